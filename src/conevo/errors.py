@@ -1,0 +1,41 @@
+"""The two ways conevo says no, each one clear line, and the nearest right name for a wrong one."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+__all__ = ["ConevoError", "EnvironmentFailure", "UsageError", "unknown_name"]
+
+
+class ConevoError(Exception):
+    """An error with a message meant for the user: one line, what was wrong, where, what is allowed."""
+
+    exit_code = 2
+
+
+class UsageError(ConevoError):
+    """The request cannot be carried out as written (exit code 2)."""
+
+
+class EnvironmentFailure(ConevoError):
+    """The machine refused: full disk, no permission, no such device (exit code 3)."""
+
+    exit_code = 3
+
+
+def unknown_name(kind: str, name: str, allowed: Iterable[str], where: str = "") -> UsageError:
+    """Return the error for an unknown name, naming the nearest known one.
+
+    Args:
+        kind: what the name should have been ("method", "key").
+        name: what was given.
+        allowed: the names that exist.
+        where: where it was found ("in config.toml"), empty if obvious.
+    """
+    names = sorted(allowed)
+    near = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
+    hint = f"; did you mean {near[0]!r}?" if near else ""
+    place = f" {where}" if where else ""
+    shown = ", ".join(names) if len(names) <= 40 else ", ".join(names[:40]) + ", ..."
+    return UsageError(f"unknown {kind} {name!r}{place}{hint} (known: {shown})")
