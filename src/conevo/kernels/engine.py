@@ -1,0 +1,112 @@
+"""Making, launching and identifying kernels: one text for CPU threads and CUDA blocks.
+
+One world is one block. On the CPU a block has a single lane that does all robots in turn, and
+slices of the batch are launched from several Python threads (Warp releases the GIL); on a CUDA
+device each lane takes its share of the robots and ``barrier`` separates the phases. Each phase
+writes only its own robot's data, so both give the same bits.
+"""
+
+import hashlib
+import os
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import warp as wp
+
+__all__ = ["barrier", "kernel_hash", "launch", "options", "start", "usable_threads"]
+
+# Measured (HOUSE section 4): no adjoints and no unrolling pay; fast_math and -O3 do not. No fused
+# multiply-add: CPU and CUDA must agree to the bit.
+options = {"enable_backward": False, "max_unroll": 0, "fuse_fp": False}
+
+_started = threading.Lock()
+_is_started = False
+
+
+def start() -> None:
+    """Initialize Warp once, quietly."""
+    global _is_started
+    with _started:
+        if not _is_started:
+            wp.config.log_level = wp.LOG_WARNING
+            wp.init()
+            _is_started = True
+
+
+@wp.func_native("WP_TILE_SYNC();")
+def barrier():  # type: ignore[no-untyped-def]
+    """Wait for all lanes of the block (nothing to wait for where a block has one lane)."""
+    ...
+
+
+def usable_threads() -> int:
+    """Return the number of hardware threads this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def launch(
+    kernel: Any,
+    n_worlds: int,
+    inputs: Sequence[Any],
+    *,
+    device: str = "cpu",
+    n_threads: int = 1,
+    lanes: int = 1,
+    stop: Callable[[], bool] | None = None,
+) -> None:
+    """Run ``kernel`` for worlds 0..n_worlds-1; its last two arguments are set here.
+
+    The kernel's arguments are ``inputs`` and ``first``, the first world of a slice. Worlds are
+    independent, so neither the slicing nor the number of threads changes a result.
+
+    Args:
+        kernel: made with ``options``; its thread index is ``(world in slice, lane)``.
+        n_worlds: number of worlds.
+        inputs: kernel arguments before ``first``.
+        device: "cpu" or a CUDA device.
+        n_threads: CPU threads to launch from.
+        lanes: lanes of a block; 1 on the CPU unless CPU blocks are being tested.
+        stop: asked between slices; true abandons the rest (results are then incomplete).
+    """
+    if device != "cpu":
+        wp.launch_tiled(
+            kernel, dim=[n_worlds], inputs=[*inputs, 0], block_dim=lanes, device=device
+        )
+        wp.synchronize_device(device)
+        return
+
+    def run(piece: tuple[int, int]) -> None:
+        if stop is None or not stop():
+            first, count = piece
+            wp.launch_tiled(
+                kernel, dim=[count], inputs=[*inputs, first], block_dim=lanes, device="cpu"
+            )
+
+    if n_threads == 1:
+        for piece in _pieces(n_worlds, 1):
+            run(piece)
+    else:
+        with ThreadPoolExecutor(n_threads) as pool:
+            for _ in pool.map(run, _pieces(n_worlds, n_threads)):
+                pass
+
+
+def _pieces(n: int, n_threads: int) -> Iterator[tuple[int, int]]:
+    """Cut n worlds into slices small enough that all threads end together."""
+    size = max(1, min(16, n // (4 * n_threads)))
+    for first in range(0, n, size):
+        yield first, min(size, n - first)
+
+
+def kernel_hash(*kernels: Any) -> str:
+    """Return 16 hex digits that change with any function, constant or option of the kernels.
+
+    It is Warp's own content hash of the kernels' modules and Warp's version: the same that decides
+    whether a compiled kernel may be used again.
+    """
+    digest = hashlib.blake2b(wp.__version__.encode(), digest_size=8)
+    for kernel in kernels:
+        digest.update(kernel.module.get_module_hash())
+    return digest.hexdigest()

@@ -1,0 +1,182 @@
+"""The controller inside a kernel: a simple recurrent network with slots for hidden neurons.
+
+Nitschke 2009, sections 3.1 and 5.2.4. The shape is data (``Shape``), so one compiled kernel serves
+every size of controller a world can have. Hidden slots are computed ``WIDE`` at a time.
+"""
+
+import warp as wp
+
+__all__ = ["OUT", "WIDE", "Networks", "Shape", "load", "networks_of", "out_vector", "think"]
+
+WIDE = wp.constant(16)
+OUT = wp.constant(8)
+wide_vector = wp.types.vector(length=16, dtype=float)
+out_vector = wp.types.vector(length=8, dtype=float)
+
+
+@wp.struct
+class Shape:
+    """Sizes of a controller (``controllers.ControllerSpec``) as the kernels need them."""
+
+    n_sensors: int
+    n_context: int
+    n_inputs: int
+    n_outputs: int
+    n_slots: int
+    n_chunks: int
+    weight_scale: float
+    bias: float
+
+
+@wp.struct
+class Networks:
+    """Weights and activations of a team's networks (or, flat, of a batch of teams).
+
+    w_in [R, chunks, inputs] of 16 slots; w_out [R, slots] of 8 outputs; filled [R, chunks] of 16
+    slots, 1 where a slot holds a neuron; n_chunks [R] in use; inputs [R, inputs] (sensors, then
+    context); outputs [R] of 8.
+    """
+
+    w_in: wp.array[wide_vector]
+    w_out: wp.array[out_vector]
+    filled: wp.array[wide_vector]
+    n_chunks: wp.array[int]
+    inputs: wp.array[float]
+    outputs: wp.array[out_vector]
+
+
+@wp.func
+def networks_of(batch: Networks, b: int, n_batch: int) -> Networks:
+    """Return the networks of team ``b`` as contiguous views of the batch's arrays."""
+    q = wp.uint64(b)
+    n_in = batch.w_in.shape[0] // n_batch
+    n_out = batch.w_out.shape[0] // n_batch
+    n_filled = batch.filled.shape[0] // n_batch
+    n = batch.n_chunks.shape[0] // n_batch
+    n_inputs = batch.inputs.shape[0] // n_batch
+    nets = Networks()
+    nets.w_in = wp.array(
+        ptr=batch.w_in.ptr + q * wp.uint64(n_in * 64), shape=(n_in,), dtype=wide_vector
+    )
+    nets.w_out = wp.array(
+        ptr=batch.w_out.ptr + q * wp.uint64(n_out * 32), shape=(n_out,), dtype=out_vector
+    )
+    nets.filled = wp.array(
+        ptr=batch.filled.ptr + q * wp.uint64(n_filled * 64), shape=(n_filled,), dtype=wide_vector
+    )
+    nets.n_chunks = wp.array(ptr=batch.n_chunks.ptr + q * wp.uint64(n * 4), shape=(n,), dtype=int)
+    nets.inputs = wp.array(
+        ptr=batch.inputs.ptr + q * wp.uint64(n_inputs * 4), shape=(n_inputs,), dtype=float
+    )
+    nets.outputs = wp.array(
+        ptr=batch.outputs.ptr + q * wp.uint64(n * 32), shape=(n,), dtype=out_vector
+    )
+    return nets
+
+
+@wp.func
+def load(
+    nets: Networks, shape: Shape, i: int, genes: wp.array2d[float], slots: wp.array3d[int], n: int
+):
+    """Build robot ``i``'s network from neuron genotypes and clear its memory.
+
+    Args:
+        genes: pool of neuron genotypes [K, G]: input weights, then output weights.
+        slots: row of the pool for each slot [N, R, U], -1 for an empty slot.
+        n: the team.
+    """
+    used = int(1)
+    for chunk in range(shape.n_chunks):
+        filled = wide_vector()
+        for k in range(WIDE):
+            slot = chunk * WIDE + k
+            row = int(-1)
+            if slot < shape.n_slots:
+                row = slots[n, i, slot]
+            out = out_vector()
+            if row >= 0:
+                used = chunk + 1
+                filled[k] = 1.0
+                for o in range(shape.n_outputs):
+                    out[o] = shape.weight_scale * genes[row, shape.n_inputs + o]
+            nets.w_out[(i * shape.n_chunks + chunk) * WIDE + k] = out
+        nets.filled[i * shape.n_chunks + chunk] = filled
+        for j in range(shape.n_inputs):
+            w = wide_vector()
+            for k in range(WIDE):
+                slot = chunk * WIDE + k
+                if filled[k] > 0.0:
+                    w[k] = shape.weight_scale * genes[slots[n, i, slot], j]
+            nets.w_in[(i * shape.n_chunks + chunk) * shape.n_inputs + j] = w
+    nets.n_chunks[i] = used
+    for j in range(shape.n_inputs):
+        nets.inputs[i * shape.n_inputs + j] = 0.0
+    nets.outputs[i] = out_vector()
+
+
+@wp.func
+def sigmoid(a: float) -> float:
+    """Return the logistic function by a rational approximation, error below 1e-6, branch-free.
+
+    The same operations on every target, unlike a library's exp.
+    """
+    h = wp.clamp(a * 0.5, -7.9, 7.9)
+    q = h * h
+    p = h * (
+        4.89352455891786e-03
+        + q
+        * (
+            6.37261928875436e-04
+            + q
+            * (
+                1.48572235717979e-05
+                + q
+                * (
+                    5.12229709037114e-08
+                    + q
+                    * (
+                        -8.60467152213735e-11
+                        + q * (2.00018790482477e-13 + q * -2.76076847742355e-16)
+                    )
+                )
+            )
+        )
+    )
+    d = 4.89352518554385e-03 + q * (
+        2.26843463243900e-03 + q * (1.18534705686654e-04 + q * 1.19825839466702e-06)
+    )
+    return 0.5 + 0.5 * (p / d)
+
+
+@wp.func
+def think(nets: Networks, shape: Shape, i: int):
+    """Run robot ``i``'s network once: inputs to outputs, hidden activations to next context.
+
+    An empty slot neither contributes to an output nor feeds the context (SPEC section 2).
+    """
+    inputs = i * shape.n_inputs
+    first = wide_vector()
+    out = out_vector()
+    for k in range(OUT):
+        out[k] = shape.bias
+    for chunk in range(nets.n_chunks[i]):
+        c = i * shape.n_chunks + chunk
+        h = wide_vector()
+        for k in range(WIDE):
+            h[k] = shape.bias
+        for j in range(shape.n_inputs):
+            h += nets.w_in[c * shape.n_inputs + j] * nets.inputs[inputs + j]
+        for k in range(WIDE):
+            h[k] = sigmoid(h[k])
+        h = wp.cw_mul(h, nets.filled[c])
+        n = wp.min(shape.n_slots - chunk * WIDE, WIDE)
+        for k in range(n):
+            out += nets.w_out[c * WIDE + k] * h[k]
+        if chunk == 0:
+            first = h
+    # Written only now: every chunk must read the context of the previous iteration.
+    for k in range(shape.n_context):
+        nets.inputs[inputs + shape.n_sensors + k] = first[k]
+    for k in range(OUT):
+        out[k] = sigmoid(out[k])
+    nets.outputs[i] = out

@@ -1,0 +1,82 @@
+"""What a world is: a task, its parameters, its controllers, and the functions that simulate it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from conevo.controllers import ControllerSpec
+
+__all__ = ["Outcome", "Simulation", "World"]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What happened to a batch of teams.
+
+    fitness [N, E, R]: each robot's private fitness. counts [N, E, R, A]: how often each robot
+    executed each action. switches [N, E, R]: how often it executed another action than just before.
+    performance: task performance measures, each [N, E].
+    """
+
+    fitness: npt.NDArray[np.float32]
+    counts: npt.NDArray[np.int32]
+    switches: npt.NDArray[np.int32]
+    performance: dict[str, npt.NDArray[np.float32]]
+
+
+@dataclass(frozen=True)
+class Simulation:
+    """The Warp side of a world: what ``worlds.rollout`` needs to run it.
+
+    ``state`` is the struct type of a team's state, its arrays flat over a batch; ``sizes`` says how
+    many elements of each array one team needs. ``scene`` is the struct type of a scenario,
+    its arrays
+    named as those of the scenarios object, ``params_type`` that of ``params``. ``functions`` are the views and the phases of an iteration: view, view_scene, reset,
+    sense, act, commit, resolve, outcome. ``recorded`` names the state arrays of one element per
+    robot that ``Rollout.record`` keeps.
+    """
+
+    state: Any
+    sizes: dict[str, int]
+    scene: Any
+    params_type: Any
+    params: Any
+    functions: dict[str, Any]
+    recorded: tuple[str, ...]
+
+
+
+class World(Protocol):
+    """One environment of a task, with its parameters."""
+
+    name: ClassVar[str]
+    actions: ClassVar[tuple[str, ...]]
+    performance: ClassVar[tuple[str, ...]]
+    heuristics: ClassVar[tuple[str, ...]]
+
+    @property
+    def environment(self) -> str:
+        """Name of the environment, as in "complex-1"."""
+
+    @property
+    def n_robots(self) -> int:
+        """Number of robots in a team."""
+
+    @property
+    def iterations(self) -> int:
+        """Iterations of one epoch, T."""
+
+    @property
+    def controller(self) -> ControllerSpec:
+        """Shape of the robots' controllers."""
+
+    def scenarios(self, keys: Sequence[int]) -> Any:
+        """Return one scenario per key: the same key always gives the same scenario."""
+
+    def simulation(self) -> Simulation:
+        """Return the Warp side of this world (imports Warp)."""

@@ -1,0 +1,102 @@
+"""The worlds there are, by name: drives the command line, the docs tables and the contract tests."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from conevo.errors import UsageError, unknown_name
+
+if TYPE_CHECKING:
+    from conevo.worlds.protocol import World
+
+__all__ = ["WORLDS", "WorldEntry", "resolve", "world"]
+
+
+@dataclass(frozen=True)
+class WorldEntry:
+    """What the registry knows of a world without loading it.
+
+    ``module`` holds the classes named ``params_name`` (parameters) and ``world_name`` (built from
+    an environment name and parameters).
+    """
+
+    name: str
+    title: str
+    summary: str
+    source: str
+    environments: tuple[str, ...]
+    module: str
+    params_name: str
+    world_name: str
+
+    @property
+    def short_name(self) -> str:
+        """The name without its version, as in "rover"."""
+        return self.name.rpartition("-v")[0]
+
+    @property
+    def params_class(self) -> type[Any]:
+        """The dataclass of the world's parameters."""
+        found: type[Any] = getattr(import_module(self.module), self.params_name)
+        return found
+
+    def build(self, environment: str, params: Any) -> World:
+        """Return one environment of this world."""
+        make: Callable[[str, Any], World] = getattr(import_module(self.module), self.world_name)
+        return make(environment, params)
+
+
+WORLDS: dict[str, WorldEntry] = {
+    entry.name: entry
+    for entry in (
+        WorldEntry(
+            name="rover-v1",
+            title="Multi-rover",
+            summary="20 rovers detect red rocks that only two of them together can detect",
+            source="Nitschke 2009, chapter 5",
+            environments=tuple(
+                f"{kind}-{n}" for kind in ("simple", "complex", "extended") for n in range(1, 11)
+            ),
+            module="conevo.worlds.rover",
+            params_name="RoverParams",
+            world_name="RoverWorld",
+        ),
+    )
+}
+
+
+def resolve(path: str) -> tuple[WorldEntry, str]:
+    """Return the entry and environment of a path like "rover/complex-1" or "rover-v1/complex-1".
+
+    Raises:
+        UsageError: no such world or environment, or no environment given.
+    """
+    name, _, environment = path.partition("/")
+    newest = {entry.short_name: entry for entry in WORLDS.values()}
+    entry = WORLDS.get(name) or newest.get(name)
+    if entry is None:
+        raise unknown_name("world", name, [*newest, *WORLDS])
+    if not environment:
+        raise UsageError(
+            f"world {name!r} needs an environment, as in {entry.short_name}/{entry.environments[0]}"
+        )
+    if environment not in entry.environments:
+        raise unknown_name("environment", environment, entry.environments, f"of world {name!r}")
+    return entry, environment
+
+
+def world(path: str, **params: Any) -> World:
+    """Return the world at a path like "rover/complex-1", with parameters other than its defaults.
+
+    Raises:
+        UsageError: unknown world, environment or parameter.
+    """
+    entry, environment = resolve(path)
+    known = entry.params_class.__dataclass_fields__
+    for key in params:
+        if key not in known:
+            raise unknown_name("parameter", key, known, f"of world {entry.name!r}")
+    return entry.build(environment, entry.params_class(**params))

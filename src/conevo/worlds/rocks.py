@@ -1,0 +1,93 @@
+"""Red rocks: what the five types are worth, and how many of each the 30 environments hold.
+
+Nitschke 2009, sections 5.1, 5.4 and table 5.1. The total red rock value of every environment is
+5000 (table 5.4); a simple environment holds only type E, a complex one types A to D. The counts of
+table 5.6 are lost.
+
+``simple-e`` and ``complex-e`` use canal layout e; all extended environments use layout 10, the
+least structured (they vary what is there, not where). Choice: the ten extended mixes, derived from
+500 of each type A to D, whole rocks, value exactly 5000:
+
+============  ====================================  ====  ====  ====  ====
+environment   rule                                     A     B     C     D
+============  ====================================  ====  ====  ====  ====
+extended-1    equal counts                           500   500   500   500
+extended-2    value share of A doubled (10 to 20 %) 1000   444   444   445
+extended-3    value share of B doubled (20 to 40 %)  375  1000   375   375
+extended-4    value share of C doubled (30 to 60 %)  286   285  1000   286
+extended-5    value share of D doubled (40 to 80 %)  167   166   167  1000
+extended-6    no A, the others equal                   0   556   556   555
+extended-7    no B, the others equal                 625     0   625   625
+extended-8    no C, the others equal                 714   715     0   714
+extended-9    no D, the others equal                 833   834   833     0
+extended-10   A and D only, equal                   1000     0     0  1000
+============  ====================================  ====  ====  ====  ====
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from conevo.errors import unknown_name
+
+__all__ = ["ENVIRONMENTS", "TYPES", "VALUES", "Mix", "layout", "mix"]
+
+TYPES = ("A", "B", "C", "D", "E")
+VALUES = (1, 2, 3, 4, 1)  # Nitschke 2009, table 5.1
+
+
+class Mix(NamedTuple):
+    """Number of rocks of each type."""
+
+    A: int = 0
+    B: int = 0
+    C: int = 0
+    D: int = 0
+    E: int = 0
+
+
+_EXTENDED = (
+    Mix(500, 500, 500, 500),
+    Mix(1000, 444, 444, 445),
+    Mix(375, 1000, 375, 375),
+    Mix(286, 285, 1000, 286),
+    Mix(167, 166, 167, 1000),
+    Mix(0, 556, 556, 555),
+    Mix(625, 0, 625, 625),
+    Mix(714, 715, 0, 714),
+    Mix(833, 834, 833, 0),
+    Mix(1000, 0, 0, 1000),
+)
+
+# environment -> (canal layout, mix)
+_TABLE = (
+    {f"simple-{e}": (e, Mix(E=5000)) for e in range(1, 11)}
+    | {f"complex-{e}": (e, Mix(500, 500, 500, 500)) for e in range(1, 11)}
+    | {f"extended-{e}": (10, counts) for e, counts in enumerate(_EXTENDED, 1)}
+)
+
+ENVIRONMENTS = tuple(_TABLE)
+
+
+def mix(environment: str) -> Mix:
+    """Return how many rocks of types A to E an environment holds (total value 5000).
+
+    Raises:
+        UsageError: there is no such environment.
+    """
+    return _look_up(environment)[1]
+
+
+def layout(environment: str) -> int:
+    """Return the number of an environment's canal layout, 1 to 10.
+
+    Raises:
+        UsageError: there is no such environment.
+    """
+    return _look_up(environment)[0]
+
+
+def _look_up(environment: str) -> tuple[int, Mix]:
+    if environment not in _TABLE:
+        raise unknown_name("rover environment", environment, ENVIRONMENTS)
+    return _TABLE[environment]

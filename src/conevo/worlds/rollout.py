@@ -1,0 +1,333 @@
+"""The single episode loop: ``evaluate`` runs batches of teams, ``record`` watches one of them.
+
+Teams are rows of a genotype pool: the kernel builds each network itself, so a generation of ten
+thousand teams needs no unpacked weights. Batches larger than the workspace run in parts.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import warp as wp
+
+from conevo.errors import EnvironmentFailure
+from conevo.kernels import engine
+from conevo.kernels.engine import barrier
+from conevo.kernels.network import WIDE, Shape, load, out_vector, think, wide_vector
+from conevo.worlds.protocol import Outcome, Simulation, World
+
+__all__ = ["Rollout", "episode_kernel"]
+
+CHUNK = 512  # worlds simulated at once: bounds memory, large enough to keep all threads busy
+
+
+@wp.struct
+class Job:
+    """What a launch is to do: which networks play, in how many scenarios, which iterations."""
+
+    shape: Shape
+    genes: wp.array2d[float]
+    slots: wp.array3d[int]
+    heuristic: wp.array2d[int]
+    n_worlds: int
+    n_scenarios: int
+    n_robots: int
+    t_begin: int
+    t_end: int
+
+
+def episode_kernel(simulation: Simulation) -> Any:
+    """Return the kernel that runs a world's iterations ``t_begin`` to ``t_end``."""
+    f = simulation.functions
+    return _episode_kernel(
+        simulation.state,
+        simulation.scene,
+        simulation.params_type,
+        *(f[name] for name in _PHASES),
+    )
+
+
+_PHASES = ("view", "view_scene", "reset", "sense", "act", "commit", "resolve", "outcome")
+
+
+@cache
+def _episode_kernel(
+    State: Any,  # noqa: N803 (types)
+    Scene: Any,  # noqa: N803
+    Params: Any,  # noqa: N803
+    view: Any,
+    view_scene: Any,
+    reset: Any,
+    sense: Any,
+    act: Any,
+    commit: Any,
+    resolve: Any,
+    outcome: Any,
+) -> Any:
+    @wp.kernel(module="unique", module_options=engine.options, grid_stride=False)
+    def episode(batch: State, scenes: Scene, p: Params, job: Job, first: int):
+        index, lane = wp.tid()
+        b = first + index
+        lanes = wp.block_dim()
+        n = b // job.n_scenarios
+        team = view(batch, b, job.n_worlds)
+        scene = view_scene(scenes, b % job.n_scenarios, job.n_scenarios)
+        if job.t_begin == 0:
+            for i in range(lane, job.n_robots, lanes):
+                reset(team, scene, p, i)
+                load(team.nets, job.shape, i, job.genes, job.slots, n)
+                team.heuristic[i] = job.heuristic[n, i]
+            barrier()
+        for t in range(job.t_begin, job.t_end):
+            for i in range(lane, job.n_robots, lanes):
+                sense(team, scene, p, i, t)
+                if team.heuristic[i] < 0:
+                    think(team.nets, job.shape, i)
+                act(team, scene, p, i, t)
+            barrier()
+            for i in range(lane, job.n_robots, lanes):
+                commit(team, scene, p, i, t)
+            barrier()
+            for i in range(lane, job.n_robots, lanes):
+                resolve(team, scene, p, i, t)
+            barrier()
+        if lane == 0:
+            outcome(team, scene, p, job.t_end)
+
+    return episode
+
+
+@dataclass
+class _Workspace:
+    """Arrays of a batch of at most ``n`` worlds, used again and again."""
+
+    n: int
+    state: Any
+    host: dict[str, Any]
+
+
+class Rollout:
+    """Runs teams in one world.
+
+    Args:
+        world: the world and environment to run.
+        n_threads: CPU threads; all usable ones by default. Results do not depend on it.
+        device: "cpu" or a CUDA device as Warp names it.
+        lanes: lanes of a CPU block (for tests of the CUDA form; needs Warp's CPU blocks).
+
+    Raises:
+        EnvironmentFailure: the device does not exist.
+    """
+
+    def __init__(
+        self, world: World, n_threads: int | None = None, device: str = "cpu", lanes: int = 1
+    ) -> None:
+        engine.start()
+        self.world = world
+        self.device = device
+        self.n_threads = n_threads or engine.usable_threads()
+        self.lanes = 32 if device != "cpu" else lanes
+        if device != "cpu" and not wp.is_cuda_available():
+            raise EnvironmentFailure(
+                f"device {device!r}: no CUDA device on this machine; allowed here: cpu"
+            )
+        self._simulation = world.simulation()
+        self._kernel = episode_kernel(self._simulation)
+        spec = world.controller
+        shape = Shape()
+        shape.n_sensors = spec.n_sensors
+        shape.n_context = spec.n_context
+        shape.n_inputs = spec.n_inputs
+        shape.n_outputs = spec.n_outputs
+        shape.n_slots = spec.max_hidden
+        shape.n_chunks = -(-spec.max_hidden // int(WIDE))
+        shape.weight_scale = spec.weight_scale
+        shape.bias = float(spec.bias)
+        self._shape = shape
+        self._workspace: _Workspace | None = None
+
+    @property
+    def kernel_hash(self) -> str:
+        """Sixteen hex digits that change with anything the kernel is made of."""
+        return engine.kernel_hash(self._kernel)
+
+    def evaluate(
+        self,
+        genes: npt.NDArray[np.float32],
+        teams: npt.NDArray[np.int32],
+        scenarios: Any,
+        heuristic: npt.NDArray[np.int32] | None = None,
+        stop: Callable[[], bool] | None = None,
+    ) -> Outcome:
+        """Run every team in every scenario and return what happened.
+
+        Args:
+            genes: pool of neuron genotypes [K, G], float32.
+            teams: pool rows of the neurons [N, R, U] (team, robot, slot), -1 for an empty slot.
+            scenarios: E scenarios of this world.
+            heuristic: [N, R], index of a heuristic controller of the world, -1 for the network.
+            stop: asked now and then; true ends the work early with KeyboardInterrupt.
+
+        Raises:
+            ValueError: shapes or rows that do not fit this world.
+        """
+        genes, teams, heuristic = self._checked(genes, teams, heuristic)
+        n_teams, e, r = len(teams), len(scenarios), self.world.n_robots
+        n_actions = len(self.world.actions)
+        parts = []
+        scene = self._scene(scenarios)
+        step = max(1, CHUNK // e)
+        for first in range(0, n_teams, step):
+            some = slice(first, min(first + step, n_teams))
+            batch = self._batch((some.stop - some.start) * e)
+            job = self._job(genes, teams[some], heuristic[some], e)
+            self._launch(batch, scene, job, (some.stop - some.start) * e, stop)
+            if stop is not None and stop():
+                raise KeyboardInterrupt
+            parts.append(self._collect(batch, some.stop - some.start, e))
+        joined = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+        return Outcome(
+            fitness=joined["fitness"].reshape(n_teams, e, r),
+            counts=joined["counts"].reshape(n_teams, e, r, n_actions),
+            switches=joined["switches"].reshape(n_teams, e, r),
+            performance={
+                name: joined["performance"].reshape(n_teams, e, -1)[:, :, k]
+                for k, name in enumerate(self.world.performance)
+            },
+        )
+
+    def record(
+        self,
+        genes: npt.NDArray[np.float32],
+        team: npt.NDArray[np.int32],
+        scenarios: Any,
+        heuristic: npt.NDArray[np.int32] | None = None,
+    ) -> dict[str, npt.NDArray[Any]]:
+        """Run one team in one scenario and return its state after every iteration.
+
+        The same kernel as ``evaluate``, launched one iteration at a time, so the same bits.
+
+        Args:
+            genes: pool of neuron genotypes [K, G].
+            team: pool rows [R, U].
+            scenarios: exactly one scenario.
+            heuristic: [R] or None.
+
+        Returns:
+            The world's recorded arrays, each [T, R], and ``inputs`` [T, R, sensors + context].
+        """
+        if len(scenarios) != 1:
+            raise ValueError(f"record takes one scenario, got {len(scenarios)}")
+        genes, teams, modes = self._checked(
+            genes, team[None], None if heuristic is None else heuristic[None]
+        )
+        scene, batch = self._scene(scenarios), self._batch(1)
+        job = self._job(genes, teams, modes, 1)
+        steps: dict[str, list[npt.NDArray[Any]]] = {n: [] for n in self._simulation.recorded}
+        inputs = []
+        for t in range(self.world.iterations):
+            job.t_begin, job.t_end = t, t + 1
+            self._launch(batch, scene, job, 1, None)
+            for name, values in steps.items():
+                values.append(getattr(batch.state, name).numpy()[: self.world.n_robots].copy())
+            inputs.append(batch.state.nets.inputs.numpy().copy())
+        r = self.world.n_robots
+        return {name: np.stack(values) for name, values in steps.items()} | {
+            "inputs": np.stack(inputs).reshape(self.world.iterations, r, -1)
+        }
+
+    def _checked(
+        self,
+        genes: npt.NDArray[np.float32],
+        teams: npt.NDArray[np.int32],
+        heuristic: npt.NDArray[np.int32] | None,
+    ) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.int32], npt.NDArray[np.int32]]:
+        spec, r = self.world.controller, self.world.n_robots
+        if genes.ndim != 2 or genes.shape[1] != spec.n_genes:
+            raise ValueError(f"genes must be [K, {spec.n_genes}], got {list(genes.shape)}")
+        if teams.ndim != 3 or teams.shape[1:] != (r, spec.max_hidden):
+            raise ValueError(f"teams must be [N, {r}, {spec.max_hidden}], got {list(teams.shape)}")
+        if teams.size and not (teams.min() >= -1 and teams.max() < len(genes)):
+            raise ValueError(f"teams must hold rows -1..{len(genes) - 1} of the pool")
+        if heuristic is None:
+            heuristic = np.full(teams.shape[:2], -1, dtype=np.int32)
+        n = len(self.world.heuristics)
+        if heuristic.shape != teams.shape[:2] or heuristic.min() < -1 or heuristic.max() >= n:
+            raise ValueError(f"heuristic must be {list(teams.shape[:2])} of -1..{n - 1}")
+        return (
+            np.ascontiguousarray(genes, dtype=np.float32),
+            np.ascontiguousarray(teams, dtype=np.int32),
+            np.ascontiguousarray(heuristic, dtype=np.int32),
+        )
+
+    def _scene(self, scenarios: Any) -> Any:
+        scene = self._simulation.scene()
+        for name in self._simulation.scene.vars:
+            setattr(scene, name, self._array(getattr(scenarios, name).reshape(-1)))
+        return scene
+
+    def _array(self, values: npt.NDArray[Any]) -> Any:
+        dtype = wp.dtype_from_numpy(values.dtype)
+        return wp.array(values, dtype=dtype, device=self.device, copy=self.device != "cpu")
+
+    def _job(
+        self,
+        genes: npt.NDArray[np.float32],
+        teams: npt.NDArray[np.int32],
+        heuristic: npt.NDArray[np.int32],
+        n_scenarios: int,
+    ) -> Any:
+        job = Job()
+        job.shape = self._shape
+        job.genes = self._array(genes)
+        job.slots = self._array(teams)
+        job.heuristic = self._array(heuristic)
+        job.n_scenarios = n_scenarios
+        job.n_robots = self.world.n_robots
+        job.t_begin, job.t_end = 0, self.world.iterations
+        return job
+
+    def _batch(self, n: int) -> _Workspace:
+        """Return a workspace of at least n worlds."""
+        if self._workspace is None or self._workspace.n < n:
+            r, chunks = self.world.n_robots, self._shape.n_chunks
+            state = self._simulation.state()
+            for name, size in self._simulation.sizes.items():
+                dtype = self._simulation.state.vars[name].type.dtype
+                setattr(state, name, wp.zeros(n * size, dtype=dtype, device=self.device))
+            nets = state.nets
+            slots = chunks * int(WIDE)
+            zeros = {"device": self.device}
+            nets.w_in = wp.zeros(n * r * chunks * self._shape.n_inputs, dtype=wide_vector, **zeros)
+            nets.w_out = wp.zeros(n * r * slots, dtype=out_vector, **zeros)
+            nets.filled = wp.zeros(n * r * chunks, dtype=wide_vector, **zeros)
+            nets.n_chunks = wp.zeros(n * r, dtype=int, **zeros)
+            nets.inputs = wp.zeros(n * r * self._shape.n_inputs, dtype=float, **zeros)
+            nets.outputs = wp.zeros(n * r, dtype=out_vector, **zeros)
+            self._workspace = _Workspace(n, state, {})
+        return self._workspace
+
+    def _launch(
+        self, batch: _Workspace, scene: Any, job: Any, n: int, stop: Callable[[], bool] | None
+    ) -> None:
+        job.n_worlds = batch.n
+        engine.launch(
+            self._kernel,
+            n,
+            [batch.state, scene, self._simulation.params, job],
+            device=self.device,
+            n_threads=self.n_threads,
+            lanes=self.lanes,
+            stop=stop,
+        )
+
+    def _collect(self, batch: _Workspace, n_teams: int, e: int) -> dict[str, npt.NDArray[Any]]:
+        n = n_teams * e
+        sizes = self._simulation.sizes
+        return {
+            name: getattr(batch.state, name).numpy()[: n * sizes[name]].reshape(n_teams, -1).copy()
+            for name in ("fitness", "counts", "switches", "performance")
+        }
