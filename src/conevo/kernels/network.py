@@ -33,14 +33,14 @@ class Networks:
     """Weights and activations of a team's networks (or, flat, of a batch of teams).
 
     w_in [R, chunks, inputs] of 16 slots; w_out [R, slots] of 8 outputs; filled [R, chunks] of 16
-    slots, 1 where a slot holds a neuron; n_chunks [R] in use; inputs [R, inputs] (sensors, then
+    slots, 1 where a slot holds a neuron; n_used [R], one above the last filled slot; inputs [R, inputs] (sensors, then
     context); outputs [R] of 8.
     """
 
     w_in: wp.array[wide_vector]
     w_out: wp.array[out_vector]
     filled: wp.array[wide_vector]
-    n_chunks: wp.array[int]
+    n_used: wp.array[int]
     inputs: wp.array[float]
     outputs: wp.array[out_vector]
 
@@ -52,7 +52,7 @@ def networks_of(batch: Networks, b: int, n_batch: int) -> Networks:
     n_in = batch.w_in.shape[0] // n_batch
     n_out = batch.w_out.shape[0] // n_batch
     n_filled = batch.filled.shape[0] // n_batch
-    n = batch.n_chunks.shape[0] // n_batch
+    n = batch.n_used.shape[0] // n_batch
     n_inputs = batch.inputs.shape[0] // n_batch
     nets = Networks()
     nets.w_in = wp.array(
@@ -64,7 +64,7 @@ def networks_of(batch: Networks, b: int, n_batch: int) -> Networks:
     nets.filled = wp.array(
         ptr=batch.filled.ptr + q * wp.uint64(n_filled * 64), shape=(n_filled,), dtype=wide_vector
     )
-    nets.n_chunks = wp.array(ptr=batch.n_chunks.ptr + q * wp.uint64(n * 4), shape=(n,), dtype=int)
+    nets.n_used = wp.array(ptr=batch.n_used.ptr + q * wp.uint64(n * 4), shape=(n,), dtype=int)
     nets.inputs = wp.array(
         ptr=batch.inputs.ptr + q * wp.uint64(n_inputs * 4), shape=(n_inputs,), dtype=float
     )
@@ -85,7 +85,7 @@ def load(
         slots: row of the pool for each slot [N, R, U], -1 for an empty slot.
         n: the team.
     """
-    used = int(1)
+    used = int(0)
     for chunk in range(shape.n_chunks):
         filled = wide_vector()
         for k in range(WIDE):
@@ -95,7 +95,7 @@ def load(
                 row = slots[n, i, slot]
             out = out_vector()
             if row >= 0:
-                used = chunk + 1
+                used = slot + 1
                 filled[k] = 1.0
                 for o in range(shape.n_outputs):
                     out[o] = shape.weight_scale * genes[row, shape.n_inputs + o]
@@ -108,7 +108,7 @@ def load(
                 if filled[k] > 0.0:
                     w[k] = shape.weight_scale * genes[slots[n, i, slot], j]
             nets.w_in[(i * shape.n_chunks + chunk) * shape.n_inputs + j] = w
-    nets.n_chunks[i] = used
+    nets.n_used[i] = used
     for j in range(shape.n_inputs):
         nets.inputs[i * shape.n_inputs + j] = 0.0
     nets.outputs[i] = out_vector()
@@ -155,11 +155,12 @@ def think(nets: Networks, shape: Shape, i: int):
     An empty slot neither contributes to an output nor feeds the context (SPEC section 2).
     """
     inputs = i * shape.n_inputs
+    used = nets.n_used[i]
     first = wide_vector()
     out = out_vector()
     for k in range(OUT):
         out[k] = shape.bias
-    for chunk in range(nets.n_chunks[i]):
+    for chunk in range((used + WIDE - 1) // WIDE):
         c = i * shape.n_chunks + chunk
         h = wide_vector()
         for k in range(WIDE):
@@ -169,8 +170,7 @@ def think(nets: Networks, shape: Shape, i: int):
         for k in range(WIDE):
             h[k] = sigmoid(h[k])
         h = wp.cw_mul(h, nets.filled[c])
-        n = wp.min(shape.n_slots - chunk * WIDE, WIDE)
-        for k in range(n):
+        for k in range(wp.min(used - chunk * WIDE, WIDE)):
             out += nets.w_out[c * WIDE + k] * h[k]
         if chunk == 0:
             first = h

@@ -49,7 +49,7 @@ _MARGIN = 8  # free cells along the border
 _CLEAR = 11.0  # smallest distance between the middles of two strokes, in cells
 _REACH = 4.5  # largest distance from a canal cell to a free cell, in cells
 _QUARTER = 0.18  # smallest share of the canal cells in each quarter of the square
-_PIECES = (1, 2, 3, 5, 7, 11, 16, 24, 34, 46)  # connected pieces of layouts 1..10
+_PIECES = (1, 2, 3, 5, 7, 11, 16, 24, 34, 46)  # aimed at, layouts 1..10
 
 
 def load(environment: int) -> BoolArray:

@@ -304,7 +304,7 @@ class Rollout:
             nets.w_in = wp.zeros(n * r * chunks * self._shape.n_inputs, dtype=wide_vector, **zeros)
             nets.w_out = wp.zeros(n * r * slots, dtype=out_vector, **zeros)
             nets.filled = wp.zeros(n * r * chunks, dtype=wide_vector, **zeros)
-            nets.n_chunks = wp.zeros(n * r, dtype=int, **zeros)
+            nets.n_used = wp.zeros(n * r, dtype=int, **zeros)
             nets.inputs = wp.zeros(n * r * self._shape.n_inputs, dtype=float, **zeros)
             nets.outputs = wp.zeros(n * r, dtype=out_vector, **zeros)
             self._workspace = _Workspace(n, state, {})
