@@ -8,9 +8,12 @@ writes only its own robot's data, so both give the same bits.
 
 import hashlib
 import os
+import sys
+import tempfile
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from typing import Any
 
 import warp as wp
@@ -31,14 +34,30 @@ def start() -> None:
     with _started:
         if not _is_started:
             wp.config.log_level = wp.LOG_WARNING
-            wp.init()
+            with _without_driver_warning():
+                wp.init()
             _is_started = True
+
+
+@contextmanager
+def _without_driver_warning() -> Iterator[None]:
+    """Drop the line that Warp's native code prints where there is no GPU driver, and no other."""
+    sys.stderr.flush()
+    with tempfile.TemporaryFile() as caught, open(os.dup(2), "wb", buffering=0) as real:
+        os.dup2(caught.fileno(), 2)
+        try:
+            yield
+        finally:
+            os.dup2(real.fileno(), 2)
+            caught.seek(0)
+            for line in caught:
+                if b"CUDA driver" not in line:
+                    real.write(line)
 
 
 @wp.func_native("WP_TILE_SYNC();")
 def barrier():  # type: ignore[no-untyped-def]
     """Wait for all lanes of the block (nothing to wait for where a block has one lane)."""
-    ...
 
 
 def usable_threads() -> int:
@@ -71,9 +90,7 @@ def launch(
         stop: asked between slices; true abandons the rest (results are then incomplete).
     """
     if device != "cpu":
-        wp.launch_tiled(
-            kernel, dim=[n_worlds], inputs=[*inputs, 0], block_dim=lanes, device=device
-        )
+        wp.launch_tiled(kernel, dim=[n_worlds], inputs=[*inputs, 0], block_dim=lanes, device=device)
         wp.synchronize_device(device)
         return
 

@@ -46,7 +46,8 @@ def cover_disc(grid: wp.array[wp.uint64], base: int, x: float, y: float, r: floa
     Args:
         grid: words of one or more coverage grids, ``COVER_WORDS`` each.
         base: first word of the grid to mark.
-        x, y: centre of the disc, in sides of the square.
+        x: first coordinate of the disc's centre, in sides of the square.
+        y: second coordinate.
         r: radius, in sides of the square.
     """
     n = float(COVER_CELLS)

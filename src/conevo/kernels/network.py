@@ -33,8 +33,8 @@ class Networks:
     """Weights and activations of a team's networks (or, flat, of a batch of teams).
 
     w_in [R, chunks, inputs] of 16 slots; w_out [R, slots] of 8 outputs; filled [R, chunks] of 16
-    slots, 1 where a slot holds a neuron; n_used [R], one above the last filled slot; inputs [R, inputs] (sensors, then
-    context); outputs [R] of 8.
+    slots, 1 where a slot holds a neuron; n_used [R], one above the last filled slot;
+    inputs [R, inputs] (sensors, then context); outputs [R] of 8.
     """
 
     w_in: wp.array[wide_vector]
@@ -77,10 +77,13 @@ def networks_of(batch: Networks, b: int, n_batch: int) -> Networks:
 @wp.func
 def load(
     nets: Networks, shape: Shape, i: int, genes: wp.array2d[float], slots: wp.array3d[int], n: int
-):
+) -> None:
     """Build robot ``i``'s network from neuron genotypes and clear its memory.
 
     Args:
+        nets: networks of one team, to be filled.
+        shape: sizes of a controller.
+        i: the robot.
         genes: pool of neuron genotypes [K, G]: input weights, then output weights.
         slots: row of the pool for each slot [N, R, U], -1 for an empty slot.
         n: the team.
@@ -149,7 +152,7 @@ def sigmoid(a: float) -> float:
 
 
 @wp.func
-def think(nets: Networks, shape: Shape, i: int):
+def think(nets: Networks, shape: Shape, i: int) -> None:
     """Run robot ``i``'s network once: inputs to outputs, hidden activations to next context.
 
     An empty slot neither contributes to an output nor feeds the context (SPEC section 2).

@@ -33,12 +33,13 @@ class Outcome:
 class Simulation:
     """The Warp side of a world: what ``worlds.rollout`` needs to run it.
 
-    ``state`` is the struct type of a team's state, its arrays flat over a batch; ``sizes`` says how
-    many elements of each array one team needs. ``scene`` is the struct type of a scenario,
-    its arrays
-    named as those of the scenarios object, ``params_type`` that of ``params``. ``functions`` are the views and the phases of an iteration: view, view_scene, reset,
-    sense, act, commit, resolve, outcome. ``recorded`` names the state arrays of one element per
-    robot that ``Rollout.record`` keeps.
+    state: struct type of a team's state, with a field ``nets`` of networks; its other arrays are
+        flat over a batch of teams. sizes: elements that one team needs of each of them.
+    scene: struct type of a scenario; its arrays are those of the scenarios object, by name.
+    params_type, params: struct type of the parameters, and the parameters.
+    functions: the views and the phases of an iteration: view, view_scene, reset, sense, act,
+        commit, resolve, outcome.
+    recorded: state arrays of one element per robot that ``Rollout.record`` keeps.
     """
 
     state: Any
@@ -48,7 +49,6 @@ class Simulation:
     params: Any
     functions: dict[str, Any]
     recorded: tuple[str, ...]
-
 
 
 class World(Protocol):

@@ -1,4 +1,4 @@
-"""The worlds there are, by name: drives the command line, the docs tables and the contract tests."""
+"""The worlds there are: drives the command line, the docs tables and the contract tests."""
 
 from __future__ import annotations
 

@@ -55,9 +55,9 @@ _PHASES = ("view", "view_scene", "reset", "sense", "act", "commit", "resolve", "
 
 @cache
 def _episode_kernel(
-    State: Any,  # noqa: N803 (types)
-    Scene: Any,  # noqa: N803
-    Params: Any,  # noqa: N803
+    State: Any,
+    Scene: Any,
+    Params: Any,
     view: Any,
     view_scene: Any,
     reset: Any,
@@ -68,7 +68,7 @@ def _episode_kernel(
     outcome: Any,
 ) -> Any:
     @wp.kernel(module="unique", module_options=engine.options, grid_stride=False)
-    def episode(batch: State, scenes: Scene, p: Params, job: Job, first: int):
+    def episode(batch: State, scenes: Scene, p: Params, job: Job, first: int) -> None:
         index, lane = wp.tid()
         b = first + index
         lanes = wp.block_dim()

@@ -1,0 +1,451 @@
+"""The dynamics of the multi-rover world: what a rover does in one iteration, as Warp functions.
+
+State, reset, sense, act, commit, resolve, outcome; the rules and the choices stand on the card of
+``worlds.rover``. Every function is called for one robot and writes only that robot's data.
+"""
+
+import warp as wp
+
+from conevo.kernels.geometry import COVER_CELLS, COVER_WORDS, cover_disc, covered_by_any, octant
+from conevo.kernels.network import Networks, networks_of
+from conevo.kernels.random import uniform
+from conevo.worlds import canals
+
+__all__ = [
+    "FUNCTIONS",
+    "N_ACTIONS",
+    "ROCK_CELLS",
+    "Params",
+    "Scene",
+    "Team",
+]
+
+# --- state ----------------------------------------------------------------------------------------
+
+N_ACTIONS = wp.constant(4)
+MOVE = wp.constant(3)
+NONE = wp.constant(-1)
+ROCK_CELLS = wp.constant(40)  # grid over the rocks; 0.025 wide, so a disc needs few cells
+CANAL_CELLS = wp.constant(canals.N_CELLS)
+UNDETECTED = wp.constant(2**31 - 1)
+HEURISTIC = wp.constant(2**20 - 4)  # counters above every rock's, for heuristic controllers
+
+octants = wp.types.vector(length=8, dtype=float)
+
+
+@wp.struct
+class Params:
+    """``RoverParams`` for the kernels, squared and combined where that is what they need."""
+
+    n_robots: int
+    energy: float
+    ranges: wp.vec3f
+    accuracy: wp.vec3f
+    cost: wp.vec3f
+    rover_range_2: float
+    rover_cost: float
+    move_range: float
+    move_cost: float
+    report_cost: float
+    min_distance_2: float
+    separation_2: float
+    mate_range_2: float
+    fitness_is_product: int
+
+
+@wp.struct
+class Scene:
+    """A scenario: rocks sorted by grid cell, canals, starts. Flat over the scenarios of a batch."""
+
+    rock_x: wp.array[float]
+    rock_y: wp.array[float]
+    rock_value: wp.array[float]
+    rock_type: wp.array[int]
+    cell: wp.array[int]
+    canal: wp.array[wp.uint8]
+    start_x: wp.array[float]
+    start_y: wp.array[float]
+    seed: wp.array[wp.uint64]
+
+
+@wp.struct
+class Team:
+    """State of a team, flat over a batch. R robots, K rocks."""
+
+    nets: Networks
+    x: wp.array[float]
+    y: wp.array[float]
+    to_x: wp.array[float]
+    to_y: wp.array[float]
+    action: wp.array[int]  # executed in the previous iteration, NONE if it did nothing
+    chosen: wp.array[int]
+    setting: wp.array[int]
+    heuristic: wp.array[int]
+    energy: wp.array[float]
+    detected: wp.array[int]  # [K] iteration of detection; "undetected at t" is detected >= t
+    cover: wp.array[wp.uint64]  # [R, COVER_WORDS]
+    covered: wp.array[int]
+    covered_range: wp.array[float]  # largest disc already marked at the present place
+    value: wp.array[float]
+    fitness: wp.array[float]
+    counts: wp.array[int]  # [R, A]
+    switches: wp.array[int]
+    performance: wp.array[float]  # value, area
+
+
+@wp.func
+def view(batch: Team, b: int, n: int) -> Team:
+    """Return team ``b`` of a batch of ``n`` as contiguous views (faster than slices: measured)."""
+    q = wp.uint64(b)
+    team = Team()
+    team.nets = networks_of(batch.nets, b, n)
+    r = batch.x.shape[0] // n
+    q4 = q * wp.uint64(4 * r)
+    team.x = wp.array(ptr=batch.x.ptr + q4, shape=(r,), dtype=float)
+    team.y = wp.array(ptr=batch.y.ptr + q4, shape=(r,), dtype=float)
+    team.to_x = wp.array(ptr=batch.to_x.ptr + q4, shape=(r,), dtype=float)
+    team.to_y = wp.array(ptr=batch.to_y.ptr + q4, shape=(r,), dtype=float)
+    team.action = wp.array(ptr=batch.action.ptr + q4, shape=(r,), dtype=int)
+    team.chosen = wp.array(ptr=batch.chosen.ptr + q4, shape=(r,), dtype=int)
+    team.setting = wp.array(ptr=batch.setting.ptr + q4, shape=(r,), dtype=int)
+    team.heuristic = wp.array(ptr=batch.heuristic.ptr + q4, shape=(r,), dtype=int)
+    team.energy = wp.array(ptr=batch.energy.ptr + q4, shape=(r,), dtype=float)
+    team.covered = wp.array(ptr=batch.covered.ptr + q4, shape=(r,), dtype=int)
+    team.covered_range = wp.array(ptr=batch.covered_range.ptr + q4, shape=(r,), dtype=float)
+    team.value = wp.array(ptr=batch.value.ptr + q4, shape=(r,), dtype=float)
+    team.fitness = wp.array(ptr=batch.fitness.ptr + q4, shape=(r,), dtype=float)
+    team.switches = wp.array(ptr=batch.switches.ptr + q4, shape=(r,), dtype=int)
+    a = r * N_ACTIONS
+    team.counts = wp.array(ptr=batch.counts.ptr + q * wp.uint64(4 * a), shape=(a,), dtype=int)
+    k = batch.detected.shape[0] // n
+    team.detected = wp.array(ptr=batch.detected.ptr + q * wp.uint64(4 * k), shape=(k,), dtype=int)
+    c = r * COVER_WORDS
+    team.cover = wp.array(ptr=batch.cover.ptr + q * wp.uint64(8 * c), shape=(c,), dtype=wp.uint64)
+    team.performance = wp.array(
+        ptr=batch.performance.ptr + q * wp.uint64(8), shape=(2,), dtype=float
+    )
+    return team
+
+
+@wp.func
+def view_scene(scenes: Scene, e: int, n: int) -> Scene:
+    """Return scenario ``e`` of ``n`` as contiguous views."""
+    q = wp.uint64(e)
+    scene = Scene()
+    k = scenes.rock_x.shape[0] // n
+    q4 = q * wp.uint64(4 * k)
+    scene.rock_x = wp.array(ptr=scenes.rock_x.ptr + q4, shape=(k,), dtype=float)
+    scene.rock_y = wp.array(ptr=scenes.rock_y.ptr + q4, shape=(k,), dtype=float)
+    scene.rock_value = wp.array(ptr=scenes.rock_value.ptr + q4, shape=(k,), dtype=float)
+    scene.rock_type = wp.array(ptr=scenes.rock_type.ptr + q4, shape=(k,), dtype=int)
+    c = scenes.cell.shape[0] // n
+    scene.cell = wp.array(ptr=scenes.cell.ptr + q * wp.uint64(4 * c), shape=(c,), dtype=int)
+    scene.canal = wp.array(ptr=scenes.canal.ptr, shape=(CANAL_CELLS * CANAL_CELLS,), dtype=wp.uint8)
+    r = scenes.start_x.shape[0] // n
+    scene.start_x = wp.array(ptr=scenes.start_x.ptr + q * wp.uint64(4 * r), shape=(r,), dtype=float)
+    scene.start_y = wp.array(ptr=scenes.start_y.ptr + q * wp.uint64(4 * r), shape=(r,), dtype=float)
+    scene.seed = wp.array(ptr=scenes.seed.ptr + q * wp.uint64(8), shape=(1,), dtype=wp.uint64)
+    return scene
+
+
+# --- reset ----------------------------------------------------------------------------------------
+
+
+@wp.func
+def reset(team: Team, scene: Scene, p: Params, i: int) -> None:
+    """Put rover ``i`` at its start and clear its share of what is recorded."""
+    team.x[i] = scene.start_x[i]
+    team.y[i] = scene.start_y[i]
+    team.action[i] = NONE
+    team.setting[i] = 0
+    team.energy[i] = p.energy
+    team.covered[i] = 0
+    team.covered_range[i] = 0.0
+    team.value[i] = 0.0
+    team.fitness[i] = 0.0
+    team.switches[i] = 0
+    for a in range(N_ACTIONS):
+        team.counts[i * N_ACTIONS + a] = 0
+    for word in range(COVER_WORDS):
+        team.cover[i * COVER_WORDS + word] = wp.uint64(0)
+    for k in range(i, team.detected.shape[0], p.n_robots):
+        team.detected[k] = UNDETECTED
+
+
+# --- sense ----------------------------------------------------------------------------------------
+
+
+@wp.func
+def rock_cell(v: float) -> int:
+    """Return the row or column of the rock grid that a coordinate lies in."""
+    return wp.clamp(int(v * float(ROCK_CELLS)), 0, ROCK_CELLS - 1)
+
+
+@wp.func
+def sense(team: Team, scene: Scene, p: Params, i: int, t: int) -> None:
+    """Fill rover ``i``'s 16 sensor inputs (eqs 5.2, 5.3), each mapped monotonically into [0, 1].
+
+    Choice: a rover sensor reads setting d_min^2 / (3 d^2); a rock sensor z / (1 + z) with z the
+    sum of value d_min^2 / d^2 over the undetected rocks in its octant; d is at least d_min.
+    """
+    if team.energy[i] <= 0.0:
+        return
+    base = i * (team.nets.inputs.shape[0] // p.n_robots)
+    x = team.x[i]
+    y = team.y[i]
+    for k in range(16):
+        team.nets.inputs[base + k] = 0.0
+    near = int(0)
+    for j in range(p.n_robots):
+        dx = team.x[j] - x
+        dy = team.y[j] - y
+        near += int(dx * dx + dy * dy < p.rover_range_2)
+    if near > 1:
+        for o in range(8):
+            closest = float(p.rover_range_2)
+            setting = int(0)
+            for j in range(p.n_robots):
+                dx = team.x[j] - x
+                dy = team.y[j] - y
+                d2 = dx * dx + dy * dy
+                if j != i and d2 < closest:
+                    if octant(dx, dy) == o:
+                        closest = d2
+                        setting = team.setting[j] + 1
+            team.nets.inputs[base + o] = (
+                float(setting) * p.min_distance_2 / (3.0 * wp.max(closest, p.min_distance_2))
+            )
+    a = team.action[i]
+    if a != NONE and a < MOVE:
+        r = p.ranges[a]
+        z = octants()
+        first = rock_cell(x - r)
+        last = rock_cell(x + r)
+        for row in range(rock_cell(y - r), rock_cell(y + r) + 1):
+            cells = row * ROCK_CELLS
+            for k in range(scene.cell[cells + first], scene.cell[cells + last + 1]):
+                dx = scene.rock_x[k] - x
+                dy = scene.rock_y[k] - y
+                d2 = dx * dx + dy * dy
+                if d2 < r * r:
+                    if team.detected[k] >= t:
+                        o = octant(dx, dy)
+                        z[o] = z[o] + (
+                            scene.rock_value[k] * p.min_distance_2 / wp.max(d2, p.min_distance_2)
+                        )
+        for o in range(8):
+            team.nets.inputs[base + 8 + o] = z[o] / (1.0 + z[o])
+
+
+# --- act ------------------------------------------------------------------------------------------
+
+
+@wp.func
+def is_refused(team: Team, scene: Scene, p: Params, i: int, x: float, y: float) -> bool:
+    """Return whether rover ``i`` may not move to a place: edge, canal, or another rover there."""
+    if x < 0.0 or x >= 1.0 or y < 0.0 or y >= 1.0:
+        return True
+    n = float(CANAL_CELLS)
+    if scene.canal[int(y * n) * CANAL_CELLS + int(x * n)] != wp.uint8(0):
+        return True
+    close = int(0)
+    for j in range(p.n_robots):
+        dx = team.x[j] - x
+        dy = team.y[j] - y
+        close += int(dx * dx + dy * dy < p.separation_2 and j != i)
+    return close > 0
+
+
+@wp.func
+def act(team: Team, scene: Scene, p: Params, i: int, t: int) -> None:
+    """Choose rover ``i``'s action from its outputs (section 5.2.5) and propose where it will be.
+
+    A heuristic rover draws its action from table 5.3 and, if it moves, a random direction.
+    """
+    team.to_x[i] = team.x[i]
+    team.to_y[i] = team.y[i]
+    if team.energy[i] <= 0.0:
+        team.chosen[i] = NONE
+        return
+    a = int(0)
+    dx = float(0.0)
+    dy = float(0.0)
+    h = team.heuristic[i]
+    if h >= 0:
+        u = uniform(scene.seed[0], t, HEURISTIC, i)
+        if h < 3:
+            a = wp.where(u < 0.7, h, MOVE)
+        else:
+            a = wp.min(int(u * 4.0), MOVE)
+        turn = uniform(scene.seed[0], t, HEURISTIC + 1, i) * 6.2831853
+        dx = p.move_range * wp.cos(turn)
+        dy = p.move_range * wp.sin(turn)
+    else:
+        out = team.nets.outputs[i]
+        best = out[0]
+        for k in range(1, 5):
+            if out[k] > best:
+                best = out[k]
+                a = wp.min(k, MOVE)
+        # "Normalized and scaled" (5.2.6): both outputs at an extreme make the largest step.
+        dx = p.move_range * 1.4142135 * (out[3] - 0.5)
+        dy = p.move_range * 1.4142135 * (out[4] - 0.5)
+    team.chosen[i] = a
+    if a == MOVE:
+        x = team.x[i] + dx
+        y = team.y[i] + dy
+        if not is_refused(team, scene, p, i, x, y):
+            team.to_x[i] = x
+            team.to_y[i] = y
+
+
+@wp.func
+def commit(team: Team, scene: Scene, p: Params, i: int, t: int) -> None:
+    """Make rover ``i``'s proposal its state, count the action and pay for it.
+
+    Choice: of two rovers that propose the same place, the one with the lower number gets it.
+    """
+    a = team.chosen[i]
+    previous = team.action[i]
+    team.action[i] = a
+    if a == NONE:
+        return
+    x = team.to_x[i]
+    y = team.to_y[i]
+    if a == MOVE:
+        if x != team.x[i] or y != team.y[i]:
+            close = int(0)
+            for j in range(i):
+                dx = team.to_x[j] - x
+                dy = team.to_y[j] - y
+                close += int(dx * dx + dy * dy < p.separation_2)
+            if close == 0:
+                team.x[i] = x
+                team.y[i] = y
+                team.covered_range[i] = 0.0
+        team.energy[i] = team.energy[i] - p.rover_cost - p.move_cost
+    else:
+        team.setting[i] = a
+        team.energy[i] = team.energy[i] - p.rover_cost - p.cost[a]
+    if previous != NONE and previous != a:
+        team.switches[i] = team.switches[i] + 1
+    team.counts[i * N_ACTIONS + a] = team.counts[i * N_ACTIONS + a] + 1
+
+
+# --- resolve --------------------------------------------------------------------------------------
+
+
+@wp.func
+def partner(rock_type: int, setting: int) -> int:
+    """Return the setting a second rover needs to detect such a rock with this one, or NONE."""
+    if rock_type == 4:
+        return setting
+    if rock_type == setting or rock_type == setting + 1:
+        return wp.where(rock_type < 2, rock_type, rock_type + 1) - setting
+    return NONE
+
+
+@wp.func
+def resolve(team: Team, scene: Scene, p: Params, i: int, t: int) -> None:
+    """Mark what rover ``i``'s activation covers and credit the rocks it detects with another.
+
+    Both rovers of a pair find the detection by themselves, so nobody writes another's data;
+    ``detected[k] = t`` is written by both with the same value.
+    """
+    a = team.action[i]
+    if a == NONE or a == MOVE:
+        return
+    x = team.x[i]
+    y = team.y[i]
+    r = p.ranges[a]
+    if team.covered_range[i] < r:
+        fresh = cover_disc(team.cover, i * COVER_WORDS, x, y, r)
+        team.covered[i] = team.covered[i] + fresh
+        team.covered_range[i] = r
+    crowd = int(0)
+    for j in range(p.n_robots):
+        dx = team.x[j] - x
+        dy = team.y[j] - y
+        crowd += int(dx * dx + dy * dy < p.mate_range_2)
+    if crowd == 1:
+        return
+    mates = wp.uint64(0)
+    for j in range(p.n_robots):
+        b = team.action[j]
+        if j != i and b != NONE and b != MOVE and wp.abs(b - a) <= 1:
+            dx = team.x[j] - x
+            dy = team.y[j] - y
+            reach = r + p.ranges[b]
+            if dx * dx + dy * dy < reach * reach:
+                mates = mates | (wp.uint64(1) << wp.uint64(j))
+    if mates == wp.uint64(0):
+        return
+    gained = float(0.0)
+    nearness = float(0.0)
+    first = rock_cell(x - r)
+    last = rock_cell(x + r)
+    for row in range(rock_cell(y - r), rock_cell(y + r) + 1):
+        cells = row * ROCK_CELLS
+        for k in range(scene.cell[cells + first], scene.cell[cells + last + 1]):
+            need = partner(scene.rock_type[k], a)
+            dx = scene.rock_x[k] - x
+            dy = scene.rock_y[k] - y
+            d2 = dx * dx + dy * dy
+            if need != NONE and d2 < r * r:
+                if team.detected[k] >= t:
+                    if uniform(scene.seed[0], t, k, i) < p.accuracy[a]:
+                        if is_paired(team, scene, p, mates, need, k, t):
+                            team.detected[k] = t
+                            gained = gained + scene.rock_value[k]
+                            nearness = nearness + scene.rock_value[k] / wp.max(d2, p.min_distance_2)
+    if gained > 0.0:
+        area = float(team.covered[i]) / float(COVER_CELLS * COVER_CELLS)
+        team.value[i] = team.value[i] + gained
+        team.fitness[i] = team.fitness[i] + nearness * area
+        team.energy[i] = team.energy[i] - p.report_cost
+
+
+@wp.func
+def is_paired(
+    team: Team, scene: Scene, p: Params, mates: wp.uint64, need: int, k: int, t: int
+) -> bool:
+    """Return whether one of the mates has the needed setting and succeeds on rock ``k``."""
+    r = p.ranges[need]
+    for j in range(p.n_robots):
+        if ((mates >> wp.uint64(j)) & wp.uint64(1)) != wp.uint64(0) and team.action[j] == need:
+            dx = scene.rock_x[k] - team.x[j]
+            dy = scene.rock_y[k] - team.y[j]
+            if dx * dx + dy * dy < r * r:
+                if uniform(scene.seed[0], t, k, j) < p.accuracy[need]:
+                    return True
+    return False
+
+
+# --- outcome --------------------------------------------------------------------------------------
+
+
+@wp.func
+def outcome(team: Team, scene: Scene, p: Params, t_end: int) -> None:
+    """Write the team's task performance: value the lander has recorded, share of area covered."""
+    value = float(0.0)
+    for k in range(team.detected.shape[0]):
+        if team.detected[k] < t_end - 1:
+            value = value + scene.rock_value[k]
+    cells = float(COVER_CELLS * COVER_CELLS)
+    team.performance[0] = value
+    team.performance[1] = float(covered_by_any(team.cover, p.n_robots)) / cells
+    if p.fitness_is_product != 0:
+        for i in range(p.n_robots):
+            team.fitness[i] = team.value[i] * float(team.covered[i]) / cells
+
+
+FUNCTIONS = {
+    "view": view,
+    "view_scene": view_scene,
+    "reset": reset,
+    "sense": sense,
+    "act": act,
+    "commit": commit,
+    "resolve": resolve,
+    "outcome": outcome,
+}
