@@ -6,7 +6,18 @@ every size of controller a world can have. Hidden slots are computed ``WIDE`` at
 
 import warp as wp
 
-__all__ = ["OUT", "WIDE", "Networks", "Shape", "load", "networks_of", "out_vector", "think"]
+__all__ = [
+    "OUT",
+    "WIDE",
+    "Networks",
+    "Shape",
+    "load",
+    "networks_of",
+    "out_vector",
+    "sigmoid",
+    "think",
+    "wide_vector",
+]
 
 WIDE = wp.constant(16)
 OUT = wp.constant(8)
@@ -34,7 +45,10 @@ class Networks:
 
     w_in [R, chunks, inputs] of 16 slots; w_out [R, slots] of 8 outputs; filled [R, chunks] of 16
     slots, 1 where a slot holds a neuron; n_used [R], one above the last filled slot;
-    inputs [R, inputs] (sensors, then context); outputs [R] of 8.
+    inputs [R, inputs] (sensors, then context); sums [R] of 8: the output units' weighted sums.
+
+    An output is ``sigmoid`` of its sum. The highest output is that of the highest sum, which is
+    exact even where several outputs are 1 to the last bit.
     """
 
     w_in: wp.array[wide_vector]
@@ -42,7 +56,7 @@ class Networks:
     filled: wp.array[wide_vector]
     n_used: wp.array[int]
     inputs: wp.array[float]
-    outputs: wp.array[out_vector]
+    sums: wp.array[out_vector]
 
 
 @wp.func
@@ -68,9 +82,7 @@ def networks_of(batch: Networks, b: int, n_batch: int) -> Networks:
     nets.inputs = wp.array(
         ptr=batch.inputs.ptr + q * wp.uint64(n_inputs * 4), shape=(n_inputs,), dtype=float
     )
-    nets.outputs = wp.array(
-        ptr=batch.outputs.ptr + q * wp.uint64(n * 32), shape=(n,), dtype=out_vector
-    )
+    nets.sums = wp.array(ptr=batch.sums.ptr + q * wp.uint64(n * 32), shape=(n,), dtype=out_vector)
     return nets
 
 
@@ -114,7 +126,7 @@ def load(
     nets.n_used[i] = used
     for j in range(shape.n_inputs):
         nets.inputs[i * shape.n_inputs + j] = 0.0
-    nets.outputs[i] = out_vector()
+    nets.sums[i] = out_vector()
 
 
 @wp.func
@@ -153,7 +165,7 @@ def sigmoid(a: float) -> float:
 
 @wp.func
 def think(nets: Networks, shape: Shape, i: int) -> None:
-    """Run robot ``i``'s network once: inputs to outputs, hidden activations to next context.
+    """Run robot ``i``'s network once: inputs to output sums, hidden activations to next context.
 
     An empty slot neither contributes to an output nor feeds the context (SPEC section 2).
     """
@@ -180,6 +192,4 @@ def think(nets: Networks, shape: Shape, i: int) -> None:
     # Written only now: every chunk must read the context of the previous iteration.
     for k in range(shape.n_context):
         nets.inputs[inputs + shape.n_sensors + k] = first[k]
-    for k in range(OUT):
-        out[k] = sigmoid(out[k])
-    nets.outputs[i] = out
+    nets.sums[i] = out

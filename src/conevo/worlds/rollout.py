@@ -306,7 +306,7 @@ class Rollout:
             nets.filled = wp.zeros(n * r * chunks, dtype=wide_vector, **zeros)
             nets.n_used = wp.zeros(n * r, dtype=int, **zeros)
             nets.inputs = wp.zeros(n * r * self._shape.n_inputs, dtype=float, **zeros)
-            nets.outputs = wp.zeros(n * r, dtype=out_vector, **zeros)
+            nets.sums = wp.zeros(n * r, dtype=out_vector, **zeros)
             self._workspace = _Workspace(n, state, {})
         return self._workspace
 

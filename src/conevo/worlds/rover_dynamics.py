@@ -7,7 +7,7 @@ State, reset, sense, act, commit, resolve, outcome; the rules and the choices st
 import warp as wp
 
 from conevo.kernels.geometry import COVER_CELLS, COVER_WORDS, cover_disc, covered_by_any, octant
-from conevo.kernels.network import Networks, networks_of
+from conevo.kernels.network import Networks, networks_of, sigmoid
 from conevo.kernels.random import uniform
 from conevo.worlds import canals
 
@@ -281,15 +281,16 @@ def act(team: Team, scene: Scene, p: Params, i: int, t: int) -> None:
         dx = p.move_range * wp.cos(turn)
         dy = p.move_range * wp.sin(turn)
     else:
-        out = team.nets.outputs[i]
-        best = out[0]
+        sums = team.nets.sums[i]
+        best = sums[0]
         for k in range(1, 5):
-            if out[k] > best:
-                best = out[k]
+            if sums[k] > best:
+                best = sums[k]
                 a = wp.min(k, MOVE)
-        # "Normalized and scaled" (5.2.6): both outputs at an extreme make the largest step.
-        dx = p.move_range * 1.4142135 * (out[3] - 0.5)
-        dy = p.move_range * 1.4142135 * (out[4] - 0.5)
+        if a == MOVE:
+            # "Normalized and scaled" (5.2.6): both outputs at an extreme make the largest step.
+            dx = p.move_range * 1.4142135 * (sigmoid(sums[3]) - 0.5)
+            dy = p.move_range * 1.4142135 * (sigmoid(sums[4]) - 0.5)
     team.chosen[i] = a
     if a == MOVE:
         x = team.x[i] + dx

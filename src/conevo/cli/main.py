@@ -1,0 +1,98 @@
+"""The command table. A verb's module is loaded when the verb is used, so that help is instant."""
+
+from __future__ import annotations
+
+import errno
+import os
+import sys
+from collections.abc import Sequence
+from importlib import import_module
+from typing import NoReturn
+
+import click
+
+from conevo.errors import ConevoError, unknown_name
+
+__all__ = ["cli", "main"]
+
+VERBS = {
+    "run": "Evolve a team and test it.",
+    "resume": "Continue an interrupted run, to the bit.",
+    "test": "Re-execute a run's fittest team in fresh scenarios.",
+    "show": "Print a finished or running run.",
+    "list": "List worlds, methods or runs.",
+}
+MODULES = {"list": "listing"}
+
+
+class Verbs(click.Group):
+    """A group that knows its verbs without loading them."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Return the verbs in the order of their use."""
+        return list(VERBS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command:
+        """Load a verb."""
+        if cmd_name not in VERBS:
+            raise unknown_name("command", cmd_name, VERBS)
+        module = import_module(f"conevo.cli.{MODULES.get(cmd_name, cmd_name)}")
+        command: click.Command = getattr(module, MODULES.get(cmd_name, cmd_name))
+        return command
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the table without loading the verbs."""
+        with formatter.section("Commands"):
+            formatter.write_dl(list(VERBS.items()))
+
+
+def fail(message: str, code: int) -> NoReturn:
+    """End with one line on stderr."""
+    click.echo(f"conevo: error: {' '.join(message.split())}", err=True)
+    sys.exit(code)
+
+
+def print_version(ctx: click.Context, parameter: click.Parameter, is_asked: bool) -> None:
+    """Print the version and end."""
+    if is_asked:
+        import conevo
+
+        click.echo(f"conevo {conevo.__version__}")
+        ctx.exit()
+
+
+@click.group(cls=Verbs, context_settings={"help_option_names": ["-h", "--help"]})
+@click.option(
+    "--version",
+    is_flag=True,
+    is_eager=True,
+    expose_value=False,
+    callback=print_version,
+    help="Show the version and exit.",
+)
+def cli() -> None:
+    """Collective Neuro-Evolution: evolve teams of robots that specialize.
+
+    Begin with: conevo run rover/complex-1
+    """
+
+
+def main(arguments: Sequence[str] | None = None) -> NoReturn:
+    """Run a command line; every error is one line, every ending has its exit code.
+
+    2: the request cannot be carried out as written; 3: the machine refused; 130: interrupted.
+    """
+    try:
+        code = cli.main(arguments, prog_name="conevo", standalone_mode=False)
+    except ConevoError as error:
+        fail(str(error), error.exit_code)
+    except click.ClickException as error:
+        fail(error.format_message(), 2)
+    except (KeyboardInterrupt, click.Abort):
+        fail("interrupted", 130)
+    except OSError as error:
+        if error.errno == errno.EPIPE:  # the reader of our output has gone
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            sys.exit(0)
+        fail(f"{error.filename}: {error.strerror}" if error.filename else str(error), 3)
+    sys.exit(code if isinstance(code, int) else 0)

@@ -1,0 +1,152 @@
+"""Watching a run: live on a terminal, else one line or one JSON object per generation."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import click
+
+from conevo.cli.summary import title
+from conevo.cli.text import bars, castes, count, duration, neurons, number
+from conevo.runs.run import Run
+
+__all__ = ["watching"]
+
+Record = dict[str, Any]
+PAUSE = 2.0  # seconds between two plain lines
+
+
+@contextmanager
+def watching(run: Run, style: str) -> Iterator[Callable[[Run, Record], None]]:
+    """Yield the function that is called after each generation.
+
+    Args:
+        run: the run to be watched.
+        style: "live", "plain", "verbose", "json" or "quiet".
+    """
+    if style == "live":
+        from rich.live import Live
+
+        display = Display(run)
+        with Live(get_renderable=display.render, refresh_per_second=4):
+            yield display.add
+    elif style in ("plain", "verbose"):
+        click.echo(f"{title(run.config)}\n{run.path}")
+        yield Lines(run, pause=PAUSE if style == "plain" else 0.0).add
+    else:
+        yield lambda _, record: click.echo(json.dumps(record)) if style == "json" else None
+
+
+class Pace:
+    """How fast a run goes: team evaluations per second and the time to its end."""
+
+    def __init__(self, run: Run) -> None:
+        records = run.generations()
+        self.settings = run.config.run
+        self.spent = records[-1]["team_evaluations"] if records else 0
+        self.recent: list[tuple[float, int]] = []  # seconds and evaluations of a generation
+
+    def add(self, record: Record) -> None:
+        """Note a finished generation."""
+        cost = record["team_evaluations"] - self.spent
+        self.spent = record["team_evaluations"]
+        self.recent = [*self.recent[-9:], (record["seconds"], cost)]
+
+    @property
+    def rate(self) -> float:
+        """Team evaluations per second over the last ten generations."""
+        seconds = sum(s for s, _ in self.recent)
+        return sum(n for _, n in self.recent) / seconds if seconds else 0.0
+
+    def remaining(self, generation: int) -> float:
+        """Return the seconds until the last generation, or until the budget is spent."""
+        if not self.recent:
+            return 0.0
+        left: float = self.settings.generations - generation - 1
+        if self.settings.budget_evaluations:
+            cost = sum(n for _, n in self.recent) / len(self.recent)
+            left = min(left, (self.settings.budget_evaluations - self.spent) / cost)
+        return max(0.0, left) * sum(s for s, _ in self.recent) / len(self.recent)
+
+
+class Lines:
+    """One plain line per generation, at most one every ``pause`` seconds; first and last always."""
+
+    def __init__(self, run: Run, pause: float) -> None:
+        self.pace, self.pause, self.next = Pace(run), pause, 0.0
+
+    def add(self, run: Run, record: Record) -> None:
+        """Print a generation if it is time to."""
+        self.pace.add(record)
+        total, generation = run.config.run.generations, record["generation"]
+        if time.monotonic() < self.next and generation + 1 < total:
+            return
+        self.next = time.monotonic() + self.pause
+        measures = "  ".join(f"{k} {number(v)}" for k, v in record["performance"].items())
+        click.echo(
+            f"generation {generation + 1}/{total}  {measures}  "
+            f"fitness best {number(record['best_fitness'])} mean {number(record['mean_fitness'])}  "
+            f"S {number(record['specialization'])}  {castes(record['castes'])}  "
+            f"{number(self.pace.rate)} evaluations/s  "
+            f"{duration(self.pace.remaining(generation))} left"
+        )
+
+
+class Display:
+    """The live view on a terminal."""
+
+    def __init__(self, run: Run) -> None:
+        self.run, self.pace = run, Pace(run)
+        self.records, self.started = run.generations(), time.monotonic()
+
+    def add(self, run: Run, record: Record) -> None:
+        """Show a finished generation."""
+        self.pace.add(record)
+        self.records = [*self.records, record]
+
+    def render(self) -> Any:
+        """Return the view of this moment."""
+        from rich.console import Group
+        from rich.progress_bar import ProgressBar
+        from rich.table import Table
+
+        total, done = self.run.config.run.generations, len(self.records)
+        grid = Table.grid(padding=(0, 2))
+        for label, text in (
+            self._rows() if self.records else [("", "the first generation is under way")]
+        ):
+            grid.add_row(f"[bold]{label}[/bold]", text)
+        return Group(
+            f"[bold]{title(self.run.config)}[/bold]\n{self.run.path}",
+            ProgressBar(total=total, completed=done, width=60),
+            f"generation {done} of {total}, {duration(time.monotonic() - self.started)} so far, "
+            f"{duration(self.pace.remaining(done - 1))} left",
+            grid,
+        )
+
+    def _rows(self) -> Iterator[tuple[str, str]]:
+        last = self.records[-1]
+        for name, value in last["performance"].items():
+            series = [record["performance"][name] or 0.0 for record in self.records]
+            yield name, f"{number(value):>8}  {bars(series, 40)}  highest {number(max(series))}"
+        yield (
+            "fitness",
+            f"best {number(last['best_fitness'])}, mean {number(last['mean_fitness'])}, "
+            f"fittest team {number(last['team_fitness'])}",
+        )
+        yield "castes", castes(last["castes"])
+        yield "S", f"{number(last['specialization'])} (mean degree of specialization)"
+        if last["sst"] is not None or last["gst"] is not None:
+            yield (
+                "thresholds",
+                f"SST {number(last['sst'])}, GST {number(last['gst'])}, "
+                f"{last['recombinations']} recombinations between populations",
+            )
+        yield "neurons", neurons(last["n_hidden"])
+        yield "speed", f"{number(self.pace.rate)} team evaluations/s, {count(self.pace.spent)} spent"
+        if last["n_nonfinite"]:
+            yield "not finite", f"{last['n_nonfinite']} scores, ranked last"

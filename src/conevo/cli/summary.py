@@ -1,0 +1,141 @@
+"""A run in words: its state, its generations, its testing phase, and what can be done next."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import click
+
+from conevo.cli.text import castes, count, duration, neurons, number, table
+from conevo.evolution.methods.registry import METHODS
+from conevo.runs.config import RunConfig, resolve
+from conevo.runs.run import Run
+
+__all__ = ["next_commands", "print_end", "run_text", "test_text", "title"]
+
+
+def title(config: RunConfig) -> str:
+    """Return one line that names a run."""
+    name = METHODS[config.method].title
+    return f"{config.task}, {name}, preset {config.preset}, seed {config.run.seed}"
+
+
+def print_end(run: Run, style: str) -> None:
+    """Print how a run ended, in the style asked for."""
+    if style == "quiet":
+        click.echo(run.path)
+    elif style == "json":
+        end = {"run": str(run.path), "status": run.status, "test": run.test_result}
+        click.echo(json.dumps(end))
+    else:
+        result = run.test_result or {}
+        commands = "\n".join(f"  {command}" for command in next_commands(run))
+        click.echo(f"\n{test_text(result)}\n\n{_state(run)}\n\nWhat next:\n{commands}")
+
+
+def run_text(run: Run, n_rows: int) -> str:
+    """Return a finished or unfinished run as text."""
+    records = run.generations()
+    parts = [title(run.config), _state(run)]
+    if records:
+        parts += ["", generations_text(records, n_rows)]
+    if run.test_result:
+        parts += ["", test_text(run.test_result)]
+    if run.status == "interrupted":
+        parts += ["", f"Continue it with: conevo resume {run.path}"]
+    return "\n".join(parts)
+
+
+def generations_text(records: list[dict[str, Any]], n_rows: int) -> str:
+    """Return evenly spaced generations, first and last among them, as a table."""
+    last = len(records) - 1
+    picks = sorted({round(last * k / (n_rows - 1)) for k in range(n_rows)})
+    measures = list(records[0]["performance"])
+    head = ["generation", *measures, "best fitness", "mean fitness", "S", "SST", "GST"]
+    head += ["recombined", "neurons", "evaluations", "castes of the fittest team"]
+    rows = [
+        [
+            str(record["generation"]),
+            *(number(record["performance"][name]) for name in measures),
+            number(record["best_fitness"]),
+            number(record["mean_fitness"]),
+            number(record["specialization"]),
+            number(record["sst"]),
+            number(record["gst"]),
+            str(record["recombinations"]),
+            neurons(record["n_hidden"]),
+            count(record["team_evaluations"]),
+            castes(record["castes"]),
+        ]
+        for record in (records[pick] for pick in picks)
+    ]
+    return table(head, rows)
+
+
+def test_text(result: dict[str, Any]) -> str:
+    """Return the testing phase as a table."""
+    some = next(iter(result.values()))
+    measures = list(some["performance"])
+    rows = []
+    for name, tested in result.items():
+        spread = [tested["performance"][m] for m in measures]
+        mean_s = sum(tested["specialization"]) / len(tested["specialization"])
+        rows.append(
+            [
+                "first fittest team" if name == "generation_0" else "fittest team",
+                str(tested["generation"]),
+                *(f"{number(s['mean'])} +- {number(s['sd'])}" for s in spread),
+                number(mean_s),
+                castes(tested["castes"]),
+            ]
+        )
+    head = ["", "generation", *measures, "S", "castes (robots)"]
+    return (
+        f"Testing phase, {some['scenarios']} fresh scenarios (mean +- standard deviation)\n"
+        f"{table(head, rows)}"
+    )
+
+
+def next_commands(run: Run) -> list[str]:
+    """Return the exact commands for what can be done with a finished run."""
+    config = run.config
+    other = "mesp" if config.method.startswith("cone") else "cone"
+    plain = resolve(config.task, config.method, config.preset).tables()
+    changes = [
+        f" --set {section}.{key}={value}"
+        for section in ("run", "world")
+        for key, value in config.tables()[section].items()
+        if key != "seed" and value != plain[section].get(key)
+    ]
+    world = config.task.replace(config.world, config.world.rpartition("-v")[0])
+    seed = config.run.seed
+    repeat = f"conevo run {world} --method {other} --preset {config.preset} --seed {seed}"
+    again = f"conevo run --config {run.path}/config.toml --seed {seed + 1}"
+    commands = {
+        f"conevo show {run.path}": "its generations",
+        f"conevo test {run.path} --scenarios 100": "test its team longer",
+        again: "the same with another seed",
+        repeat + "".join(changes): "the same with another method",
+    }
+    width = max(map(len, commands))
+    return [f"{command.ljust(width)}   # {what}" for command, what in commands.items()]
+
+
+def _state(run: Run) -> str:
+    """Return a run's place, state and cost in two lines."""
+    records, about = run.generations(), run.provenance
+    state = run.status
+    if state == "finished":
+        state += f" {about['finished']} (stopped by: {about['stopped_by']})"
+        changed = run.changed_files
+        state += f"; CHANGED SINCE: {', '.join(changed)}" if changed else ""
+    spent = f"{len(records)} of {run.config.run.generations} generations"
+    if records:
+        last = records[-1]
+        seconds = sum(record["seconds"] for record in records)
+        spent += (
+            f", {count(last['team_evaluations'])} team evaluations, "
+            f"{count(last['team_steps'])} team-steps, {duration(seconds)}"
+        )
+    return f"{run.path}: {state}\n{spent}"

@@ -1,0 +1,33 @@
+"""``conevo test``: re-execute a run's fittest team in fresh scenarios."""
+
+from __future__ import annotations
+
+import json
+
+import click
+
+__all__ = ["test"]
+
+
+@click.command(short_help="Re-execute a run's fittest team in fresh scenarios.")
+@click.argument("run")
+@click.option(
+    "--scenarios", type=click.IntRange(1), help="How many (default: as the run's own test)."
+)
+@click.option(
+    "--seed", type=click.IntRange(0), help="Draw other scenarios than the run's own test."
+)
+@click.option(
+    "--threads", type=click.IntRange(1), help="CPU threads (default all); changes no result."
+)
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+def test(
+    run: str, scenarios: int | None, seed: int | None, threads: int | None, as_json: bool
+) -> None:
+    """Re-execute the fittest team of RUN (finished or not) in fresh scenarios; writes nothing."""
+    from conevo.cli.find import find_run
+    from conevo.cli.summary import test_text
+
+    found = find_run(run)
+    result = found.test(scenarios, seed, threads=threads)
+    click.echo(json.dumps(result) if as_json else test_text({"champion": result}))

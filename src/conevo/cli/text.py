@@ -1,0 +1,70 @@
+"""Numbers, tables and durations as plain text."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+
+__all__ = ["bars", "castes", "count", "duration", "neurons", "number", "table"]
+
+NUMBER = re.compile(r"-|[-+.,/\de]+( \+- .*)?")
+
+
+def number(value: float | None) -> str:
+    """Return a number with four significant digits, "-" for none."""
+    if value is None:
+        return "-"
+    return f"{value:.0f}" if 1000 <= abs(value) < 1e7 else f"{value:.4g}"
+
+
+def count(value: int) -> str:
+    """Return a whole number with separated thousands."""
+    return f"{value:,}"
+
+
+def duration(seconds: float) -> str:
+    """Return a time span: "42 s", "4 min 05 s", "3 h 20 min"."""
+    whole = round(seconds)
+    if whole < 60:
+        return f"{whole} s"
+    if whole < 3600:
+        return f"{whole // 60} min {whole % 60:02d} s"
+    return f"{whole // 3600} h {whole % 3600 // 60:02d} min"
+
+
+def castes(sizes: Mapping[str, int]) -> str:
+    """Return castes with their numbers of robots: "low 12, non-specialized 8"."""
+    return ", ".join(f"{name} {size}" for name, size in sizes.items())
+
+
+def neurons(n_hidden: Sequence[int]) -> str:
+    """Return controller sizes: "10" or "8-12"."""
+    low, high = min(n_hidden), max(n_hidden)
+    return str(low) if low == high else f"{low}-{high}"
+
+
+def bars(values: Sequence[float], width: int) -> str:
+    """Return a series as a line of bars, averaged into at most ``width`` of them."""
+    if not values:
+        return ""
+    n = min(width, len(values))
+    edges = [len(values) * k // n for k in range(n + 1)]
+    means = [sum(values[a:b]) / (b - a) for a, b in pairwise(edges)]
+    low, span = min(means), (max(means) - min(means)) or 1.0
+    return "".join("▁▂▃▄▅▆▇█"[round(7 * (mean - low) / span)] for mean in means)
+
+
+def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Return an aligned table: numbers to the right, words to the left."""
+    columns = list(zip(head, *rows, strict=True))
+    widths = [max(map(len, column)) for column in columns]
+    is_number = [all(map(NUMBER.fullmatch, column[1:])) for column in columns]
+    lines = []
+    for row in (head, *rows):
+        cells = (
+            cell.rjust(width) if right else cell.ljust(width)
+            for cell, width, right in zip(row, widths, is_number, strict=True)
+        )
+        lines.append("  ".join(cells).rstrip())
+    return "\n".join(lines)

@@ -1,0 +1,34 @@
+"""Evolution: genotypes and fitness, no world.
+
+Every method speaks the same three words. ``ask`` says which teams to evaluate, you evaluate them
+however you like, ``tell`` turns the scores into the next state::
+
+    from conevo.evolution import Layout, Scores, method
+
+    mesp = method("mesp", genotypes=20, evaluation="shared")
+    state = mesp.init(Layout(n_robots=3, n_hidden=4, max_hidden=8, n_genes=6), root=1)
+    while state.generation < 50:
+        trials = mesp.ask(state)
+        state = mesp.tell(state, trials, my_scores(trials.networks()))
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from conevo.evolution.methods.registry import METHODS, MethodEntry, method
+    from conevo.evolution.protocol import Layout, Method, Scores, State, Trials
+
+__all__ = ["METHODS", "Layout", "Method", "MethodEntry", "Scores", "State", "Trials", "method"]
+
+_REGISTRY = ("METHODS", "MethodEntry", "method")
+
+
+def __getattr__(name: str) -> Any:
+    """Load on first use, so that reading the registry's names costs no numpy."""
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    module = "methods.registry" if name in _REGISTRY else "protocol"
+    return getattr(importlib.import_module(f"{__name__}.{module}"), name)

@@ -1,0 +1,141 @@
+"""Who plays with whom: teams as rows of a pool of neuron genotypes.
+
+The pool is ``genes.reshape(-1, G)``, so genotype m of slot u of population p is row
+``(p * U + u) * M + m``; a second pool may be appended at an ``offset``. An empty slot is -1.
+Methods with one population (P = 1) fill every robot from it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from conevo.evolution.protocol import BoolArray, IntArray
+
+__all__ = [
+    "best_team",
+    "distinct",
+    "elite_teams",
+    "lesion_teams",
+    "on_trial",
+    "rows",
+    "shared",
+    "systematic",
+]
+
+
+def rows(active: BoolArray, choice: IntArray, n_genotypes: int, offset: int = 0) -> IntArray:
+    """Return the pool rows [..., R, U] of chosen genotypes, -1 in empty slots.
+
+    Args:
+        active: [P, U] slots in use; P = R or 1.
+        choice: [..., R, U] genotype numbers, or [..., R, 1] for whole networks.
+        n_genotypes: M, genotypes per slot in the pool.
+        offset: first row of the pool.
+    """
+    slots = np.arange(active.size, dtype=np.int32).reshape(active.shape)
+    found = (slots * n_genotypes + offset) + choice.astype(np.int32, copy=False)
+    return np.where(active, found, np.int32(-1))
+
+
+def on_trial(active: BoolArray, n_genotypes: int) -> tuple[IntArray, IntArray, IntArray]:
+    """Return population, slot and genotype [N] on trial in each team of ``systematic``."""
+    population, slot = np.nonzero(active)
+    genotype = np.tile(np.arange(n_genotypes), len(population))
+    return population.repeat(n_genotypes), slot.repeat(n_genotypes), genotype
+
+
+def systematic(active: BoolArray, n_genotypes: int, generator: np.random.Generator) -> IntArray:
+    """Return one team per genotype, [N, P, U]: every other place is filled at random.
+
+    Nitschke 2009, 3.3.1: genotype g with random genotypes of its population's other
+    sub-populations, and controllers of random genotypes of the other populations.
+    """
+    population, slot, genotype = on_trial(active, n_genotypes)
+    shape = (len(population), *active.shape)
+    choice = generator.integers(n_genotypes, size=shape, dtype=np.int32)
+    choice[np.arange(len(population)), population, slot] = genotype
+    return rows(active, choice, n_genotypes)
+
+
+def shared(
+    active: BoolArray,
+    n_genotypes: int,
+    rounds: int,
+    generator: np.random.Generator,
+    *,
+    networks: bool = False,
+) -> IntArray:
+    """Return ``rounds`` x M teams [N, P, U] in which every genotype plays exactly ``rounds`` times.
+
+    Each round is a fresh permutation of every sub-population (with ``networks``: of every
+    population's whole networks), as in ESP (Gomez; Yong and Miikkulainen).
+    """
+    n_populations, n_slots = active.shape
+    shape = (rounds, n_populations, 1 if networks else n_slots, n_genotypes)
+    order = np.broadcast_to(np.arange(n_genotypes, dtype=np.int32), shape)
+    choice = np.moveaxis(generator.permuted(order, axis=-1), -1, 1)
+    return rows(active, choice.reshape(rounds * n_genotypes, *shape[1:3]), n_genotypes)
+
+
+def elite_teams(
+    active: BoolArray, elite: IntArray, n_genotypes: int, generator: np.random.Generator
+) -> IntArray:
+    """Return P x L teams [N, P, U] for type C fitness; ``i * L + l`` tries rank l of population i.
+
+    Nitschke 2009, 3.3.2: controller i from the genotypes of equal rank l in its sub-populations,
+    the other controllers from random genotypes of the elite portions.
+
+    Args:
+        active: [P, U] slots in use.
+        elite: [P, U, L] elite genotypes, the fittest first.
+        n_genotypes: M.
+        generator: the source of the random partners.
+    """
+    n_populations, n_slots, n_elite = elite.shape
+    size = (n_populations, n_elite, n_populations, n_slots)
+    rank = generator.integers(n_elite, size=size, dtype=np.int32)
+    for population in range(n_populations):
+        rank[population, :, population] = np.arange(n_elite)[:, None]
+    choice = elite[np.arange(n_populations)[:, None], np.arange(n_slots), rank]
+    return rows(active, choice.reshape(-1, n_populations, n_slots), n_genotypes)
+
+
+def best_team(active: BoolArray, elite: IntArray, n_genotypes: int) -> IntArray:
+    """Return the fittest team [1, P, U]: the first of the elite in every slot.
+
+    It is each population's controller of greatest utility (type B fitness, Nitschke 2009, eq. 3.8):
+    the sum over slots is greatest where every term is.
+    """
+    return rows(active, elite[None, :, :, 0], n_genotypes)
+
+
+def lesion_teams(team: IntArray, suspects: BoolArray) -> tuple[IntArray, IntArray, IntArray]:
+    """Return the fittest team once for each neuron that is tried for being missed.
+
+    Nitschke 2009, section 3.6.
+
+    Args:
+        team: [R, U] rows of the fittest team.
+        suspects: [R] the robots whose neurons are lesioned, one at a time.
+
+    Returns:
+        Teams [N, R, U], and the robot and the slot [N] each of them lacks.
+    """
+    robot, slot = np.nonzero((team >= 0) & suspects[:, None])
+    teams = np.repeat(team[None], len(robot), axis=0)
+    teams[np.arange(len(robot)), robot, slot] = -1
+    return teams, robot, slot
+
+
+def distinct(n_teams: int, n_members: int, n_from: int, generator: np.random.Generator) -> IntArray:
+    """Return ``n_teams`` draws of ``n_members`` different numbers below ``n_from``, [N, members].
+
+    Shuffled decks are dealt out in hands, so all numbers are used about equally often.
+    """
+    if n_members == 0:
+        return np.empty((n_teams, 0), dtype=np.int32)
+    hands = n_from // n_members
+    decks = -(-n_teams // hands)
+    deck = np.broadcast_to(np.arange(n_from, dtype=np.int32), (decks, n_from))
+    dealt = generator.permuted(deck, axis=1)[:, : hands * n_members]
+    return dealt.reshape(-1, n_members)[:n_teams]

@@ -1,0 +1,115 @@
+"""CCGA, cooperative co-evolutionary genetic algorithm: one population of whole networks per robot.
+
+Nitschke 2009, sections 2.3.3 and 5.3.3, after Potter and De Jong. Populations are genetically
+isolated; a genotype is judged by its own robot's fitness in a team with partners from the others.
+
+Choice: partners come from the elite portion of the generation before, which the state keeps, since
+children have no fitness before they are tried; the first generation takes any genotypes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Annotated, Literal
+
+import numpy as np
+from annotated_types import Ge
+
+from conevo.evolution import credit
+from conevo.evolution.assembly import best_team, rows, shared
+from conevo.evolution.generation import (
+    advance,
+    begin,
+    breed_networks,
+    count,
+    crown,
+    grade,
+    pool,
+    trials,
+)
+from conevo.evolution.population import elite_count
+from conevo.evolution.protocol import FloatArray, Layout, Scores, State, Trials
+from conevo.evolution.variation import VariationConfig
+from conevo.rng import stream
+
+__all__ = ["Ccga", "CcgaConfig"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class CcgaConfig(VariationConfig):
+    """Parameters of CCGA.
+
+    Attributes:
+        genotypes: M, whole networks per population (table 5.5: 500; 600 in all for pursuit).
+        evaluation: "systematic" tries every genotype once, R x M teams; "shared" draws complete
+            teams in which every genotype takes part ``rounds`` times, rounds x M teams, no partners
+            from the elite.
+        rounds: K, trials of each genotype under "shared". More makes fitness less noisy.
+            Choice: 10, as ESP.
+    """
+
+    genotypes: Annotated[int, Ge(2)] = 500
+    evaluation: Literal["systematic", "shared"] = "systematic"
+    rounds: Annotated[int, Ge(1)] = 10
+
+
+@dataclass(frozen=True)
+class Ccga:
+    """Cooperative co-evolutionary genetic algorithm; see the module."""
+
+    config: CcgaConfig = field(default_factory=CcgaConfig)
+    name: str = "ccga"
+    title: str = "CCGA"
+
+    def init(self, layout: Layout, root: int) -> State:
+        """Return generation 0 with random genotypes."""
+        return begin(
+            layout,
+            root,
+            n_populations=layout.n_robots,
+            n_genotypes=self.config.genotypes,
+            networks=True,
+        )
+
+    def ask(self, state: State) -> Trials:
+        """Return the teams that try every genotype, then the fittest team."""
+        config, m = self.config, self.config.genotypes
+        if state.phase == "fittest":
+            return trials(state, best_team(state.active, state.elite[:, None], m))
+        generator = stream(state.root, "teams", state.generation)
+        if config.evaluation == "shared":
+            teams = shared(state.active, m, config.rounds, generator, networks=True)
+            return trials(state, teams)
+        n_robots, n_kept = len(state.active), state.partners.shape[2]
+        n_from, offset = (n_kept, len(pool(state))) if n_kept else (m, 0)
+        choice = generator.integers(n_from, size=(n_robots * m, n_robots, 1), dtype=np.int32)
+        teams = rows(state.active, choice, n_from, offset)
+        team, robot = np.arange(n_robots * m), np.arange(n_robots).repeat(m)
+        everyone = rows(state.active, np.arange(m)[:, None, None], m)
+        teams[team, robot] = everyone.swapaxes(0, 1).reshape(n_robots * m, -1)
+        genes = np.concatenate([pool(state), state.partners.reshape(-1, state.genes.shape[-1])])
+        return trials(state, teams, genes)
+
+    def tell(self, state: State, trials: Trials, scores: Scores) -> State:
+        """Return the state after these scores."""
+        state = count(state, trials, scores)
+        config = self.config
+        n_elite = elite_count(config.elite_portion, config.genotypes)
+        if state.phase == "genotypes":
+            return grade(state, self._fitness(trials, scores, state), n_elite, phase="fittest")
+        state = crown(state, trials, scores)
+        children = breed_networks(state, state.elite, config)
+        if config.evaluation == "shared":
+            return advance(state, children, state.active)
+        population = np.arange(len(state.elite))[:, None]
+        partners = state.genes[population, :, state.elite].swapaxes(1, 2)
+        return advance(state, children, state.active, partners=partners)
+
+    def _fitness(self, trials: Trials, scores: Scores, state: State) -> FloatArray:
+        """Return type A fitness [P, M]."""
+        m = self.config.genotypes
+        if self.config.evaluation == "shared":
+            by_row = credit.mean_of_trials(trials.teams, scores.fitness, len(trials.genes))
+            return by_row.reshape(state.genes.shape[:3])[:, 0]
+        robot = np.arange(len(state.active)).repeat(m)
+        return credit.of_robot(scores.fitness, robot).reshape(-1, m)

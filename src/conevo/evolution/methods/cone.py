@@ -1,0 +1,168 @@
+"""CONE, Collective Neuro-Evolution: Multi-Agent ESP whose populations may share genes.
+
+Nitschke 2009, chapter 3. To MESP it adds type C fitness (elite controllers among elite partners),
+recombination between populations that behave alike and whose sub-populations look alike (the
+specialization and genotype difference metrics, SDM and GDM), and the regulation of how alike.
+
+Variants (4.5.7, 5.5.5, 6.5.6): CONE-1 without the GDM, CONE-2 without the SDM, CONE-3 without both.
+Choice: the thesis contradicts itself on CONE-1; here its paired populations recombine slot by slot.
+Choice: in CONE-2 all pairs of populations are candidates at once, so one population may exchange
+with several: the most similar sub-populations of all come first, each is taken once.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Annotated, Literal
+
+import numpy as np
+from annotated_types import Ge, Le
+
+from conevo.evolution import credit
+from conevo.evolution.assembly import elite_teams
+from conevo.evolution.generation import begin, count, trials
+from conevo.evolution.methods.mesp import Mesp, MespConfig
+from conevo.evolution.population import ranking
+from conevo.evolution.protocol import BoolArray, IntArray, Layout, Scores, State, Trials
+from conevo.evolution.regulation import regulate_gst, regulate_sst
+from conevo.evolution.selection import pair_populations, pair_similar, pair_slots
+from conevo.rng import stream
+
+__all__ = ["Cone", "Cone1Config", "Cone2Config", "Cone3Config", "ConeConfig"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ConeConfig(MespConfig):
+    """Parameters of CONE: those of Multi-Agent ESP and its own.
+
+    Attributes:
+        stagnation_v: V, generations without progress of the fittest team before SST moves (table
+            5.5: 15; 10 for pursuit).
+        stagnation_w: W, further generations before GST moves; a controller's size is questioned
+            after V + W + Y (table 5.5: 10).
+        sst: specialization similarity threshold at the start. Higher makes more populations
+            candidates for recombination. Choice: 0.5, the middle of table 5.5's range.
+        gst: genotype similarity threshold at the start. Higher recombines more. Choice: 0.2; two
+            random sub-populations are 0.33 apart, and genotypes "needed to be very similar in order
+            to be recombined" (7.1.2).
+        gd_aggregate: "mean" or "sum" of the distances of rank-paired elites. Choice: the mean.
+        threshold_step: change of a threshold (section 3.5: 1 %). Choice: absolute.
+        use_gdm: ask for similar genotypes (the genotype difference metric).
+        use_sdm: ask for similar behaviour (the specialization difference metric).
+    """
+
+    stagnation_v: Annotated[int, Ge(1)] = 15
+    stagnation_w: Annotated[int, Ge(1)] = 10
+    sst: Annotated[float, Ge(0), Le(1)] = 0.5
+    gst: Annotated[float, Ge(0), Le(1)] = 0.2
+    gd_aggregate: Literal["mean", "sum"] = "mean"
+    threshold_step: Annotated[float, Ge(0), Le(1)] = 0.01
+    use_gdm: bool = True
+    use_sdm: bool = True
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cone1Config(ConeConfig):
+    """Parameters of CONE-1: CONE without the genotype difference metric."""
+
+    use_gdm: Literal[False] = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cone2Config(ConeConfig):
+    """Parameters of CONE-2: CONE without the specialization difference metric."""
+
+    use_sdm: Literal[False] = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cone3Config(Cone1Config):
+    """Parameters of CONE-3: CONE without both metrics."""
+
+    use_sdm: Literal[False] = False
+
+
+@dataclass(frozen=True)
+class Cone(Mesp):
+    """Collective Neuro-Evolution; see the module."""
+
+    config: ConeConfig = field(default_factory=ConeConfig)
+    name: str = "cone"
+    title: str = "CONE"
+
+    def init(self, layout: Layout, root: int) -> State:
+        """Return generation 0 with random genotypes."""
+        config = self.config
+        return begin(
+            layout,
+            root,
+            n_populations=layout.n_robots,
+            n_genotypes=config.genotypes,
+            window=self.patience + 1,
+            sst=config.sst if config.use_sdm else np.nan,
+            gst=config.gst if config.use_gdm else np.nan,
+        )
+
+    def ask(self, state: State) -> Trials:
+        """Return the teams of the state's phase."""
+        if state.phase != "elites":
+            return super().ask(state)
+        generator = stream(state.root, "elites", state.generation)
+        m = self.config.genotypes
+        return trials(state, elite_teams(state.active, state.elite, m, generator))
+
+    def tell(self, state: State, trials: Trials, scores: Scores) -> State:
+        """Return the state after these scores."""
+        if state.phase == "elites":
+            return self.type_c(count(state, trials, scores), scores)
+        told = super().tell(state, trials, scores)
+        return replace(told, phase="elites") if state.phase == "genotypes" else told
+
+    def type_c(self, state: State, scores: Scores) -> State:
+        """Return the state with the elite ranked by type C fitness.
+
+        Choice: the elite portion stays the elite portion, whatever type C says of it; ranks with
+        equal type C keep their order by type A, alike in all sub-populations.
+        """
+        n_populations, _, n_elite = state.elite.shape
+        robot = np.arange(n_populations).repeat(n_elite)
+        by_rank = credit.of_robot(scores.fitness, robot).reshape(n_populations, n_elite)
+        fitness = credit.overwrite(state.fitness, state.elite, by_rank)
+        fitness[~state.active] = np.nan
+        order = ranking(by_rank)[:, None, :]
+        elite = np.take_along_axis(state.elite, np.broadcast_to(order, state.elite.shape), axis=2)
+        return replace(state, phase="fittest", fitness=fitness, elite=elite)
+
+    @property
+    def patience(self) -> int:
+        """Generations without progress before a controller's size is questioned: V + W + Y."""
+        config = self.config
+        return config.stagnation_v + config.stagnation_w + config.stagnation_y
+
+    def pairs(self, state: State) -> IntArray:
+        """Return the sub-populations [Q, 2] that recombine between populations."""
+        config = self.config
+        if config.use_sdm:
+            candidates = pair_populations(state.fittest_specialization, state.sst)
+        elif config.use_gdm:
+            candidates = np.stack(np.triu_indices(len(state.active), k=1), axis=1)
+        else:
+            return super().pairs(state)
+        if not config.use_gdm:
+            return pair_slots(state.active, candidates)
+        elites = np.take_along_axis(state.genes, state.elite[..., None], axis=2)
+        return pair_similar(elites, state.active, candidates, state.gst, config.gd_aggregate)
+
+    def finish(self, state: State, active: BoolArray, judged: BoolArray | None = None) -> State:
+        """Return the next generation, with its thresholds regulated."""
+        state = super().finish(state, active, judged)
+        v, w = self.config.stagnation_v, self.config.stagnation_w
+        fitness, step = state.past_fitness.mean(axis=1), self.config.threshold_step
+        sst, gst = state.sst, state.gst
+        if state.generation > v:
+            recent = slice(-(v + 1), None)
+            sst = regulate_sst(sst, fitness[recent], state.past_specialization[recent], step)
+        if state.generation > v + w:
+            recent = slice(-(v + w + 1), None)
+            gst = regulate_gst(gst, fitness[recent], state.past_recombinations[recent], step)
+        return replace(state, sst=sst, gst=gst)

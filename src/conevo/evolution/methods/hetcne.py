@@ -1,0 +1,109 @@
+"""HetCNE, heterogeneous conventional neuro-evolution: one population, teams of different networks.
+
+Nitschke 2009, sections 2.3.1 and 5.3.3. Every genotype is a whole network; it is tried once with
+n - 1 different genotypes of the elite and credited with its own robot's fitness. One team
+evaluation per genotype and generation.
+
+Choice: children replace all genotypes and have no fitness before they are tried, so "elite" means
+the elite portion of the generation before, which the state keeps; the first generation takes any
+other genotypes. An elite portion of fewer than n - 1 is filled up with the next in rank. With
+``n_elitist`` a survivor may meet its own copy.
+Choice: the genotype on trial is robot 0, so that all are compared in the same place.
+Choice: the fittest team is the n fittest genotypes, robot r holding rank r (section 2.3.1: "M of
+the fittest genotypes ... decoded into a group of M different ANNs").
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Annotated
+
+import numpy as np
+from annotated_types import Ge
+
+from conevo.errors import UsageError
+from conevo.evolution import credit
+from conevo.evolution.assembly import distinct, rows
+from conevo.evolution.generation import (
+    advance,
+    begin,
+    breed_networks,
+    count,
+    crown,
+    grade,
+    pool,
+    trials,
+)
+from conevo.evolution.population import elite_count
+from conevo.evolution.protocol import IntArray, Layout, Scores, State, Trials
+from conevo.evolution.variation import VariationConfig
+from conevo.rng import stream
+
+__all__ = ["HetCne", "HetCneConfig"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class HetCneConfig(VariationConfig):
+    """Parameters of HetCNE.
+
+    Attributes:
+        genotypes: M, whole networks in the population, at least as many as robots; each costs one
+            team evaluation. Choice: 10000, as for HomCNE.
+    """
+
+    genotypes: Annotated[int, Ge(2)] = 10_000
+
+
+@dataclass(frozen=True)
+class HetCne:
+    """Heterogeneous conventional neuro-evolution; see the module."""
+
+    config: HetCneConfig = field(default_factory=HetCneConfig)
+    name: str = "hetcne"
+    title: str = "HetCNE"
+
+    def init(self, layout: Layout, root: int) -> State:
+        """Return generation 0 with random genotypes."""
+        if self.config.genotypes < layout.n_robots:
+            raise UsageError(
+                f"HetCNE fills a team with different genotypes: genotypes "
+                f"({self.config.genotypes}) must be at least the robots ({layout.n_robots})"
+            )
+        return begin(
+            layout, root, n_populations=1, n_genotypes=self.config.genotypes, networks=True
+        )
+
+    def ask(self, state: State) -> Trials:
+        """Return every genotype among different partners, then the team of the fittest."""
+        m, n_robots = self.config.genotypes, state.fittest_fitness.size
+        if state.phase == "fittest":
+            fittest = state.elite[:, :n_robots, None]
+            return trials(state, rows(state.active, fittest, m))
+        generator = stream(state.root, "teams", state.generation)
+        own = np.arange(m, dtype=np.int32)[:, None]
+        n_kept = state.partners.shape[2]
+        if n_kept == 0:
+            chosen = distinct(m, n_robots - 1, m - 1, generator)
+            chosen = chosen + (chosen >= own)
+            partners = rows(state.active, chosen[:, :, None], m)
+            genes = pool(state)
+        else:
+            chosen = distinct(m, n_robots - 1, n_kept, generator)
+            partners = rows(state.active, chosen[:, :, None], n_kept, offset=len(pool(state)))
+            genes = np.concatenate([pool(state), state.partners.reshape(-1, pool(state).shape[1])])
+        first = rows(state.active, own[:, :, None], m)
+        return trials(state, np.concatenate([first, partners], axis=1), genes)
+
+    def tell(self, state: State, trials: Trials, scores: Scores) -> State:
+        """Return the state after these scores; a genotype's fitness is robot 0's credit."""
+        state = count(state, trials, scores)
+        config = self.config
+        n_elite = elite_count(config.elite_portion, config.genotypes)
+        if state.phase == "genotypes":
+            fitness = credit.of_robot(scores.fitness, 0)[None]
+            n_named = max(n_elite, scores.fitness.shape[1])
+            return grade(state, fitness, n_named, phase="fittest")
+        state = crown(state, trials, scores)
+        children = breed_networks(state, state.elite[:, :n_elite], config)
+        kept: IntArray = state.elite[0, : max(n_elite, scores.fitness.shape[1] - 1)]
+        return advance(state, children, state.active, partners=state.genes[:, :, kept])

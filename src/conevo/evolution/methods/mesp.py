@@ -1,0 +1,159 @@
+"""MESP, Multi-Agent Enforced Sub-Populations: a population per robot, a sub-population per neuron.
+
+Nitschke 2009, sections 2.3.3 and 5.3.3, after Yong and Miikkulainen. Recombination stays within
+sub-populations, fitness is type A only, and controllers grow or shrink when they stagnate.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Annotated, Literal
+
+import numpy as np
+from annotated_types import Ge, Gt, Le
+
+from conevo.evolution import credit
+from conevo.evolution.assembly import best_team, lesion_teams, on_trial, shared, systematic
+from conevo.evolution.generation import advance, begin, count, crown, grade, trials
+from conevo.evolution.population import elite_count, random_genes
+from conevo.evolution.protocol import (
+    BoolArray,
+    FloatArray,
+    IntArray,
+    Layout,
+    Scores,
+    State,
+    Trials,
+)
+from conevo.evolution.regulation import resized, stagnating
+from conevo.evolution.variation import VariationConfig, breed
+from conevo.rng import stream
+
+__all__ = ["Mesp", "MespConfig"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class MespConfig(VariationConfig):
+    """Parameters of Multi-Agent ESP.
+
+    Attributes:
+        genotypes: M, neurons per sub-population (table 5.5: 500 per population of 10).
+        evaluation: "systematic" tries every genotype once, R x U x M teams (section 3.3.1);
+            "shared" draws complete teams in which every genotype takes part ``rounds`` times,
+            rounds x M teams, the scheme ESP itself was published with.
+        rounds: K, trials of each genotype under "shared". More makes fitness less noisy.
+            Choice: 10, as ESP.
+        stagnation_y: Y, generations without progress before a controller's size is questioned
+            (table 5.5: 15; 20 for pursuit).
+        lesion_ratio: share of its fitness that a controller must keep without its least needed
+            neuron for that neuron to go. Lower removes more. Choice: 0.9, the thesis gives none.
+    """
+
+    genotypes: Annotated[int, Ge(2)] = 50
+    evaluation: Literal["systematic", "shared"] = "systematic"
+    rounds: Annotated[int, Ge(1)] = 10
+    stagnation_y: Annotated[int, Ge(1)] = 15
+    lesion_ratio: Annotated[float, Gt(0), Le(1)] = 0.9
+
+
+@dataclass(frozen=True)
+class Mesp:
+    """Multi-Agent ESP; see the module. CONE overrides the steps below ``tell``."""
+
+    config: MespConfig = field(default_factory=MespConfig)
+    name: str = "mesp"
+    title: str = "Multi-Agent ESP"
+
+    def init(self, layout: Layout, root: int) -> State:
+        """Return generation 0 with random genotypes."""
+        return begin(
+            layout,
+            root,
+            n_populations=layout.n_robots,
+            n_genotypes=self.config.genotypes,
+            window=self.patience + 1,
+        )
+
+    def ask(self, state: State) -> Trials:
+        """Return the teams of the state's phase."""
+        m = self.config.genotypes
+        if state.phase == "genotypes":
+            generator = stream(state.root, "teams", state.generation)
+            if self.config.evaluation == "shared":
+                return trials(state, shared(state.active, m, self.config.rounds, generator))
+            return trials(state, systematic(state.active, m, generator))
+        fittest = best_team(state.active, state.elite, m)
+        if state.phase == "lesion":
+            return trials(state, lesion_teams(fittest[0], self.suspects(state))[0])
+        return trials(state, fittest)
+
+    def tell(self, state: State, trials: Trials, scores: Scores) -> State:
+        """Return the state after these scores."""
+        state = count(state, trials, scores)
+        if state.phase == "genotypes":
+            n_elite = elite_count(self.config.elite_portion, self.config.genotypes)
+            return grade(state, self.type_a(state, trials, scores), n_elite, phase="fittest")
+        if state.phase == "fittest":
+            state = crown(state, trials, scores)
+            if self.suspects(state).any():
+                return replace(state, phase="lesion")
+            return self.finish(state, state.active)
+        return self.finish(state, self.resize(state, scores), self.suspects(state))
+
+    @property
+    def patience(self) -> int:
+        """Generations without progress before a controller's size is questioned."""
+        return self.config.stagnation_y
+
+    def suspects(self, state: State) -> BoolArray:
+        """Return the populations [P] whose controllers' size is in question."""
+        return stagnating(state.past_fitness, state.generation, state.watched_since, self.patience)
+
+    def type_a(self, state: State, trials: Trials, scores: Scores) -> FloatArray:
+        """Return type A fitness [P, U, M], NaN in empty slots."""
+        shape = state.genes.shape[:3]
+        if self.config.evaluation == "shared":
+            n_rows = len(trials.genes)
+            return credit.mean_of_trials(trials.teams, scores.fitness, n_rows).reshape(shape)
+        fitness = np.full(shape, np.nan)
+        place = on_trial(state.active, shape[2])
+        fitness[place] = credit.of_robot(scores.fitness, place[0])
+        return fitness
+
+    def resize(self, state: State, scores: Scores) -> BoolArray:
+        """Return the slots [P, U] in use after the lesions."""
+        suspects = self.suspects(state)
+        fittest = best_team(state.active, state.elite, self.config.genotypes)[0]
+        _, robot, slot = lesion_teams(fittest, suspects)
+        without = np.full(state.active.shape, np.nan)
+        without[robot, slot] = credit.of_robot(scores.fitness, robot)
+        whole = state.fittest_fitness
+        return resized(state.active, whole, without, suspects, self.config.lesion_ratio)
+
+    def pairs(self, state: State) -> IntArray:
+        """Return the sub-populations [Q, 2] that recombine between populations: none."""
+        return np.empty((0, 2), dtype=np.int64)
+
+    def finish(self, state: State, active: BoolArray, judged: BoolArray | None = None) -> State:
+        """Return the next generation, its controllers using the slots ``active`` [P, U].
+
+        Args:
+            state: the generation that ends.
+            active: [P, U] slots in use from now on; a newly used slot starts at random.
+            judged: [P] populations whose size was in question; their window restarts.
+        """
+        used = state.active
+        unit = np.cumsum(used) - 1
+        pairs = self.pairs(state)
+        generator = stream(state.root, "breed", state.generation)
+        children = np.zeros_like(state.genes)
+        children[used] = breed(
+            state.genes[used], state.elite[used], generator, self.config, unit[pairs]
+        )
+        for p, u in np.argwhere(active & ~used).tolist():
+            fresh = stream(state.root, "sub-population", state.generation, p)
+            children[p, u] = random_genes(fresh, children.shape[2:])
+        since = state.watched_since
+        if judged is not None:
+            since = np.where(judged, state.generation + 1, since)
+        return advance(state, children, active, len(pairs), watched_since=since)

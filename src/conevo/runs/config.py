@@ -1,0 +1,327 @@
+"""What a run is, settled before it starts: component defaults, preset, TOML file, single settings.
+
+Each layer overrides the one before. A default lives in one place only: the field of the component
+it belongs to. Presets and files hold overrides, and every value remembers where it came from, so
+that a wrong one can be named with its place.
+
+A configuration file has three tables. ``[run]`` also holds the three names::
+
+    [run]
+    world = "rover-v1/complex-1"
+    method = "cone"
+    preset = "desk"
+    seed = 1
+
+    [world]
+    iterations = 1250
+
+    [method]
+    genotypes = 20
+
+Presets (``presets/*.toml``) hold the same three tables once per world, with ``method`` split by
+method; a variant ("cone-1") takes its family's values ("cone") first, then its own::
+
+    [rover.run]
+    [rover.world]
+    [rover.method.cone]
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import hashlib
+import json
+import math
+import tomllib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+from typing import Annotated, Any, Literal, get_type_hints
+
+import tomli_w
+from annotated_types import Ge, Le
+from pydantic import TypeAdapter, ValidationError
+
+from conevo.errors import EnvironmentFailure, UsageError, unknown_name
+
+__all__ = ["PRESETS", "RunConfig", "RunSettings", "parse_assignment", "resolve"]
+
+PRESETS = ("smoke", "desk", "night", "thesis")
+SECTIONS = ("run", "world", "method")
+NAMES = {
+    "world": "",
+    "method": "cone",
+    "preset": "desk",
+}  # the keys of [run] that choose components
+
+
+@dataclass(frozen=True)
+class RunSettings:
+    """How long and on how much evidence to evolve; belongs to no world and no method.
+
+    Defaults are those of the multi-rover experiments (Nitschke 2009, table 5.5).
+
+    Attributes:
+        seed: root of all randomness of the run.
+        generations: the run ends after this many.
+        epochs: simulated trials per team evaluation (q); all teams of a generation meet the same.
+        credit: "robot" gives each robot its own fitness as the world reports it (eq. 5.4, 6.8);
+            "team" gives every robot the sum over the team (eq. 5.5).
+        budget_evaluations: the run never spends more team evaluations than this; 0 is no limit.
+        target: the run ends when the fittest team's main task performance reaches this.
+        checkpoint_every: generations between two checkpoints.
+        n_tests: fresh scenarios of the testing phase (5.4: 20).
+    """
+
+    seed: Annotated[int, Ge(0), Le(2**63 - 1)] = 1
+    generations: Annotated[int, Ge(1)] = 250
+    epochs: Annotated[int, Ge(1)] = 10
+    credit: Literal["robot", "team"] = "robot"
+    budget_evaluations: Annotated[int, Ge(0)] = 0
+    target: float | None = None
+    checkpoint_every: Annotated[int, Ge(1)] = 1
+    n_tests: Annotated[int, Ge(1)] = 20
+
+
+@dataclass(frozen=True)
+class RunConfig:
+    """A fully resolved run.
+
+    ``world`` carries its version ("rover-v1"); ``world_params`` and ``method_config`` are the
+    world's and the method's own frozen dataclasses.
+    """
+
+    world: str
+    environment: str
+    method: str
+    preset: str
+    run: RunSettings
+    world_params: Any
+    method_config: Any
+
+    @property
+    def task(self) -> str:
+        """World and environment in one name, "rover-v1/complex-1"."""
+        return f"{self.world}/{self.environment}"
+
+    @functools.cached_property
+    def run_id(self) -> str:
+        """Twelve hex digits that change with any value but the preset's name."""
+        tables = self.tables()
+        del tables["run"]["preset"]
+        text = json.dumps(tables, sort_keys=True)
+        return hashlib.blake2b(text.encode(), digest_size=6).hexdigest()
+
+    @property
+    def label(self) -> str:
+        """A readable, unique directory name for this run."""
+        task = self.task.replace("/", "-")
+        return f"{task}-{self.method}-{self.preset}-s{self.run.seed}-{self.run_id[:6]}"
+
+    def tables(self) -> dict[str, dict[str, Any]]:
+        """Return the three tables of the configuration file, every value spelt out."""
+        names = {"world": self.task, "method": self.method, "preset": self.preset}
+        return {
+            "run": names | _set_fields(self.run),
+            "world": _set_fields(self.world_params),
+            "method": _set_fields(self.method_config),
+        }
+
+    def to_toml(self) -> str:
+        """Return the text that ``resolve(file=...)`` turns back into this configuration."""
+        return tomli_w.dumps(self.tables())
+
+
+@dataclass(frozen=True)
+class _Value:
+    """A value and the place it was read from."""
+
+    value: Any
+    place: str
+
+
+Layer = dict[str, dict[str, _Value]]  # section -> key -> value
+
+
+def resolve(
+    world: str | None = None,
+    method: str | None = None,
+    preset: str | None = None,
+    seed: int | None = None,
+    file: str | Path | None = None,
+    overrides: Mapping[str, Any] | None = None,
+    place: str = "in overrides",
+) -> RunConfig:
+    """Return the one configuration that all layers together describe.
+
+    Args:
+        world: "rover/complex-1"; may be left out if the file names it.
+        method: wins over the file's, as the next two do.
+        preset: whose overrides to begin with.
+        seed: root of all randomness.
+        file: a configuration file, for example the ``config.toml`` of a run.
+        overrides: single settings, "run.generations" -> 5; a key that only one section has may be
+            written without its section.
+        place: where ``overrides`` came from, for error messages.
+
+    Raises:
+        UsageError: an unknown name or a value that is not allowed; nothing has been written.
+        EnvironmentFailure: the file cannot be read.
+    """
+    from conevo.evolution.methods.registry import METHODS
+    from conevo.worlds.registry import resolve as resolve_world
+
+    layers: list[Layer] = [_read_file(Path(file))] if file is not None else []
+    given = dict(overrides or {})
+    single, short = _split_keys(given, place)
+    names = _take_names([*layers, single], {"world": world, "method": method, "preset": preset})
+    if not names["world"]:
+        raise UsageError("which world? Name one as WORLD/ENVIRONMENT, for example rover/complex-1")
+    entry, environment = resolve_world(names["world"])
+    if names["method"] not in METHODS:
+        raise unknown_name("method", names["method"], METHODS)
+    parts: dict[str, type] = {
+        "run": RunSettings,
+        "world": entry.params_class,
+        "method": METHODS[names["method"]].config_class,
+    }
+    for key, value in short.items():
+        single.setdefault(_section_of(key, parts, place), {})[key] = value
+    if seed is not None:
+        single.setdefault("run", {})["seed"] = _Value(seed, "as the seed")
+    base = _read_preset(names["preset"], entry.name, names["method"])
+    built = {name: _build(name, part, [base, *layers, single]) for name, part in parts.items()}
+    return RunConfig(
+        world=entry.name,
+        environment=environment,
+        method=names["method"],
+        preset=names["preset"],
+        run=built["run"],
+        world_params=built["world"],
+        method_config=built["method"],
+    )
+
+
+def parse_assignment(text: str) -> tuple[str, Any]:
+    """Return key and value of "key=value"; the value is TOML, or else plain text.
+
+    Raises:
+        UsageError: there is no "=".
+    """
+    key, equals, value = text.partition("=")
+    if not equals or not key.strip():
+        raise UsageError(f"--set {text!r}: expected key=value, for example run.generations=5")
+    try:
+        return key.strip(), tomllib.loads(f"value = {value}")["value"]
+    except tomllib.TOMLDecodeError:
+        return key.strip(), value.strip()
+
+
+def _read_file(path: Path) -> Layer:
+    try:
+        tables = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise EnvironmentFailure(f"cannot read {path}: {error.strerror}") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise UsageError(f"{path} is not valid TOML: {error}") from error
+    return _as_layer(tables, f"in {path}")
+
+
+def _as_layer(tables: Mapping[str, Any], place: str) -> Layer:
+    layer: Layer = {}
+    for section, values in tables.items():
+        if section not in SECTIONS:
+            raise unknown_name("section", section, SECTIONS, place)
+        if not isinstance(values, Mapping):
+            raise UsageError(f"{section} {place} must be a table: [{section}]")
+        layer[section] = {key: _Value(value, place) for key, value in values.items()}
+    return layer
+
+
+def _split_keys(given: Mapping[str, Any], place: str) -> tuple[Layer, dict[str, _Value]]:
+    """Separate settings with a section from short ones."""
+    dotted: Layer = {}
+    short: dict[str, _Value] = {}
+    for key, value in given.items():
+        section, dot, name = key.partition(".")
+        if not dot:
+            short[key] = _Value(value, place)
+        elif section not in SECTIONS:
+            raise unknown_name("section", section, SECTIONS, f"in {key!r} {place}")
+        else:
+            dotted.setdefault(section, {})[name] = _Value(value, place)
+    return dotted, short
+
+
+def _take_names(layers: list[Layer], asked: Mapping[str, str | None]) -> dict[str, str]:
+    """Remove the three names from the layers' [run] tables and return those that hold."""
+    names = dict(NAMES)
+    for layer in layers:
+        for name in NAMES:
+            found = layer.get("run", {}).pop(name, None)
+            if found is not None and not isinstance(found.value, str):
+                raise UsageError(f"run.{name} = {found.value!r} {found.place}: must be a name")
+            names[name] = found.value if found is not None else names[name]
+    return names | {name: value for name, value in asked.items() if value is not None}
+
+
+def _section_of(key: str, parts: Mapping[str, type], place: str) -> str:
+    """Return the only section that has ``key``."""
+    known = {name: [f.name for f in dataclasses.fields(part)] for name, part in parts.items()}
+    homes = [name for name in known if key in known[name]]
+    if len(homes) > 1:
+        options = " or ".join(f"{home}.{key}" for home in homes)
+        raise UsageError(f"key {key!r} {place} is ambiguous: write {options}")
+    if not homes:
+        raise unknown_name("key", key, [key for keys in known.values() for key in keys], place)
+    return homes[0]
+
+
+def _read_preset(preset: str, world: str, method: str) -> Layer:
+    """Return what a preset says about this world and method."""
+    if preset not in PRESETS:
+        raise unknown_name("preset", preset, PRESETS)
+    source = resources.files(__package__) / "presets" / f"{preset}.toml"
+    worlds = tomllib.loads(source.read_text(encoding="utf-8"))
+    name = world.rsplit("-v", 1)[0]
+    if name not in worlds:
+        raise unknown_name("world", name, worlds, f"in preset {preset!r}")
+    tables = dict(worlds[name])
+    by_method = tables.pop("method", {})
+    family = method.split("-")[0]
+    tables["method"] = by_method.get(family, {}) | by_method.get(method, {})
+    return _as_layer(tables, f"in preset {preset!r}")
+
+
+def _build(section: str, part: Any, layers: Iterable[Layer]) -> Any:
+    """Return the component's dataclass with the layers' values over its defaults."""
+    hints = get_type_hints(part, include_extras=True)
+    values: dict[str, Any] = {}
+    for layer in layers:
+        for key, given in layer.get(section, {}).items():
+            if key not in hints:
+                known = [f"{section}.{name}" for name in hints]
+                raise unknown_name("key", f"{section}.{key}", known, given.place)
+            values[key] = _check(f"{section}.{key}", hints[key], given)
+    try:
+        return part(**values)
+    except ValueError as error:
+        raise UsageError(f"[{section}]: {error}") from error
+
+
+def _check(name: str, hint: Any, given: _Value) -> Any:
+    """Return the value as the type asks for it, or say what is allowed."""
+    problem = "must be finite"
+    if not isinstance(given.value, float) or math.isfinite(given.value):
+        try:
+            return TypeAdapter(hint).validate_python(given.value, strict=True)
+        except ValidationError as error:
+            problem = error.errors()[0]["msg"].replace("Input should be", "must be")
+    raise UsageError(f"{name} = {given.value!r} {given.place}: {problem}")
+
+
+def _set_fields(part: Any) -> dict[str, Any]:
+    """Return a dataclass' fields without those that are None (TOML has no such value)."""
+    return {key: value for key, value in dataclasses.asdict(part).items() if value is not None}

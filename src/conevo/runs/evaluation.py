@@ -1,0 +1,97 @@
+"""From trials to scores: where what methods ask meets what worlds report."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from conevo.evolution.protocol import Scores, Trials
+from conevo.rng import fold
+from conevo.specialization.individual import castes, degree, label
+from conevo.worlds.protocol import Outcome, World
+from conevo.worlds.rollout import Rollout
+
+__all__ = ["Evaluation", "Portrait", "describe", "make_evaluator", "score"]
+
+
+@dataclass(frozen=True)
+class Portrait:
+    """What one team did, averaged over its epochs.
+
+    Attributes:
+        performance: task performance measures.
+        specialization: degree of specialization S of each robot.
+        labels: caste of each robot, its most executed action or "non-specialized".
+        castes: number of robots per caste, largest first.
+    """
+
+    performance: dict[str, float]
+    specialization: list[float]
+    labels: list[str]
+    castes: dict[str, int]
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """Scores of a batch of trials, with the outcome they were made from."""
+
+    scores: Scores
+    outcome: Outcome
+
+
+Evaluate = Callable[[Trials], Evaluation]
+
+
+def make_evaluator(
+    rollout: Rollout, world: World, *, seed: int, epochs: int, credit: str
+) -> Evaluate:
+    """Return the function that plays trials in a world.
+
+    All trials of a generation meet the same ``epochs`` scenarios, addressed by seed, generation
+    and epoch, so a score depends neither on the batch nor on when it is computed.
+    """
+
+    def evaluate(trials: Trials) -> Evaluation:
+        keys = [fold(seed, "epoch", trials.generation, epoch) for epoch in range(epochs)]
+        genes = np.asarray(trials.genes, dtype=np.float32)
+        teams = np.asarray(trials.teams, dtype=np.int32)
+        outcome = rollout.evaluate(genes, teams, world.scenarios(keys))
+        return Evaluation(score(outcome, credit), outcome)
+
+    return evaluate
+
+
+def score(outcome: Outcome, credit: str = "robot") -> Scores:
+    """Average an outcome over epochs and give each robot its credit.
+
+    Args:
+        outcome: fitness [N, E, R], switches [N, E, R], counts [N, E, R, A].
+        credit: "robot": its own fitness (Nitschke 2009, eq. 5.4, 6.8); "team": the sum over the
+            team, the same for all its robots (eq. 5.5).
+    """
+    fitness = outcome.fitness.astype(np.float64).mean(axis=1)
+    if credit == "team":
+        fitness = np.repeat(fitness.sum(axis=1, keepdims=True), fitness.shape[1], axis=1)
+    specialization = degree(outcome.switches, outcome.counts).mean(axis=1)
+    return Scores(fitness=fitness, specialization=specialization)
+
+
+def describe(outcome: Outcome, actions: tuple[str, ...], team: int = 0) -> Portrait:
+    """Return what one team of an outcome did."""
+    counts: npt.NDArray[np.int64] = outcome.counts[team].astype(np.int64).sum(axis=0)
+    specialization = degree(outcome.switches[team], outcome.counts[team]).mean(axis=0)
+    labels = [
+        label(float(s), robot, actions) for s, robot in zip(specialization, counts, strict=True)
+    ]
+    return Portrait(
+        performance={
+            name: float(values[team].astype(np.float64).mean())
+            for name, values in outcome.performance.items()
+        },
+        specialization=[float(value) for value in specialization],
+        labels=labels,
+        castes=castes(labels),
+    )

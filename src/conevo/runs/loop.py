@@ -1,0 +1,136 @@
+"""The generation loop: ask, evaluate, tell, until a generation is done; stop when it is time to."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from conevo.errors import UsageError
+from conevo.evolution.protocol import Method, Scores, State
+from conevo.runs.config import RunSettings
+from conevo.runs.evaluation import Evaluate, Portrait, describe
+
+__all__ = ["check_budget", "evolve_generations"]
+
+Record = dict[str, Any]
+
+
+def evolve_generations(
+    method: Method,
+    state: State,
+    evaluate: Evaluate,
+    *,
+    settings: RunSettings,
+    actions: tuple[str, ...],
+    steps_per_evaluation: int,
+    last: Record | None = None,
+    on_generation: Callable[[State, Record], None],
+) -> str:
+    """Carry a population forward, one whole generation after another, and say why it stopped.
+
+    Args:
+        method: init / ask / tell.
+        state: the method's state at the beginning of a generation.
+        evaluate: plays trials.
+        settings: the stop conditions.
+        actions: names of the world's actions.
+        steps_per_evaluation: team-steps that one team evaluation takes (epochs x iterations).
+        last: record of the generation before, if there was one.
+        on_generation: called with the state after a generation and the generation's record.
+
+    Returns:
+        "generations", "target" or "budget".
+    """
+    while True:
+        if last is not None and _has_reached(settings.target, last["performance"]):
+            return "target"
+        if state.generation >= settings.generations:
+            return "generations"
+        started = time.perf_counter()
+        finished = _run_generation(method, state, evaluate, actions, settings.budget_evaluations)
+        if finished is None:
+            return "budget"
+        generation, (state, portrait) = state.generation, finished
+        steps = state.team_evaluations * steps_per_evaluation
+        last = _record(state, portrait, generation, steps, time.perf_counter() - started)
+        on_generation(state, last)
+
+
+def check_budget(method: Method, state: State, budget: int) -> None:
+    """Refuse a budget that does not pay for the first generation.
+
+    ask and tell are pure, so the first generation can be priced with empty scores.
+
+    Raises:
+        UsageError: no generation could be finished.
+    """
+    while budget and state.generation == 0:
+        trials = method.ask(state)
+        empty = np.zeros(trials.teams.shape[:2])
+        state = method.tell(state, trials, Scores(fitness=empty, specialization=empty))
+    if budget and state.team_evaluations > budget:
+        raise UsageError(
+            f"run.budget_evaluations = {budget} does not pay for one generation: "
+            f"the first takes {state.team_evaluations} team evaluations"
+        )
+
+
+def _run_generation(
+    method: Method, state: State, evaluate: Evaluate, actions: tuple[str, ...], budget: int
+) -> tuple[State, Portrait] | None:
+    """Return the state after one generation and its fittest team's portrait, None if unpayable.
+
+    Choice: a phase that the budget cannot pay is not begun, and a generation that could not be
+    finished does not count, so that a run never spends more than its budget.
+    """
+    generation = state.generation
+    portrait: Portrait | None = None
+    while state.generation == generation:
+        trials = method.ask(state)
+        if budget and state.team_evaluations + len(trials.teams) > budget:
+            return None
+        evaluation = evaluate(trials)
+        if trials.phase == "fittest":
+            portrait = describe(evaluation.outcome, actions)
+        state = method.tell(state, trials, evaluation.scores)
+    if portrait is None:
+        raise RuntimeError(f"{method.name} finished a generation without its fittest team")
+    return state, portrait
+
+
+def _record(
+    state: State, portrait: Portrait, generation: int, team_steps: int, seconds: float
+) -> Record:
+    """Return what the run's log says about a generation."""
+    return {
+        "generation": generation,
+        "team_evaluations": int(state.team_evaluations),
+        "team_steps": int(team_steps),
+        "seconds": round(seconds, 4),
+        "best_fitness": _finite(state.best_fitness),
+        "mean_fitness": _finite(state.mean_fitness),
+        "team_fitness": _finite(np.mean(state.fittest_fitness)),
+        "performance": {name: _finite(value) for name, value in portrait.performance.items()},
+        "castes": portrait.castes,
+        "specialization": _finite(np.mean(state.fittest_specialization)),
+        "sst": _finite(state.sst),
+        "gst": _finite(state.gst),
+        "recombinations": int(state.recombinations),
+        "n_hidden": [int(n) for n in np.atleast_1d(state.n_hidden)],
+        "n_nonfinite": int(state.n_nonfinite),
+    }
+
+
+def _finite(value: Any) -> float | None:
+    """Return a number that JSON can hold: not-a-number and infinity become null."""
+    return float(value) if math.isfinite(value) else None
+
+
+def _has_reached(target: float | None, performance: Mapping[str, float | None]) -> bool:
+    """Whether the first performance measure is at least the target."""
+    value = next(iter(performance.values()), None)
+    return target is not None and value is not None and value >= target

@@ -1,0 +1,329 @@
+"""A run: one seeded experiment on disk, and the one call that makes one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from conevo.errors import UsageError
+from conevo.evolution.methods.registry import METHODS
+from conevo.evolution.protocol import Layout, Method, State
+from conevo.runs import provenance
+from conevo.runs.champions import Team, fittest_team, sampled_generations
+from conevo.runs.config import RunConfig, resolve
+from conevo.runs.evaluation import Evaluate, make_evaluator
+from conevo.runs.loop import check_budget, evolve_generations
+from conevo.runs.store import Store, create, refuse_existing
+from conevo.runs.testing import test_team
+from conevo.worlds.protocol import World
+from conevo.worlds.registry import WORLDS
+from conevo.worlds.rollout import Rollout
+
+__all__ = ["RUNS", "Run", "evolve", "start"]
+
+RUNS = Path("runs")  # where runs are made and looked for unless told otherwise
+Record = dict[str, Any]
+Watch = Callable[["Run", Record], None]
+
+
+def evolve(
+    world: str | None = None,
+    method: str | None = None,
+    preset: str | None = None,
+    seed: int | None = None,
+    out: str | Path | None = None,
+    config: str | Path | None = None,
+    overrides: Mapping[str, Any] | None = None,
+    threads: int | None = None,
+    device: str = "cpu",
+    progress: bool = False,
+) -> Run:
+    """Evolve a team and test it; everything is kept in one directory.
+
+    Args:
+        world: world and environment, "rover/complex-1".
+        method: "cone" (default), "mesp", "ccga", "hetcne", "homcne", "cone-1" to "cone-3".
+        preset: "smoke" (seconds), "desk" (minutes, default), "night" (hours), "thesis".
+        seed: the same seed gives the same run, to the bit.
+        out: the run's directory; by default a new one under ``runs/``.
+        config: a TOML file with settings, for example the ``config.toml`` of another run.
+        overrides: single settings, for example ``{"run.generations": 5}``.
+        threads: CPU threads, all by default; results do not depend on it.
+        device: "cpu" or "cuda".
+        progress: print a line per generation.
+
+    Raises:
+        UsageError: a name or value that is not allowed, or ``out`` exists; nothing was written.
+        EnvironmentFailure: no such device, full disk, no permission.
+    """
+    settings = resolve(world, method, preset, seed, config, overrides)
+    run = start(settings, out, threads=threads, device=device)
+    return run.resume(threads=threads, watch=_print_line if progress else None)
+
+
+def start(
+    config: RunConfig,
+    out: str | Path | None = None,
+    *,
+    threads: int | None = None,
+    device: str = "cpu",
+    command: str = "conevo.evolve",
+) -> Run:
+    """Create the directory of a run that is then carried on by ``Run.resume``.
+
+    Raises:
+        UsageError: the directory exists, or the budget does not pay for one generation.
+        EnvironmentFailure: no such device, full disk, no permission; nothing was written.
+    """
+    path = Path(out) if out is not None else RUNS / config.label
+    refuse_existing(path)
+    lab = _Lab.equip(config, threads, device)
+    check_budget(lab.method, lab.first_state(), config.run.budget_evaluations)
+    about = {
+        "run_id": config.run_id,
+        "preset": config.preset,
+        "command": command,
+        "device": device,
+        "kernel_hash": lab.rollout.kernel_hash,
+        "created": provenance.now(),
+        **provenance.describe_machine(),
+        "sessions": [],
+    }
+    return Run(create(path, config, about).path, lab)
+
+
+class Run:
+    """A run on disk, finished or not.
+
+    Args:
+        path: its directory.
+
+    Raises:
+        UsageError: there is no run at ``path``.
+    """
+
+    def __init__(self, path: str | Path, lab: _Lab | None = None) -> None:
+        self._store = Store(Path(path))
+        self._lab = lab
+        self.path = self._store.path
+        self.config: RunConfig = self._store.read_config()
+
+    def __repr__(self) -> str:
+        return f"Run({str(self.path)!r})"
+
+    @property
+    def status(self) -> str:
+        """Return "finished", "running" or "interrupted"."""
+        if self._store.is_finished:
+            return "finished"
+        return "running" if self._store.is_in_use else "interrupted"
+
+    @property
+    def provenance(self) -> Record:
+        """Versions, kernel hash, machine and sessions."""
+        return self._store.read_provenance()
+
+    @property
+    def champion(self) -> Team | None:
+        """The fittest team of all generations so far, None before the first has ended."""
+        return self._store.load_champion()
+
+    @property
+    def test_result(self) -> Record | None:
+        """The testing phase of a finished run: "champion" and "generation_0"; None before."""
+        return self._store.read_test()
+
+    @property
+    def changed_files(self) -> list[str]:
+        """Files of a finished run that are not as they were when it was sealed."""
+        return self._store.check_seal() if self._store.is_finished else []
+
+    def generations(self) -> list[Record]:
+        """Return the record of every finished generation."""
+        return self._store.read_generations()
+
+    def team(self, generation: int) -> Team | None:
+        """Return the fittest team of a generation, None if it was not kept."""
+        return self._store.load_team(generation)
+
+    def resume(
+        self,
+        *,
+        threads: int | None = None,
+        watch: Watch | None = None,
+        remark: Callable[[str], None] | None = None,
+    ) -> Run:
+        """Carry the run on from its last checkpoint to its end: the same bits as without a break.
+
+        Args:
+            threads: CPU threads, all by default.
+            watch: called with the run and the record of each finished generation.
+            remark: told about a checkpoint that could not be used.
+
+        Raises:
+            UsageError: finished, in use, made with other kernels, or no usable checkpoint.
+            EnvironmentFailure: the machine refused; the run can be resumed when it no longer does.
+        """
+        self._refuse_finished()
+        with self._store.locked():
+            self._refuse_finished()
+            lab = self._equip(threads)
+            stopped_by = self._evolve(lab, watch, remark)
+            champion, first = self._best_so_far(), self._store.load_team(0)
+            tested = {"champion": champion, "generation_0": first or champion}
+            self._store.write_test({name: self._test(lab, team) for name, team in tested.items()})
+            about = self.provenance | {"finished": provenance.now(), "stopped_by": stopped_by}
+            self._store.write_provenance(about)
+            self._store.seal()
+        return self
+
+    def test(
+        self, scenarios: int | None = None, seed: int | None = None, *, threads: int | None = None
+    ) -> Record:
+        """Re-execute the fittest team so far in fresh scenarios; writes nothing.
+
+        Args:
+            scenarios: how many, by default as many as the run's own testing phase.
+            seed: draws other scenarios than the run's own testing phase.
+            threads: CPU threads, all by default.
+
+        Raises:
+            UsageError: no generation has finished yet, or made with other kernels.
+        """
+        champion = self.champion
+        if champion is None:
+            raise UsageError(f"{self.path} has no finished generation yet, so no team to test")
+        return self._test(self._equip(threads), champion, scenarios, seed)
+
+    def _test(
+        self, lab: _Lab, team: Team, scenarios: int | None = None, seed: int | None = None
+    ) -> Record:
+        return test_team(
+            lab.rollout,
+            lab.world,
+            team,
+            n_scenarios=scenarios or self.config.run.n_tests,
+            seed=self.config.run.seed if seed is None else seed,
+        )
+
+    def _best_so_far(self) -> Team:
+        champion = self.champion
+        if champion is None:
+            raise UsageError(f"{self.path} has lost its champion.npz: it cannot be resumed")
+        return champion
+
+    def _refuse_finished(self) -> None:
+        if self._store.is_finished:
+            raise UsageError(
+                f"{self.path} is finished; see it with 'conevo show {self.path}', or start another "
+                f"run with another --seed or --out"
+            )
+
+    def _equip(self, threads: int | None) -> _Lab:
+        """Return what the run needs, after checking that it is what it was started with."""
+        lab, self._lab = self._lab, None
+        about = self.provenance
+        if lab is None:
+            lab = _Lab.equip(self.config, threads, about["device"])
+        if lab.rollout.kernel_hash != about["kernel_hash"]:
+            raise UsageError(
+                f"{self.path} was made with other kernels ({about['kernel_hash']}, here "
+                f"{lab.rollout.kernel_hash}): install conevo {about['conevo']} and warp-lang "
+                f"{about['warp']}, or start another run with --config {self.path}/config.toml"
+            )
+        return lab
+
+    def _evolve(self, lab: _Lab, watch: Watch | None, remark: Callable[[str], None] | None) -> str:
+        store, settings, method = self._store, self.config.run, self.config.method
+        state, problem = store.load_checkpoint(method)
+        if state is None:
+            state = lab.first_state()
+        if problem and remark is not None:
+            remark(f"{problem}; going on from generation {state.generation} instead")
+        records = store.cut_generations(state.generation)
+        champion = self._best_so_far() if records else None
+        kept = sampled_generations(settings.generations)
+        newest = saved = state
+        session = {"started": provenance.now(), "from_generation": state.generation}
+        sessions = [*self.provenance["sessions"], session | {"threads": lab.rollout.n_threads}]
+        store.write_provenance(self.provenance | {"sessions": sessions})
+
+        def keep(state: State, record: Record) -> None:
+            nonlocal champion, newest, saved
+            team = fittest_team(state, record["generation"])
+            if team.is_fitter_than(champion):
+                store.save_champion(team)
+                champion = team
+            if team.generation in kept:
+                store.save_team(team)
+            store.append(record)
+            newest = state
+            if state.generation % settings.checkpoint_every == 0:
+                store.save_checkpoint(state, method)
+                saved = state
+            if watch is not None:
+                watch(self, record)
+
+        try:
+            return evolve_generations(
+                lab.method,
+                state,
+                lab.evaluate,
+                settings=settings,
+                actions=lab.world.actions,
+                steps_per_evaluation=settings.epochs * lab.world.iterations,
+                last=records[-1] if records else None,
+                on_generation=keep,
+            )
+        finally:
+            if newest is not saved:
+                store.save_checkpoint(newest, method)
+
+
+@dataclass(frozen=True)
+class _Lab:
+    """The working parts of a run, made from its configuration."""
+
+    config: RunConfig
+    world: World
+    method: Method
+    rollout: Rollout
+    evaluate: Evaluate
+
+    @staticmethod
+    def equip(config: RunConfig, threads: int | None, device: str) -> _Lab:
+        """Build world, method and simulator.
+
+        Raises:
+            EnvironmentFailure: there is no such device.
+        """
+        world = WORLDS[config.world].build(config.environment, config.world_params)
+        rollout = Rollout(world, n_threads=threads, device=device)
+        return _Lab(
+            config=config,
+            world=world,
+            method=METHODS[config.method].build(config.method_config),
+            rollout=rollout,
+            evaluate=make_evaluator(
+                rollout,
+                world,
+                seed=config.run.seed,
+                epochs=config.run.epochs,
+                credit=config.run.credit,
+            ),
+        )
+
+    def first_state(self) -> State:
+        """Return the method's state before generation 0."""
+        spec = self.world.controller
+        layout = Layout(self.world.n_robots, spec.n_hidden, spec.max_hidden, spec.n_genes)
+        return self.method.init(layout, self.config.run.seed)
+
+
+def _print_line(run: Run, record: Record) -> None:
+    """Print one generation (``progress=True``)."""
+    name, value = next(iter(record["performance"].items()))
+    total = run.config.run.generations
+    print(f"generation {record['generation'] + 1}/{total}  {name} {value:g}", flush=True)  # noqa: T201 (asked for)

@@ -1,0 +1,65 @@
+"""How specialized one robot is, to what, and which castes a team has.
+
+Nitschke 2009, section 3.2, after Gautrais et al. 2002.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+__all__ = ["NON_SPECIALIZED", "castes", "degree", "label"]
+
+NON_SPECIALIZED = "non-specialized"
+
+
+def degree(switches: npt.ArrayLike, counts: npt.ArrayLike) -> npt.NDArray[np.floating[Any]]:
+    """Return the degree of specialization S = A / N in [0, 1], [...]; 0 is a perfect specialist.
+
+    Nitschke 2009, eq. 3.4: A is how often the robot changed from one action to another, N how often
+    it could have: one less than the actions it executed. More switching raises S. Choice:
+    iterations without an action do not count, and S is 0 if fewer than two were executed.
+
+    Args:
+        switches: [...] A.
+        counts: [..., A] how often each action was executed.
+    """
+    possible = np.asarray(counts, dtype=np.float64).sum(axis=-1) - 1
+    changed = np.asarray(switches, dtype=np.float64)
+    s: npt.NDArray[np.floating[Any]] = np.zeros_like(possible)
+    np.divide(changed, possible, out=s, where=possible > 0)
+    return s
+
+
+def label(
+    specialization: float, counts: npt.ArrayLike, actions: Sequence[str], threshold: float = 0.5
+) -> str:
+    """Return the action a robot is specialized to, or "non-specialized".
+
+    Nitschke 2009, 3.2.3: specialized if S < 0.5, then to the most executed action (the first of
+    equals). Choice: a robot that executed no action is not specialized.
+
+    Args:
+        specialization: S.
+        counts: [A] how often each action was executed.
+        actions: A names.
+        threshold: S from which on a robot is not specialized.
+    """
+    executed = np.asarray(counts)
+    if executed.sum() == 0 or not specialization < threshold:
+        return NON_SPECIALIZED
+    return actions[int(executed.argmax())]
+
+
+def castes(labels: Iterable[str]) -> dict[str, int]:
+    """Return the number of robots per caste, the largest first, equals by name.
+
+    A caste is the robots of a team specialized to the same action (Nitschke 2009, 3.2.3); the
+    non-specialized are counted with them, as in the thesis' tables.
+    """
+    found = Counter(labels)
+    return dict(sorted(found.items(), key=lambda caste: (-caste[1], caste[0])))

@@ -1,0 +1,142 @@
+"""What every world promises, for each environment family of the registry."""
+
+import numpy as np
+import pytest
+from conevo.rng import fold, stream
+from conevo.worlds.registry import WORLDS, world
+from conevo.worlds.rollout import Rollout
+
+ITERATIONS = 25
+CASES = [
+    f"{entry.name}/{environment}"
+    for entry in WORLDS.values()
+    for environment in sorted({e.rpartition("-")[0]: e for e in entry.environments}.values())
+]
+
+
+def keys(n, root=7):
+    return [fold(root, "epoch", 0, e) for e in range(n)]
+
+
+@pytest.fixture(params=CASES, scope="module")
+def some_world(request):
+    return world(request.param, iterations=ITERATIONS)
+
+
+def random_teams(some_world, n, seed=0):
+    spec, r = some_world.controller, some_world.n_robots
+    pool = stream(seed, "pool").uniform(-1, 1, (n * r * spec.n_hidden, spec.n_genes))
+    teams = np.full((n, r, spec.max_hidden), -1, dtype=np.int32)
+    teams[:, :, : spec.n_hidden] = np.arange(len(pool)).reshape(n, r, -1)
+    return pool.astype(np.float32), teams
+
+
+def outcome_arrays(outcome):
+    return {
+        "fitness": outcome.fitness,
+        "counts": outcome.counts,
+        "switches": outcome.switches,
+        **outcome.performance,
+    }
+
+
+def assert_same_bits(a, b):
+    for name, values in outcome_arrays(a).items():
+        assert values.tobytes() == outcome_arrays(b)[name].tobytes(), name
+
+
+def test_outcome_has_the_shapes_and_ranges_it_promises(some_world):
+    genes, teams = random_teams(some_world, 3)
+    out = Rollout(some_world).evaluate(genes, teams, some_world.scenarios(keys(2)))
+    r, a = some_world.n_robots, len(some_world.actions)
+    assert out.fitness.shape == (3, 2, r)
+    assert out.counts.shape == (3, 2, r, a)
+    assert out.switches.shape == (3, 2, r)
+    assert set(out.performance) == set(some_world.performance)
+    assert all(values.shape == (3, 2) for values in out.performance.values())
+    assert np.isfinite(out.fitness).all()
+    executed = out.counts.sum(axis=-1)
+    assert (executed <= ITERATIONS).all()
+    assert (executed > 0).all()
+    assert (out.switches >= 0).all()
+    assert (out.switches < executed).all()
+
+
+def test_threads_slices_and_company_do_not_change_a_bit(some_world):
+    genes, teams = random_teams(some_world, 5)
+    scenarios = some_world.scenarios(keys(2))
+    whole = Rollout(some_world, n_threads=1).evaluate(genes, teams, scenarios)
+    assert_same_bits(whole, Rollout(some_world, n_threads=3).evaluate(genes, teams, scenarios))
+    rollout = Rollout(some_world, n_threads=2)
+    rollout.evaluate(genes, teams[::-1], scenarios)  # the workspace keeps no trace of it
+    for n in range(5):
+        alone = rollout.evaluate(genes, teams[n : n + 1], scenarios)
+        for name, values in outcome_arrays(whole).items():
+            assert values[n].tobytes() == outcome_arrays(alone)[name][0].tobytes(), name
+
+
+def test_one_scenario_is_the_same_alone_and_among_others(some_world):
+    genes, teams = random_teams(some_world, 2)
+    rollout = Rollout(some_world)
+    three = rollout.evaluate(genes, teams, some_world.scenarios(keys(3)))
+    last = rollout.evaluate(genes, teams, some_world.scenarios(keys(3)[2:]))
+    for name, values in outcome_arrays(three).items():
+        assert values[:, 2].tobytes() == outcome_arrays(last)[name][:, 0].tobytes(), name
+    assert not np.array_equal(three.counts[:, 0], three.counts[:, 1])  # scenarios differ
+
+
+def test_record_equals_evaluate_bit_for_bit(some_world):
+    genes, teams = random_teams(some_world, 2)
+    heuristic = np.full((2, some_world.n_robots), -1, dtype=np.int32)
+    heuristic[1, ::2] = len(some_world.heuristics) - 1
+    scenarios = some_world.scenarios(keys(1))
+    rollout = Rollout(some_world)
+    out = rollout.evaluate(genes, teams, scenarios, heuristic)
+    for n in range(2):
+        seen = rollout.record(genes, teams[n], scenarios, heuristic[n])
+        assert seen["fitness"].shape == (ITERATIONS, some_world.n_robots)
+        assert seen["fitness"][-1].tobytes() == out.fitness[n, 0].tobytes()
+        for a in range(len(some_world.actions)):
+            assert np.array_equal((seen["action"] == a).sum(axis=0), out.counts[n, 0, :, a])
+
+
+def test_every_heuristic_controller_plays(some_world):
+    genes, teams = random_teams(some_world, 1)
+    scenarios = some_world.scenarios(keys(1))
+    rollout = Rollout(some_world)
+    seen = {
+        rollout.evaluate(
+            genes, teams, scenarios, np.full(teams.shape[:2], h, np.int32)
+        ).counts.tobytes()
+        for h in range(-1, len(some_world.heuristics))
+    }
+    assert len(seen) == len(some_world.heuristics) + 1
+
+
+def test_cpu_blocks_run_the_cuda_form_to_the_same_bits(some_world, cpu_blocks):
+    genes, teams = random_teams(some_world, 2)
+    heuristic = np.full((2, some_world.n_robots), -1, dtype=np.int32)
+    heuristic[0, 1::2] = 0
+    scenarios = some_world.scenarios(keys(2))
+    serial = Rollout(some_world, n_threads=1).evaluate(genes, teams, scenarios, heuristic)
+    with cpu_blocks():
+        block = Rollout(some_world, n_threads=1, lanes=8)
+        assert_same_bits(serial, block.evaluate(genes, teams, scenarios, heuristic))
+
+
+def test_wrong_shapes_and_rows_are_refused_in_one_line(some_world):
+    genes, teams = random_teams(some_world, 1)
+    rollout, scenarios = Rollout(some_world), some_world.scenarios(keys(1))
+    outside = teams.copy()
+    outside[0, 0, 0] = len(genes)
+    for bad_genes, bad_teams, match in (
+        (genes[:, 1:], teams, "genes must be"),
+        (genes, teams[:, 1:], "teams must be"),
+        (genes, outside, "rows"),
+    ):
+        with pytest.raises(ValueError, match=match):
+            rollout.evaluate(bad_genes, bad_teams, scenarios)
+    with pytest.raises(ValueError, match="heuristic must be"):
+        rollout.evaluate(genes, teams, scenarios, np.full(teams.shape[:2], 99, np.int32))
+    with pytest.raises(ValueError, match="one scenario"):
+        rollout.record(genes, teams[0], some_world.scenarios(keys(2)))

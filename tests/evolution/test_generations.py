@@ -1,0 +1,317 @@
+"""Whole generations of each method with scripted scores, worked by hand."""
+
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from conevo.errors import UsageError
+from conevo.evolution import Layout, Scores, method
+
+SMALL = Layout(n_robots=2, n_hidden=2, max_hidden=3, n_genes=4)
+
+
+def scores(trials, fitness=1.0, specialization=0.0):
+    """Return the same score for everyone, or arrays spread over teams x robots."""
+    shape = trials.teams.shape[:2]
+    return Scores(
+        np.broadcast_to(np.asarray(fitness, dtype=float), shape).copy(),
+        np.broadcast_to(np.asarray(specialization, dtype=float), shape).copy(),
+    )
+
+
+def play(learner, state, generations, fitness=1.0, specialization=0.0, lesion=1.0):
+    """Return the state after each of some generations in which every team scores alike.
+
+    ``fitness`` and ``specialization`` may be functions of the generation.
+    """
+    seen = []
+    last = state.generation + generations
+    while state.generation < last:
+        trials = learner.ask(state)
+        f, s = (v(state.generation) if callable(v) else v for v in (fitness, specialization))
+        before = state.generation
+        state = learner.tell(
+            state, trials, scores(trials, lesion if trials.phase == "lesion" else f, s)
+        )
+        if state.generation > before:
+            seen.append(state)
+    return seen
+
+
+def test_homcne_clones_and_averages():
+    learner = method("homcne", genotypes=4, elite_portion=0.5)
+    state = learner.init(SMALL, root=7)
+    trials = learner.ask(state)
+    # Pool rows of genotype m: slot 0 -> m, slot 1 -> 4 + m, slot 2 is empty.
+    assert trials.teams[3].tolist() == [[3, 7, -1], [3, 7, -1]]
+    credit = np.array([[1.0, 3.0], [0.0, 10.0], [4.0, 4.0], [-1.0, 0.0]])
+    state = learner.tell(state, trials, Scores(credit, np.zeros((4, 2))))
+    assert state.fitness.tolist() == [[2, 5, 4, -0.5]]
+    assert state.elite.tolist() == [[1, 2]]
+    assert (state.best_fitness, state.mean_fitness) == (5, 2.625)
+    final = learner.ask(state)
+    assert final.phase == "fittest"
+    assert final.teams.tolist() == [[[1, 5, -1], [1, 5, -1]]]
+    after = learner.tell(state, final, Scores(np.array([[6.0, 7.0]]), np.array([[0.25, 0.5]])))
+    assert (after.generation, after.phase, after.team_evaluations) == (1, "genotypes", 5)
+    assert after.fittest_fitness.tolist() == [6, 7]
+    assert after.fittest_specialization.tolist() == [0.25, 0.5]
+    np.testing.assert_array_equal(after.fittest_genes[1, :2], state.genes[0, :2, 1])
+    assert after.fittest_active.tolist() == [[True, True, False]] * 2
+    assert not after.genes[0, 2].any()
+
+
+def test_hetcne_partners_are_others_first_then_last_generations_elite():
+    learner = method("hetcne", genotypes=6, elite_portion=0.5)
+    layout = replace(SMALL, n_robots=3)
+    state = learner.init(layout, root=7)
+    trials = learner.ask(state)
+    members = trials.teams[:, :, 0]
+    assert members[:, 0].tolist() == [0, 1, 2, 3, 4, 5]
+    assert all(len(set(team)) == 3 for team in members.tolist())
+    credit = np.zeros((6, 3))
+    credit[:, 0] = [1, 6, 2, 5, 4, 3]  # only robot 0's credit counts
+    credit[:, 1:] = 99
+    state = learner.tell(state, trials, Scores(credit, np.zeros((6, 3))))
+    final = learner.ask(state)
+    assert final.teams[0].tolist() == [[1, 7, -1], [3, 9, -1], [4, 10, -1]]
+    parents = state.genes
+    state = learner.tell(state, final, scores(final))
+    trials = learner.ask(state)
+    elite = {tuple(parents[0, :2, m].ravel()) for m in (1, 3, 4)}
+    networks = trials.networks()
+    for team in networks:
+        partners = {tuple(robot[:2].ravel()) for robot in team[1:]}
+        assert len(partners) == 2
+        assert partners <= elite
+    np.testing.assert_array_equal(networks[4, 0], state.genes[0, :, 4])
+
+
+def test_hetcne_needs_a_genotype_per_robot():
+    with pytest.raises(UsageError, match=r"genotypes \(2\) must be at least the robots \(3\)"):
+        method("hetcne", genotypes=2).init(replace(SMALL, n_robots=3), root=1)
+
+
+def test_ccga_tries_whole_networks_among_last_generations_elite():
+    learner = method("ccga", genotypes=4, elite_portion=0.5)
+    state = learner.init(SMALL, root=3)
+    trials = learner.ask(state)
+    assert trials.teams.shape == (8, 2, 3)
+    # Population 0 rows 0-3 and 4-7; population 1 rows 12-15 and 16-19.
+    assert trials.teams[2, 0].tolist() == [2, 6, -1]
+    assert trials.teams[5, 1].tolist() == [13, 17, -1]
+    assert set(trials.teams[:4, 1, 0]) <= {12, 13, 14, 15}
+    credit = np.array([[1, 0], [4, 0], [2, 0], [3, 0], [0, 9], [0, 7], [0, 8], [0, 6]], float)
+    state = learner.tell(state, trials, Scores(credit, np.zeros((8, 2))))
+    assert state.fitness.tolist() == [[1, 4, 2, 3], [9, 7, 8, 6]]
+    assert state.elite.tolist() == [[1, 3], [0, 2]]
+    final = learner.ask(state)
+    assert final.teams.tolist() == [[[1, 5, -1], [12, 16, -1]]]
+    parents = state.genes
+    state = learner.tell(state, final, scores(final))
+    networks = learner.ask(state).networks()
+    for team in networks[:4]:
+        assert any((team[1, :2] == parents[1, :2, m]).all() for m in (0, 2))
+    for team in networks[4:]:
+        assert any((team[0, :2] == parents[0, :2, m]).all() for m in (1, 3))
+
+
+def test_cone_type_c_reorders_the_elite_and_only_the_elite():
+    learner = method("cone", genotypes=4, elite_portion=0.5)
+    state = learner.init(replace(SMALL, n_hidden=1, max_hidden=1), root=3)
+    trials = learner.ask(state)
+    assert trials.teams[:, :, 0].shape == (8, 2)
+    type_a = np.array([[1, 0], [4, 0], [2, 0], [3, 0], [0, 9], [0, 7], [0, 8], [0, 6]], float)
+    state = learner.tell(state, trials, Scores(type_a, np.zeros((8, 2))))
+    assert state.phase == "elites"
+    trials = learner.ask(state)
+    # P0's elite: genotypes 1, 3; P1's: 0, 2 (rows 4, 6).
+    assert trials.teams[:2, 0, 0].tolist() == [1, 3]
+    assert trials.teams[2:, 1, 0].tolist() == [4, 6]
+    assert set(trials.teams[:2, 1, 0]) <= {4, 6}
+    # Type C turns P0's ranks round and leaves P1's, although 0.5 is less than others' type A.
+    type_c = np.array([[0.25, 0], [0.5, 0], [0, 0.5], [0, 0.25]])
+    state = learner.tell(state, trials, Scores(type_c, np.zeros((4, 2))))
+    assert state.elite[:, 0].tolist() == [[3, 1], [0, 2]]
+    assert state.fitness[:, 0].tolist() == [[1, 0.25, 2, 0.5], [0.5, 7, 0.25, 6]]
+    assert (state.best_fitness, state.phase) == (9, "fittest")  # best and mean are type A
+    assert learner.ask(state).teams.tolist() == [[[3], [4]]]
+
+
+def marked_generation(name, specialization, n_robots=3, **config):
+    """Return a method's state after a generation whose genes name their populations.
+
+    Every gene of population p is (p + 1) / 8, so children show whom they come from.
+    """
+    learner = method(name, genotypes=4, mutation_probability=0.0, **config)
+    layout = Layout(n_robots=n_robots, n_hidden=2, max_hidden=2, n_genes=4)
+    state = learner.init(layout, root=5)
+    names = (np.arange(n_robots, dtype=np.float32) + 1) / 8
+    state = replace(state, genes=np.broadcast_to(names[:, None, None, None], state.genes.shape))
+    return play(learner, state, 1, specialization=np.array(specialization))[0]
+
+
+def parents_of(state, population):
+    """Return which populations the genes of a marked population's children come from."""
+    return set((np.unique(state.genes[population]) * 8 - 1).astype(int).tolist())
+
+
+@pytest.mark.parametrize(
+    ("name", "config", "families", "recombinations"),
+    [
+        # S: 0 and 1 alike (0.05), 2 far (0.75). GD between P0 and P1: 1/16; P0 and P2: 1/8.
+        ("cone", {"gst": 0.1}, [{0, 1}, {0, 1}, {2}], 2),
+        ("cone", {"gst": 0.05}, [{0}, {1}, {2}], 0),  # behave alike, look different
+        ("cone", {"gst": 0.1, "sst": 0.01}, [{0}, {1}, {2}], 0),  # look alike, behave differently
+        ("cone", {"gst": 0.1, "gd_aggregate": "sum"}, [{0}, {1}, {2}], 0),  # 2 x 1/16
+        ("cone-1", {"gst": 0.0}, [{0, 1}, {0, 1}, {2}], 2),  # looks do not matter
+        ("cone-2", {"sst": 0.0, "gst": 0.1}, [{0, 1}, {0, 1}, {2}], 2),  # behaviour does not
+        ("cone-3", {"sst": 1.0, "gst": 1.0}, [{0}, {1}, {2}], 0),
+        ("mesp", {}, [{0}, {1}, {2}], 0),
+    ],
+)
+def test_recombination_between_populations(name, config, families, recombinations):
+    state = marked_generation(name, [0.1, 0.15, 0.9], **config)
+    assert [parents_of(state, p) for p in range(3)] == families
+    assert state.recombinations == recombinations
+
+
+def test_first_children_go_to_the_first_population():
+    state = marked_generation("cone", [0.5, 0.5], n_robots=2, gst=1.0)
+    assert set(state.genes[0, :, :, 0].ravel() * 8) == {1}
+    assert set(state.genes[0, :, :, -1].ravel() * 8) == {2}
+    assert set(state.genes[1, :, :, 0].ravel() * 8) == {2}
+    assert set(state.genes[1, :, :, -1].ravel() * 8) == {1}
+
+
+def test_cone_regulates_its_thresholds_over_moving_windows():
+    learner = method("cone", genotypes=2, stagnation_v=3, stagnation_w=1, sst=0.05, gst=0.02)
+    # No progress; S of both robots rises, far from each other: no recombination.
+    states = play(
+        learner,
+        learner.init(SMALL, root=1),
+        7,
+        specialization=lambda g: np.array([0.1, 0.5]) + 0.01 * g,
+    )
+    # V = 3: four values are there after generation 3. V + W = 4: five after generation 4.
+    assert [round(s.sst, 6) for s in states] == [0.05, 0.05, 0.05, 0.04, 0.03, 0.02, 0.01]
+    assert [round(s.gst, 6) for s in states] == [0.02, 0.02, 0.02, 0.02, 0.03, 0.04, 0.05]
+    progress = play(
+        learner,
+        learner.init(SMALL, root=1),
+        7,
+        fitness=lambda g: 1.0 + g,
+        specialization=lambda g: np.array([0.1, 0.5]) + 0.01 * g,
+    )
+    assert {(s.sst, s.gst) for s in progress} == {(0.05, 0.02)}
+
+
+def test_variants_have_no_threshold_they_do_not_use():
+    found = {}
+    for name in ("cone", "cone-1", "cone-2", "cone-3", "mesp"):
+        state = method(name, genotypes=2).init(SMALL, root=1)
+        found[name] = (np.isnan(state.sst), np.isnan(state.gst))
+    assert found == {
+        "cone": (False, False),
+        "cone-1": (False, True),
+        "cone-2": (True, False),
+        "cone-3": (True, True),
+        "mesp": (True, True),
+    }
+
+
+@pytest.mark.parametrize(
+    ("name", "config", "patience"),
+    [
+        ("mesp", {"stagnation_y": 3}, 3),
+        ("cone", {"stagnation_v": 1, "stagnation_w": 1, "stagnation_y": 1}, 3),
+    ],
+)
+def test_stagnating_controllers_grow_when_every_neuron_is_needed(name, config, patience):
+    learner = method(name, genotypes=2, **config)
+    layout = Layout(n_robots=2, n_hidden=2, max_hidden=4, n_genes=4)
+
+    # Robot 0 stagnates, robot 1 makes progress; a lesion costs all fitness.
+    states = play(
+        learner,
+        learner.init(layout, root=1),
+        2 * patience + 2,
+        fitness=lambda g: np.array([1.0, 1.0 + g]),
+        lesion=0.0,
+    )
+    sizes = [s.n_hidden.tolist() for s in states]
+    # The window spans `patience` generations first after generation `patience` (counted from 0),
+    # restarts in the next and is full again `patience` later.
+    grown, again = patience, 2 * patience + 1
+    expected = [[2, 2]] * grown + [[3, 2]] * (again - grown) + [[4, 2]]
+    assert sizes == expected
+    new = states[grown].genes[0, 2]
+    assert (np.abs(new) <= 1).all()
+    assert len(np.unique(new)) == new.size
+    assert not states[grown].genes[1, 2].any()
+    # Lesions are paid for: two neurons of robot 0, later three.
+    cost = np.diff([s.team_evaluations for s in states])
+    assert cost[grown - 1] - cost[grown - 2] == 2
+
+
+def test_a_neuron_that_nobody_misses_goes_and_its_slot_is_emptied():
+    learner = method("mesp", genotypes=2, stagnation_y=1)
+    layout = Layout(n_robots=2, n_hidden=3, max_hidden=4, n_genes=4)
+    state = play(learner, learner.init(layout, root=1), 1)[0]
+    while state.phase != "lesion":
+        trials = learner.ask(state)
+        state = learner.tell(state, trials, scores(trials))
+    trials = learner.ask(state)
+    assert trials.teams.shape == (6, 2, 4)
+    assert [int((team >= 0).sum()) for team in trials.teams] == [5] * 6
+    # Robot 0: without slot 1 it keeps 0.95; robot 1: slot 2 is worth 0.2, all are needed.
+    left = np.array([[0.5, 1], [0.95, 1], [0.1, 1], [1, 0.0], [1, 0.1], [1, 0.8]])
+    state = learner.tell(state, trials, Scores(left, np.zeros((6, 2))))
+    assert state.active.tolist() == [[True, False, True, False], [True, True, True, True]]
+    assert state.n_hidden.tolist() == [2, 4]
+    assert not state.genes[0, 1].any()
+    assert state.genes[1, 3].any()
+    teams = learner.ask(state).teams
+    assert (teams[:, 0, 1] == -1).all()
+    assert len(teams) == 2 * (2 + 4)
+
+
+def test_scores_must_answer_the_question():
+    learner = method("mesp", genotypes=2)
+    state = learner.init(SMALL, root=1)
+    trials = learner.ask(state)
+    with pytest.raises(UsageError, match=r"fitness has shape \(3,\), teams x robots is \(8, 2\)"):
+        learner.tell(state, trials, Scores(np.zeros(3), np.zeros((8, 2))))
+    later = learner.tell(state, trials, scores(trials))
+    with pytest.raises(UsageError, match=r"'genotypes' of generation 0.*'fittest' of 0"):
+        learner.tell(later, trials, scores(trials))
+
+
+def test_layout_refuses_impossible_sizes():
+    with pytest.raises(UsageError, match="max_hidden >= n_hidden"):
+        Layout(n_robots=2, n_hidden=4, max_hidden=3, n_genes=4)
+
+
+@pytest.mark.timing
+@pytest.mark.parametrize("name", ["homcne", "hetcne", "ccga", "mesp", "cone"])
+def test_a_desk_generation_costs_little_beside_its_simulation(name):
+    # 200 teams of 20 robots take about 1.5 s to simulate; 5 % of that is 75 ms.
+    config = {"genotypes": 200} if name.endswith("cne") else {"genotypes": 20}
+    if not name.endswith("cne"):
+        config["evaluation"] = "shared"
+    learner = method(name, **config)
+    state = learner.init(Layout(n_robots=20, n_hidden=10, max_hidden=20, n_genes=31), root=1)
+    spent = [0.0]
+    while state.generation < 9:
+        start = time.perf_counter()
+        trials = learner.ask(state)
+        asked = time.perf_counter()
+        answer = scores(trials, specialization=np.linspace(0, 1, 20))
+        told = time.perf_counter()
+        state = learner.tell(state, trials, answer)
+        spent[-1] += time.perf_counter() - told + asked - start
+        if state.phase == "genotypes":
+            spent.append(0.0)
+    assert np.median(spent[:-1]) < 0.020

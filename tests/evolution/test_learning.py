@@ -1,0 +1,38 @@
+"""Every method learns a separable function by ask and tell, without any world."""
+
+import numpy as np
+import pytest
+
+from conevo.evolution import METHODS, Layout, Scores, method
+
+LAYOUT = Layout(n_robots=3, n_hidden=3, max_hidden=3, n_genes=5)
+
+CASES = [
+    *((name, {"genotypes": 60}, 40) for name in ("homcne", "hetcne")),
+    *(
+        (name, {"genotypes": 20, "evaluation": evaluation, "rounds": 5}, 40)
+        for name in METHODS
+        if name not in ("homcne", "hetcne")
+        for evaluation in ("systematic", "shared")
+    ),
+]
+
+
+@pytest.mark.parametrize(("name", "config", "generations"), CASES)
+def test_error_halves(name, config, generations):
+    target = np.random.default_rng(0).uniform(-1, 1, (3, 3, 5))
+    if name in ("homcne", "hetcne"):
+        target[:] = target[0]  # one population can only learn one target
+    learner = method(name, elite_portion=0.25, **config)
+    state = learner.init(LAYOUT, root=11)
+    error = []
+    while state.generation < generations:
+        trials = learner.ask(state)
+        distance = np.abs(trials.networks() - target).mean(axis=(2, 3))
+        before = state.generation
+        # Robots differ in S by more than any threshold: nobody is taken for another.
+        specialization = np.broadcast_to([0.0, 0.5, 1.0], distance.shape)
+        state = learner.tell(state, trials, Scores(1 - distance, specialization))
+        if state.generation > before:
+            error.append((1 - state.fittest_fitness).mean())
+    assert np.mean(error[-3:]) < error[0] / 2

@@ -1,0 +1,78 @@
+"""Methods by name, and the one clear line for a wrong one."""
+
+import os
+import subprocess
+import sys
+from dataclasses import fields, is_dataclass
+from pathlib import Path
+
+import pytest
+
+import conevo.evolution
+from conevo.errors import UsageError
+from conevo.evolution import METHODS, method
+
+
+def test_the_five_methods_and_three_variants():
+    assert list(METHODS) == [
+        "homcne",
+        "hetcne",
+        "ccga",
+        "mesp",
+        "cone",
+        "cone-1",
+        "cone-2",
+        "cone-3",
+    ]
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_an_entry_builds_its_method(name):
+    entry = METHODS[name]
+    built = method(name)
+    assert (built.name, built.title) == (entry.name, entry.title)
+    assert type(built.config) is entry.config_class
+    assert is_dataclass(built.config)
+    with pytest.raises(AttributeError):
+        built.config.genotypes = 3
+    config = {field.name for field in fields(entry.config_class)}
+    assert ("evaluation" in config) == (name not in ("homcne", "hetcne"))
+    assert entry.summary
+    assert "Nitschke 2009" in entry.source
+
+
+@pytest.mark.parametrize(
+    ("name", "config", "message"),
+    [
+        ("cones", {}, "unknown method 'cones'; did you mean 'cone'?"),
+        ("mesp", {"genotype": 3}, "unknown parameter 'genotype' of method 'mesp'; did you mean"),
+        ("homcne", {"evaluation": "shared"}, "unknown parameter 'evaluation'"),
+        ("mesp", {"genotypes": 1}, "mesp: genotypes must be ge 2, got 1"),
+        ("mesp", {"genotypes": 2.5}, "mesp: genotypes must be int, got 2.5"),
+        ("cone", {"elite_portion": 0}, "cone: elite_portion must be gt 0, got 0"),
+        ("cone", {"sst": 1.5}, "cone: sst must be le 1, got 1.5"),
+        ("cone", {"gd_aggregate": "max"}, "gd_aggregate must be one of"),
+        ("cone-1", {"use_gdm": True}, "use_gdm must be one of"),
+    ],
+)
+def test_wrong_requests(name, config, message):
+    with pytest.raises(UsageError) as caught:
+        method(name, **config)
+    assert message in str(caught.value)
+
+
+def test_reading_names_loads_no_numpy():
+    source = Path(conevo.evolution.__file__).parents[2]
+    code = (
+        "import sys; from conevo.evolution import METHODS; print(*METHODS);"
+        "sys.exit('numpy' in sys.modules)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        env={**os.environ, "PYTHONPATH": str(source)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.stdout.split() == list(METHODS)
+    assert done.returncode == 0, done.stderr

@@ -1,0 +1,89 @@
+"""Elite selection: who may recombine with whom, worked by hand."""
+
+import numpy as np
+import pytest
+
+from conevo.evolution.selection import (
+    elite_distance,
+    pair_populations,
+    pair_similar,
+    pair_slots,
+    specialization_distance,
+)
+
+
+def test_specialization_distance_of_the_thesis_controllers():
+    # A perfect specialist (S = 0) and a non-specialist (S = 0.5), eqs 3.4 and 3.5.
+    distance = specialization_distance(np.array([0.0, 0.5, 0.125]))
+    assert distance.tolist() == [[0, 0.5, 0.125], [0.5, 0, 0.375], [0.125, 0.375, 0]]
+
+
+def test_populations_pair_from_the_most_similar_on():
+    # SD: (0,1) 1/64, (2,3) 3/64, (1,2) and the others far.
+    s = np.array([0.125, 0.140625, 0.5, 0.453125])
+    assert pair_populations(s, 0.1).tolist() == [[0, 1], [2, 3]]
+    assert pair_populations(s, 0.03).tolist() == [[0, 1]]
+    assert pair_populations(s[::-1], 0.1).tolist() == [[2, 3], [0, 1]]
+
+
+def test_a_population_is_taken_once_and_the_rest_stays_alone():
+    # SD: (1,2) 1/16 first; then (0,1) 1/8 and (0,2) 3/16 are similar too, but 1 and 2 are gone.
+    s = np.array([0.0, 0.125, 0.1875])
+    assert pair_populations(s, 0.25).tolist() == [[1, 2]]
+
+
+def test_similar_means_below_the_threshold_and_known():
+    assert pair_populations(np.array([0.0, 0.25]), 0.25).tolist() == []
+    assert pair_populations(np.array([0.5, 0.5]), 0.0).tolist() == []
+    assert pair_populations(np.array([np.nan, 0.5, 0.5]), 1.0).tolist() == [[1, 2]]
+    assert pair_populations(np.array([0.5, 0.5]), float("nan")).tolist() == []
+
+
+def test_elite_distance_pairs_ranks():
+    # One sub-population each, L = 2, G = 2. Rank 1: |diffs| 1, 0 -> GD 0.25; rank 2: 2, 1 -> 0.75.
+    a = np.array([[[0.0, 0.5], [1.0, 0.0]]])
+    b = np.array([[[1.0, 0.5], [-1.0, 1.0]]])
+    assert elite_distance(a, b).tolist() == [[0.5]]
+    assert elite_distance(a, b, "sum").tolist() == [[1.0]]
+    swapped = b[:, ::-1]  # ranks decide: 1, 0.5 -> 0.375; 0, 0.5 -> 0.125
+    assert elite_distance(a, swapped).tolist() == [[0.25]]
+
+
+def elites_of(values):
+    """Return elites [P, U, 2, 3] whose every gene in sub-population (p, u) is values[p][u]."""
+    return np.broadcast_to(np.array(values)[:, :, None, None], (*np.shape(values), 2, 3))
+
+
+def test_sub_populations_pair_greedily_by_genotype_distance():
+    # GD = |difference| / 2. Population 0: 0.0, 0.5; population 1: 0.125, 0.25.
+    # (0,0)-(1,0) 0.0625 first; then (0,1)-(1,1) 0.125; (0,0)-(1,1) also 0.125 but taken.
+    elites = elites_of([[0.0, 0.5], [0.125, 0.25]])
+    active = np.ones((2, 2), dtype=bool)
+    candidates = np.array([[0, 1]])
+    assert pair_similar(elites, active, candidates, 0.2).tolist() == [[0, 2], [1, 3]]
+    assert pair_similar(elites, active, candidates, 0.1).tolist() == [[0, 2]]
+    assert pair_similar(elites, active, candidates, 0.0625).tolist() == []
+    assert pair_similar(elites, active, candidates, 0.2, "sum").tolist() == [[0, 2]]
+    assert pair_similar(elites, active, np.empty((0, 2), dtype=int), 1.0).tolist() == []
+
+
+def test_empty_slots_never_pair():
+    elites = elites_of([[0.0, 0.5, 0.0], [0.0, 0.5, 0.0]])
+    active = np.array([[True, True, False], [False, True, False]])
+    # Left: (0,1)-(1,1) at 0, units 1 and 4; (0,0) finds nobody.
+    assert pair_similar(elites, active, np.array([[0, 1]]), 1.0).tolist() == [[1, 4]]
+
+
+def test_without_population_pairs_the_most_similar_of_all_come_first():
+    # CONE-2: (0)-(2) 0.03125 before (0)-(1) 0.0625; then (1) is left without a partner.
+    elites = elites_of([[0.0], [0.125], [-0.0625]])
+    candidates = np.array([[0, 1], [0, 2], [1, 2]])
+    paired = pair_similar(elites, np.ones((3, 1), dtype=bool), candidates, 1.0)
+    assert paired.tolist() == [[0, 2]]
+
+
+@pytest.mark.parametrize("candidates", [np.array([[0, 2]]), np.empty((0, 2), dtype=int)])
+def test_slots_pair_where_both_are_used(candidates):
+    active = np.array([[True, True, False], [True, True, True], [False, True, True]])
+    expected = [[1, 7]] if len(candidates) else []
+    assert pair_slots(active, candidates).tolist() == expected

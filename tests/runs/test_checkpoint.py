@@ -1,0 +1,134 @@
+"""A checkpoint comes back to the bit, or not at all."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from conevo.runs.checkpoint import UnusableFile, load, save
+
+IDENTITY = {"run_id": "abc", "method": "cone"}
+
+
+@dataclass(frozen=True)
+class Example:
+    generation: int
+    phase: str
+    sst: float
+    gst: float
+    genes: npt.NDArray[np.float32]
+    active: npt.NDArray[np.bool_]
+    scores: npt.NDArray[np.float64]
+    empty: npt.NDArray[np.int32]
+
+
+@dataclass(frozen=True)
+class Newer:
+    generation: int
+    genes: npt.NDArray[np.float32]
+
+
+def example() -> Example:
+    rng = np.random.default_rng(3)
+    return Example(
+        generation=7,
+        phase="genotypes",
+        sst=0.1 + 0.2,
+        gst=float("nan"),
+        genes=rng.standard_normal((2, 3, 5), dtype=np.float32),
+        active=rng.random((2, 3)) < 0.5,
+        scores=np.array([np.nan, np.inf, -0.0, 1 / 3]),
+        empty=np.zeros((2, 0), dtype=np.int32),
+    )
+
+
+def is_same(a: Any, b: Any) -> bool:
+    for field in fields(a):
+        x, y = getattr(a, field.name), getattr(b, field.name)
+        if isinstance(x, np.ndarray):
+            if (x.dtype, x.shape, x.tobytes()) != (y.dtype, y.shape, y.tobytes()):
+                return False
+        elif repr(x) != repr(y) or type(x) is not type(y):
+            return False
+    return True
+
+
+@pytest.fixture
+def saved(tmp_path: Path) -> Path:
+    path = tmp_path / "checkpoint.npz"
+    save(path, example(), IDENTITY)
+    return path
+
+
+def test_everything_comes_back_to_the_bit(saved: Path) -> None:
+    assert is_same(load(saved, Example, IDENTITY), example())
+
+
+def test_numpy_scalars_are_stored_as_plain_numbers(tmp_path: Path) -> None:
+    @dataclass(frozen=True)
+    class Scalars:
+        n: int
+        x: float
+
+    path = tmp_path / "s.npz"
+    save(path, Scalars(np.int64(3), np.float64(0.1)), IDENTITY)  # type: ignore[arg-type]
+    assert load(path, Scalars, IDENTITY) == Scalars(3, 0.1)
+
+
+def test_any_flipped_bit_is_noticed_or_harmless(saved: Path) -> None:
+    """Every byte, one random bit of each: the same content, or a refusal."""
+    data, rng = saved.read_bytes(), np.random.default_rng(1)
+    n_refused = 0
+    for position in range(len(data)):
+        damaged = bytearray(data)
+        damaged[position] ^= 1 << int(rng.integers(8))
+        saved.write_bytes(damaged)
+        try:
+            assert is_same(load(saved, Example, IDENTITY), example()), position
+        except UnusableFile as error:
+            n_refused += 1
+            assert "\n" not in str(error)
+            assert str(saved) in str(error)
+    assert n_refused > len(data) // 3  # the rest are dates and such in zip's own records
+
+
+def test_any_truncation_is_noticed(saved: Path) -> None:
+    data = saved.read_bytes()
+    for length in range(0, len(data), 7):
+        saved.write_bytes(data[:length])
+        with pytest.raises(UnusableFile, match="damaged"):
+            load(saved, Example, IDENTITY)
+
+
+def test_another_runs_or_methods_file_is_refused(saved: Path) -> None:
+    with pytest.raises(UnusableFile, match="method is 'cone', not 'mesp'"):
+        load(saved, Example, IDENTITY | {"method": "mesp"})
+    with pytest.raises(UnusableFile, match="run_id is 'abc', not 'xyz'"):
+        load(saved, Example, IDENTITY | {"run_id": "xyz"})
+
+
+def test_other_files_are_refused(saved: Path) -> None:
+    with saved.open("wb") as file:
+        np.savez(file, a=np.zeros(3))
+    with pytest.raises(UnusableFile, match="damaged or no file of conevo's"):
+        load(saved, Example, IDENTITY)
+    saved.write_text("hello")
+    with pytest.raises(UnusableFile, match="damaged or no file of conevo's"):
+        load(saved, Example, IDENTITY)
+
+
+def test_pickles_are_not_opened(saved: Path) -> None:
+    with saved.open("wb") as file:
+        np.savez(file, about=np.array([{"x": 1}], dtype=object))
+    with pytest.raises(UnusableFile, match="damaged or no file of conevo's"):
+        load(saved, Example, IDENTITY)
+
+
+def test_another_versions_fields_are_refused(saved: Path) -> None:
+    with pytest.raises(UnusableFile, match="another version of conevo"):
+        load(saved, Newer, IDENTITY)

@@ -1,0 +1,50 @@
+"""Scores by hand: means over epochs, private and team credit, degree of specialization, castes."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from conevo.runs.evaluation import describe, score
+from conevo.worlds.protocol import Outcome
+
+ACTIONS = ("dig", "move")
+
+# One team, two epochs, three robots.
+OUTCOME = Outcome(
+    fitness=np.array([[[1, 2, 3], [3, 2, 7]]], dtype=np.float32),
+    switches=np.array([[[0, 10, 4], [0, 10, 2]]], dtype=np.int32),
+    counts=np.array(
+        [[[[11, 0], [6, 5], [3, 8]], [[11, 0], [6, 5], [1, 10]]]],
+        dtype=np.int32,
+    ),
+    performance={"value": np.array([[10, 20]], dtype=np.float32)},
+)
+
+
+def test_each_robot_is_credited_with_its_own_mean_over_epochs() -> None:
+    np.testing.assert_array_equal(score(OUTCOME).fitness, [[2, 2, 5]])
+
+
+def test_team_credit_is_the_sum_for_every_robot() -> None:
+    """Nitschke 2009, eq. 5.5."""
+    np.testing.assert_array_equal(score(OUTCOME, "team").fitness, [[9, 9, 9]])
+
+
+def test_specialization_is_the_mean_of_switches_over_possible_switches() -> None:
+    """Nitschke 2009, eq. 3.4: 0/10, 10/10, (4/10 + 2/10) / 2."""
+    np.testing.assert_allclose(score(OUTCOME).specialization, [[0, 1, 0.3]])
+
+
+def test_non_finite_fitness_is_passed_on() -> None:
+    fitness = OUTCOME.fitness.copy()
+    fitness[0, 1, 2] = np.inf
+    broken = Outcome(fitness, OUTCOME.counts, OUTCOME.switches, OUTCOME.performance)
+    np.testing.assert_array_equal(score(broken).fitness, [[2, 2, np.inf]])
+
+
+def test_a_portrait_names_castes_by_the_most_executed_action() -> None:
+    portrait = describe(OUTCOME, ACTIONS)
+    assert portrait.performance == {"value": 15.0}
+    assert portrait.labels == ["dig", "non-specialized", "move"]
+    assert portrait.castes == {"dig": 1, "move": 1, "non-specialized": 1}
+    np.testing.assert_allclose(portrait.specialization, [0, 1, 0.3])

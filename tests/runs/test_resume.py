@@ -1,0 +1,206 @@
+"""A run that was broken off, anywhere, ends as if it never had been: bit for bit."""
+
+from __future__ import annotations
+
+import errno
+import os
+import random
+import shutil
+import signal
+import time
+from pathlib import Path
+
+import pytest
+from runs.tiny import command, content, evolve_tiny, spawn, wait_for
+
+import conevo
+from conevo.errors import EnvironmentFailure, UsageError
+from conevo.evolution.methods.registry import METHODS
+from conevo.runs import durable
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_resume_after_kills_at_random_moments(method: str, tmp_path: Path) -> None:
+    whole = evolve_tiny(tmp_path / "whole", method, run__generations=60)
+    path, moments = tmp_path / "killed", [random.uniform(0, 0.5) for _ in range(2)]
+
+    process = spawn(*command(path, method, run__generations=60), "--quiet")
+    wait_for(lambda: (path / "lock").exists() or process.poll() is not None)
+    time.sleep(moments[0])
+    process.kill()
+    assert process.wait() == -signal.SIGKILL, process.communicate()
+
+    process = spawn("resume", str(path), "--quiet")
+    wait_for(lambda: f"process {process.pid}" in (path / "lock").read_text())
+    time.sleep(moments[1])
+    process.kill()
+    process.wait()
+
+    run = conevo.Run(path)
+    if run.status != "finished":
+        assert run.status == "interrupted"
+        run.resume(threads=2)
+    assert content(path) == content(whole.path), moments
+
+
+class Crash(BaseException):
+    """The end of the process at this point."""
+
+
+def fail_at(monkeypatch: pytest.MonkeyPatch, call: int, problem: BaseException) -> list[int]:
+    """Let the ``call``-th fsync of the run's files fail; return the list that counts them."""
+    calls: list[int] = []
+    sync = os.fsync
+
+    def fsync(handle: int) -> None:
+        calls.append(handle)
+        if len(calls) - 1 == call:
+            raise problem
+        sync(handle)
+
+    monkeypatch.setattr(durable.os, "fsync", fsync)
+    return calls
+
+
+@pytest.mark.parametrize("every", [1, 2])
+@pytest.mark.parametrize("problem", [Crash(), OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))])
+def test_resume_after_a_failure_at_every_write(
+    problem: BaseException, every: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    changes = {"run__generations": 3, "run__checkpoint_every": every}
+    with monkeypatch.context() as patch:
+        n_writes = len(calls := fail_at(patch, -1, problem))
+        whole = content(evolve_tiny(tmp_path / "whole", **changes).path)
+        n_writes = len(calls)
+    assert n_writes > 30
+    for call in range(n_writes):
+        path = tmp_path / "broken"
+        with monkeypatch.context() as patch:
+            fail_at(patch, call, problem)
+            with pytest.raises((Crash, EnvironmentFailure)) as caught:
+                evolve_tiny(path, **changes)
+        if isinstance(caught.value, EnvironmentFailure):
+            assert caught.value.exit_code == 3
+            assert str(path) in str(caught.value)
+            assert "No space left on device" in str(caught.value)
+        if not path.exists():  # broken off in the first write: nothing is left
+            assert [p.name for p in tmp_path.iterdir()] == ["whole"]
+            continue
+        run = conevo.Run(path)
+        if run.status != "finished":
+            run.resume(threads=1)
+        assert content(path) == whole, call
+        shutil.rmtree(path)
+
+
+def test_interrupt_keeps_the_last_finished_generation(tmp_path: Path) -> None:
+    changes = {"run__generations": 400, "run__checkpoint_every": 1000}
+    path = tmp_path / "run"
+    process = spawn(*command(path, "mesp", **changes))
+    log = path / "generations.jsonl"
+    wait_for(lambda: log.exists() and log.read_bytes().count(b"\n") >= 3)
+    process.send_signal(signal.SIGINT)
+    _, said = process.communicate(timeout=30)
+    assert process.returncode == 130, said
+    assert f"continue with: conevo resume {path}" in said
+    run = conevo.Run(path)
+    count = len(run.generations())
+    assert run.status == "interrupted"
+    assert 3 <= count < 400
+    assert f"interrupted after {count} generations" in said
+    starts: list[int] = []
+    run.resume(threads=1, watch=lambda _, record: starts.append(record["generation"]))
+    assert starts[0] == count
+    whole = evolve_tiny(tmp_path / "whole", "mesp", **changes)
+    assert content(path) == content(whole.path)
+
+
+def interrupted(path: Path, *, after: int = 3) -> conevo.Run:
+    """Make a run that was interrupted after some generations."""
+
+    def stop(run: conevo.Run, record: dict[str, object]) -> None:
+        if record["generation"] == after - 1:
+            raise KeyboardInterrupt
+
+    from conevo.runs.config import resolve
+    from conevo.runs.run import start
+    from runs.tiny import TASK, tiny_settings
+
+    run = start(resolve(TASK, "cone", "smoke", overrides=tiny_settings("cone")), path, threads=1)
+    with pytest.raises(KeyboardInterrupt):
+        run.resume(threads=1, watch=stop)
+    return conevo.Run(path)
+
+
+def newest(path: Path) -> Path:
+    return max(path.glob("checkpoint-?.npz"), key=lambda p: p.stat().st_mtime_ns)
+
+
+def test_a_damaged_newest_checkpoint_falls_back_to_the_one_before(tmp_path: Path) -> None:
+    whole = evolve_tiny(tmp_path / "whole")
+    run = interrupted(tmp_path / "run")
+    damaged = newest(run.path)
+    damaged.write_bytes(damaged.read_bytes()[:-100])
+    remarks: list[str] = []
+    run.resume(threads=1, remark=remarks.append)
+    assert len(remarks) == 1
+    assert str(damaged) in remarks[0]
+    assert "going on from generation 2 instead" in remarks[0]
+    assert content(run.path) == content(whole.path)
+
+
+def test_two_damaged_checkpoints_are_one_clear_line_and_nothing_is_lost(tmp_path: Path) -> None:
+    run = interrupted(tmp_path / "run")
+    for file in run.path.glob("checkpoint-?.npz"):
+        file.write_bytes(b"")
+    before = (run.path / "generations.jsonl").read_bytes()
+    with pytest.raises(UsageError) as caught:
+        run.resume(threads=1)
+    assert "no usable checkpoint" in str(caught.value)
+    assert "\n" not in str(caught.value)
+    assert (run.path / "generations.jsonl").read_bytes() == before
+    for file in run.path.glob("checkpoint-?.npz"):
+        file.unlink()
+    assert content(run.resume(threads=1).path) == content(evolve_tiny(tmp_path / "whole").path)
+
+
+def test_a_foreign_checkpoint_is_refused(tmp_path: Path) -> None:
+    run = interrupted(tmp_path / "run")
+    other = evolve_tiny(tmp_path / "other", run__seed=2)
+    (source,) = other.path.glob("checkpoint-?.npz")
+    for file in run.path.glob("checkpoint-?.npz"):
+        shutil.copy(source, file)
+    with pytest.raises(UsageError, match="is foreign: run_id is"):
+        run.resume(threads=1)
+
+
+def test_a_lost_champion_is_not_silently_replaced(tmp_path: Path) -> None:
+    run = interrupted(tmp_path / "run")
+    (run.path / "champion.npz").unlink()
+    with pytest.raises(UsageError, match=r"lost its champion\.npz"):
+        run.resume(threads=1)
+
+
+def test_a_run_made_with_other_kernels_is_refused(tmp_path: Path) -> None:
+    run = interrupted(tmp_path / "run")
+    file = run.path / "provenance.json"
+    file.write_text(file.read_text().replace(run.provenance["kernel_hash"], "0" * 16))
+    for use in (run.resume, run.test):
+        with pytest.raises(UsageError, match=r"made with other kernels \(0000000000000000, here"):
+            use(threads=1)
+
+
+def test_an_edited_configuration_is_refused(tmp_path: Path) -> None:
+    run = interrupted(tmp_path / "run")
+    file = run.path / "config.toml"
+    file.write_text(file.read_text().replace("iterations = 12", "iterations = 13"))
+    with pytest.raises(UsageError, match="was changed after the run was started"):
+        conevo.Run(run.path)
+
+
+def test_a_finished_run_is_not_resumed(tmp_path: Path) -> None:
+    run = evolve_tiny(tmp_path / "run")
+    before = {p: p.read_bytes() for p in run.path.rglob("*") if p.is_file()}
+    with pytest.raises(UsageError, match="is finished"):
+        run.resume()
+    assert {p: p.read_bytes() for p in run.path.rglob("*") if p.is_file()} == before

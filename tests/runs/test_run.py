@@ -1,0 +1,184 @@
+"""A whole run: stop conditions, the record, the champion, the testing phase, the same bits twice."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from runs.tiny import TASK, content, evolve_tiny, tiny_settings
+
+import conevo
+from conevo.errors import EnvironmentFailure, UsageError
+from conevo.evolution.methods.registry import METHODS
+from conevo.rng import fold
+from conevo.runs.champions import Team, sampled_generations
+
+
+def make_team(generation: int, *fitness: float) -> Team:
+    genes = np.ones((len(fitness), 2, 3), dtype=np.float32)
+    active = np.ones((len(fitness), 2), dtype=np.bool_)
+    return Team(generation, genes, active, np.array(fitness), np.zeros(len(fitness)))
+
+
+def test_the_same_seed_gives_the_same_run_for_any_number_of_threads(tmp_path: Path) -> None:
+    one = evolve_tiny(tmp_path / "one")
+    settings = tiny_settings("cone")
+    two = conevo.evolve(TASK, "cone", "smoke", out=tmp_path / "two", overrides=settings, threads=2)
+    other = evolve_tiny(tmp_path / "other", run__seed=2)
+    assert content(one.path) == content(two.path)
+    assert content(one.path)["generations"] != content(other.path)["generations"]
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_budget_is_never_passed_and_nearly_spent(method: str, tmp_path: Path) -> None:
+    free = evolve_tiny(tmp_path / "free", method)
+    spent = [record["team_evaluations"] for record in free.generations()]
+    budget = spent[2] + 1
+    run = evolve_tiny(tmp_path / "bound", method, run__budget_evaluations=budget)
+    assert [record["team_evaluations"] for record in run.generations()] == spent[:3]
+    assert run.provenance["stopped_by"] == "budget"
+
+
+def test_a_budget_below_one_generation_is_refused_before_anything_is_written(
+    tmp_path: Path,
+) -> None:
+    cost = evolve_tiny(tmp_path / "one", run__generations=1).generations()[0]["team_evaluations"]
+    with pytest.raises(UsageError, match=f"the first takes {cost} team evaluations"):
+        evolve_tiny(tmp_path / "none", run__budget_evaluations=cost - 1)
+    assert not (tmp_path / "none").exists()
+    run = evolve_tiny(tmp_path / "exact", run__budget_evaluations=cost)
+    assert len(run.generations()) == 1
+
+
+def test_a_target_ends_a_run_at_the_first_generation_that_reaches_it(tmp_path: Path) -> None:
+    values = [
+        record["performance"]["value"] for record in evolve_tiny(tmp_path / "free").generations()
+    ]
+    target = sorted(values)[-2]
+    first = next(k for k, value in enumerate(values) if value >= target)
+    run = evolve_tiny(tmp_path / "target", run__target=target)
+    assert len(run.generations()) == first + 1
+    assert run.provenance["stopped_by"] == "target"
+
+
+def test_the_record_of_a_generation(tmp_path: Path) -> None:
+    run = evolve_tiny(tmp_path / "run", run__epochs=2, world__iterations=12)
+    for number, record in enumerate(run.generations()):
+        assert record["generation"] == number
+        assert record["team_steps"] == record["team_evaluations"] * 2 * 12
+        assert sum(record["castes"].values()) == 3
+        assert 0 <= record["specialization"] <= 1
+        assert set(record["performance"]) == {"value", "area"}
+        assert len(record["n_hidden"]) == 3
+        assert record["best_fitness"] >= record["mean_fitness"]
+    assert run.provenance["stopped_by"] == "generations"
+    homcne = evolve_tiny(tmp_path / "homcne", "homcne").generations()[0]
+    assert (homcne["sst"], homcne["gst"], homcne["n_hidden"]) == (None, None, [2])
+
+
+def test_the_champion_is_the_fittest_team_of_all_generations(tmp_path: Path) -> None:
+    run = evolve_tiny(tmp_path / "run", world__iterations=60, world__low_range=0.3)
+    fitness = [record["team_fitness"] for record in run.generations()]
+    assert max(fitness) > 0
+    champion = run.champion
+    assert champion is not None
+    assert champion.generation == int(np.argmax(fitness))
+    assert champion.mean_fitness == max(fitness)
+    kept = run.team(champion.generation)
+    assert kept is not None
+    np.testing.assert_array_equal(champion.genes, kept.genes)
+
+
+def test_only_a_fitter_finite_team_becomes_champion() -> None:
+    first, same, better = make_team(0, 1, 3), make_team(1, 3, 1), make_team(2, 2, 3)
+    broken = make_team(3, math.inf, 1)
+    assert first.is_fitter_than(None)
+    assert not same.is_fitter_than(first)
+    assert better.is_fitter_than(first)
+    assert not broken.is_fitter_than(first)
+    assert broken.is_fitter_than(None)
+    assert first.is_fitter_than(broken)
+
+
+def test_a_team_as_a_trial_uses_exactly_its_active_slots() -> None:
+    team = make_team(0, 1, 2)
+    team.active[1, 0] = False
+    pool, teams = team.as_trial()
+    assert pool.shape == (4, 3)
+    assert teams.tolist() == [[[0, 1], [-1, 3]]]
+
+
+def test_generations_worth_keeping_are_few_and_begin_with_the_first() -> None:
+    assert sampled_generations(3) == {0, 1, 2}
+    assert sampled_generations(100) == set(range(0, 100, 10))
+    assert len(sampled_generations(250)) == 10
+
+
+def test_the_testing_phase_is_the_team_in_the_addressed_scenarios(tmp_path: Path) -> None:
+    run = evolve_tiny(tmp_path / "run", world__iterations=60, run__n_tests=4)
+    result, champion = run.test_result, run.champion
+    assert result is not None
+    assert champion is not None
+    tested = result["champion"]
+    world = run.config
+    place = conevo.world(TASK, **world.tables()["world"])
+    keys = [fold(1, "test", k) for k in range(4)]
+    outcome = conevo.Rollout(place, n_threads=1).evaluate(
+        *champion.as_trial(), place.scenarios(keys)
+    )
+    areas = outcome.performance["area"][0].astype(float)
+    assert tested["performance"]["area"]["values"] == areas.tolist()
+    assert tested["performance"]["area"]["mean"] == pytest.approx(areas.mean())
+    assert tested["performance"]["area"]["sd"] == pytest.approx(areas.std(ddof=1))
+    assert sum(tested["castes"].values()) == len(tested["labels"]) == 3
+    assert tested["generation"] == champion.generation
+    assert result["generation_0"]["generation"] == 0
+
+
+def test_testing_again_gives_the_same_and_writes_nothing(tmp_path: Path) -> None:
+    run = evolve_tiny(tmp_path / "run")
+    before = {p: p.read_bytes() for p in run.path.rglob("*") if p.is_file()}
+    assert run.test_result is not None
+    again: dict[str, Any] = conevo.Run(run.path).test()
+    assert again == run.test_result["champion"]
+    assert len(run.test(7)["performance"]["area"]["values"]) == 7
+    assert run.test(seed=5)["performance"] != again["performance"]
+    assert {p: p.read_bytes() for p in run.path.rglob("*") if p.is_file()} == before
+
+
+def test_a_run_can_be_repeated_from_its_own_configuration(tmp_path: Path) -> None:
+    run = evolve_tiny(tmp_path / "run")
+    again = conevo.evolve(config=run.path / "config.toml", out=tmp_path / "again")
+    assert content(again.path) == content(run.path)
+
+
+def test_provenance_says_what_the_result_was_made_with(tmp_path: Path) -> None:
+    about = evolve_tiny(tmp_path / "run").provenance
+    assert about["preset"] == "smoke"
+    assert about["numpy"] == np.__version__
+    assert len(about["kernel_hash"]) == 16
+    assert [session["from_generation"] for session in about["sessions"]] == [0]
+    assert about["created"] <= about["finished"]
+
+
+def test_records_are_strict_json(tmp_path: Path) -> None:
+    run = evolve_tiny(tmp_path / "run", "homcne")
+    for file in [*run.path.glob("*.json"), *run.path.glob("*.jsonl")]:
+        assert "NaN" not in file.read_text()
+        assert "Infinity" not in file.read_text()
+        for line in file.read_text().splitlines() if file.suffix == ".jsonl" else []:
+            json.loads(line)
+
+
+def test_a_missing_device_is_an_environment_failure(tmp_path: Path) -> None:
+    import warp as wp
+
+    if wp.is_cuda_available():
+        pytest.skip("this machine has the device")
+    with pytest.raises(EnvironmentFailure, match="no CUDA device"):
+        conevo.evolve(TASK, preset="smoke", out=tmp_path / "run", device="cuda")
+    assert list(tmp_path.iterdir()) == []

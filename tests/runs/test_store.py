@@ -1,0 +1,156 @@
+"""A run's directory: one writer, whole lines only, nothing overwritten, every refusal one line."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from runs.tiny import command, evolve_tiny, spawn, wait_for
+
+import conevo
+from conevo.errors import EnvironmentFailure, UsageError
+from conevo.runs.config import resolve
+from conevo.runs.store import Store, create
+
+HOLD = """
+import fcntl, os, sys
+handle = os.open(sys.argv[1], os.O_RDWR | os.O_CREAT)
+fcntl.flock(handle, fcntl.LOCK_EX)
+os.write(handle, b"process 4711")
+print("held", flush=True)
+sys.stdin.read()
+"""
+
+
+def fresh_store(path: Path) -> Store:
+    config = resolve("rover/complex-1", preset="smoke")
+    return create(path, config, {"run_id": config.run_id})
+
+
+def test_a_new_directory_holds_the_resolved_configuration(tmp_path: Path) -> None:
+    store = fresh_store(tmp_path / "deep" / "run")
+    assert store.read_config() == resolve("rover/complex-1", preset="smoke")
+    assert store.read_generations() == []
+    assert [p.name for p in (tmp_path / "deep").iterdir()] == ["run"]
+
+
+def test_an_empty_directory_may_be_used(tmp_path: Path) -> None:
+    (tmp_path / "run").mkdir()
+    assert fresh_store(tmp_path / "run").read_generations() == []
+
+
+def test_a_directory_with_other_things_is_left_alone(tmp_path: Path) -> None:
+    (tmp_path / "thesis.txt").write_text("precious")
+    with pytest.raises(UsageError, match="exists and is no run"):
+        fresh_store(tmp_path)
+    with pytest.raises(UsageError, match="exists and is no run"):
+        fresh_store(tmp_path / "thesis.txt")
+    assert [p.name for p in tmp_path.iterdir()] == ["thesis.txt"]
+
+
+def test_an_unfinished_run_is_not_begun_again(tmp_path: Path) -> None:
+    path = tmp_path / "run"
+    fresh_store(path)
+    with pytest.raises(UsageError, match=f"unfinished: continue it with 'conevo resume {path}'"):
+        fresh_store(path)
+
+
+def test_a_finished_run_is_not_begun_again(tmp_path: Path) -> None:
+    run = evolve_tiny(tmp_path / "run")
+    before = {p: p.read_bytes() for p in run.path.rglob("*") if p.is_file()}
+    with pytest.raises(UsageError, match=f"finished: see it with 'conevo show {run.path}'"):
+        evolve_tiny(run.path)
+    assert {p: p.read_bytes() for p in run.path.rglob("*") if p.is_file()} == before
+
+
+def test_a_second_process_is_kept_out(tmp_path: Path) -> None:
+    store = fresh_store(tmp_path / "run")
+    arguments = [sys.executable, "-c", HOLD, str(store.path / "lock")]
+    with subprocess.Popen(arguments, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as holder:
+        assert holder.stdout is not None
+        assert holder.stdout.readline() == b"held\n"
+        assert store.is_in_use
+        with pytest.raises(UsageError, match="is in use by process 4711"), store.locked():
+            pass
+        with pytest.raises(UsageError, match="already holds a run, in use by process 4711"):
+            fresh_store(store.path)
+        holder.communicate()
+    assert not store.is_in_use
+    with store.locked():
+        assert store.is_in_use
+    assert not store.is_in_use
+
+
+def test_readers_do_not_disturb_a_working_process(tmp_path: Path) -> None:
+    path = tmp_path / "run"
+    process = spawn(*command(path, "cone", run__generations=150), "--quiet")
+    wait_for(lambda: (path / "lock").exists())
+    seen, statuses = [], set()
+    while process.poll() is None:
+        run = conevo.Run(path)
+        statuses.add(run.status)
+        seen.append(len(run.generations()))
+    assert process.wait() == 0, process.communicate()
+    assert seen == sorted(seen)
+    assert len(set(seen)) > 3
+    assert "running" in statuses
+    assert conevo.Run(path).status == "finished"
+
+
+def test_a_torn_last_line_does_not_count(tmp_path: Path) -> None:
+    store = fresh_store(tmp_path / "run")
+    for generation in range(3):
+        store.append({"generation": generation})
+    file = store.path / "generations.jsonl"
+    for length in range(1, 18):
+        whole = file.read_bytes()
+        file.write_bytes(whole + b'{"generation": 3}\n'[:length])
+        assert [r["generation"] for r in store.read_generations()] == [0, 1, 2]
+        assert [r["generation"] for r in store.cut_generations(2)] == [0, 1]
+        store.append({"generation": 2})
+        assert file.read_bytes() == whole
+
+
+def test_a_damaged_line_in_the_middle_is_named(tmp_path: Path) -> None:
+    store = fresh_store(tmp_path / "run")
+    (store.path / "generations.jsonl").write_bytes(b'{"generation": 0}\n{"gen\n{"generation": 2}\n')
+    with pytest.raises(UsageError, match=r"generations\.jsonl is damaged in line 2"):
+        store.read_generations()
+
+
+def test_a_log_shorter_than_the_checkpoint_is_refused(tmp_path: Path) -> None:
+    store = fresh_store(tmp_path / "run")
+    store.append({"generation": 0})
+    with pytest.raises(UsageError, match="has 1 generations, the checkpoint is at 2"):
+        store.cut_generations(2)
+
+
+def test_the_seal_names_files_that_were_changed(tmp_path: Path) -> None:
+    run = evolve_tiny(tmp_path / "run")
+    assert run.changed_files == []
+    sealed = json.loads((run.path / "DONE").read_text())["files"]
+    there = {p.relative_to(run.path).as_posix() for p in run.path.rglob("*") if p.is_file()}
+    assert set(sealed) == there - {"DONE", "lock"}
+    (run.path / "test.json").write_text("{}")
+    (run.path / "champion.npz").unlink()
+    assert run.changed_files == ["champion.npz", "test.json"]
+
+
+@pytest.mark.parametrize("out", ["file/run", "/proc/run", "/dev/null/run"])
+def test_a_place_that_cannot_be_written_is_an_environment_failure(
+    out: str, tmp_path: Path
+) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(EnvironmentFailure) as caught:
+        fresh_store(tmp_path / out)
+    assert caught.value.exit_code == 3
+    assert f"cannot write {tmp_path / out}: " in str(caught.value)
+    assert [p.name for p in tmp_path.iterdir()] == ["file"]
+
+
+def test_what_is_no_run_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="is no run"):
+        conevo.Run(tmp_path)

@@ -1,0 +1,90 @@
+"""A rover world so small that a whole run takes a tenth of a second, and what a run amounts to."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import conevo
+
+TASK = "rover/complex-1"
+TINY: dict[str, Any] = {
+    "run.generations": 5,
+    "run.epochs": 2,
+    "run.n_tests": 3,
+    "world.n_robots": 3,
+    "world.iterations": 12,
+    "world.n_hidden": 2,
+    "world.max_hidden": 4,
+    "method.genotypes": 4,
+}
+# Windows of one generation, so that thresholds and controller sizes change within five.
+RESTLESS = {"stagnation_v": 1, "stagnation_w": 1, "stagnation_y": 1, "gst": 1.0, "sst": 1.0}
+
+
+def tiny_settings(method: str, **changes: Any) -> dict[str, Any]:
+    """Return the settings of a tiny run in which everything a method has is at work."""
+    known = conevo.METHODS[method].config_class.__dataclass_fields__
+    restless = {f"method.{key}": value for key, value in RESTLESS.items() if key in known}
+    return TINY | restless | {key.replace("__", "."): value for key, value in changes.items()}
+
+
+def evolve_tiny(path: Path, method: str = "cone", **changes: Any) -> conevo.Run:
+    """Make a finished tiny run; run__epochs=3 and the like change its settings."""
+    settings = tiny_settings(method, **changes)
+    return conevo.evolve(TASK, method, "smoke", out=path, overrides=settings, threads=1)
+
+
+def command(path: Path, method: str, **changes: Any) -> list[str]:
+    """Return the command line that makes the same run as ``evolve_tiny``."""
+    settings = tiny_settings(method, **changes)
+    sets = [word for key, value in settings.items() for word in ("--set", f"{key}={value}")]
+    return ["run", TASK, "--method", method, "--preset", "smoke", "--out", str(path), *sets]
+
+
+def spawn(*arguments: str) -> subprocess.Popen[str]:
+    """Start conevo in a process of its own, one that Ctrl-C reaches."""
+    return subprocess.Popen(
+        [sys.executable, "-m", "conevo", *arguments, "--threads", "1"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)},
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )
+
+
+def wait_for(condition: Callable[[], bool], seconds: float = 60) -> None:
+    """Wait until something has happened."""
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end, "waited too long"
+        time.sleep(0.002)
+
+
+def content(path: Path) -> dict[str, Any]:
+    """Return everything that a run amounts to, without times: arrays as bytes."""
+    found: dict[str, Any] = {"config": (path / "config.toml").read_text()}
+    lines = (path / "generations.jsonl").read_text().splitlines()
+    found["generations"] = [json.loads(line) | {"seconds": 0} for line in lines]
+    found["test"] = json.loads((path / "test.json").read_text())
+    for file in [path / "champion.npz", *sorted((path / "teams").iterdir())]:
+        found[file.name] = arrays(file)
+    (checkpoint,) = path.glob("checkpoint-?.npz")
+    found["checkpoint"] = arrays(checkpoint)
+    return found
+
+
+def arrays(path: Path) -> dict[str, tuple[str, tuple[int, ...], bytes]]:
+    """Return the arrays of an npz file as dtype, shape and bytes."""
+    with np.load(path) as archive:
+        return {k: (archive[k].dtype.str, archive[k].shape, archive[k].tobytes()) for k in archive}
