@@ -57,7 +57,9 @@ def test_layers_override_one_another_in_order(tmp_path: Path) -> None:
 
 def test_names_on_the_command_line_win_over_the_files(tmp_path: Path) -> None:
     file = tmp_path / "mine.toml"
-    file.write_text('[run]\nworld = "rover/simple-2"\nmethod = "mesp"\npreset = "smoke"\nseed = 9\n')
+    file.write_text(
+        '[run]\nworld = "rover/simple-2"\nmethod = "mesp"\npreset = "smoke"\nseed = 9\n'
+    )
     from_file = resolve(file=file)
     assert (from_file.task, from_file.method) == ("rover-v1/simple-2", "mesp")
     assert (from_file.preset, from_file.run.seed) == ("smoke", 9)

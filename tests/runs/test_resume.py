@@ -7,40 +7,45 @@ import os
 import random
 import shutil
 import signal
+import subprocess
 import time
 from pathlib import Path
 
 import pytest
-from runs.tiny import command, content, evolve_tiny, spawn, wait_for
 
 import conevo
 from conevo.errors import EnvironmentFailure, UsageError
 from conevo.evolution.methods.registry import METHODS
 from conevo.runs import durable
+from conevo.runs.config import resolve
+from conevo.runs.run import start
+from runs.tiny import TASK, command, content, evolve_tiny, spawn, tiny_settings, wait_for
 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_resume_after_kills_at_random_moments(method: str, tmp_path: Path) -> None:
     whole = evolve_tiny(tmp_path / "whole", method, run__generations=60)
-    path, moments = tmp_path / "killed", [random.uniform(0, 0.5) for _ in range(2)]
+    path, kills = tmp_path / "killed", sorted(random.choices(range(45), k=2))
+    arguments = [*command(path, method, run__generations=60), "--quiet"]
+    for generation in kills:
+        process = spawn(*arguments)
+        wait_for(lambda: is_past(path, process, generation))  # noqa: B023 (called at once)
+        time.sleep(random.uniform(0, 0.02))
+        process.kill()
+        assert process.wait() == -signal.SIGKILL, process.communicate()
+        assert conevo.Run(path).status == "interrupted"
+        arguments = ["resume", str(path), "--quiet"]
+    conevo.Run(path).resume(threads=2)
+    assert content(path) == content(whole.path), kills
 
-    process = spawn(*command(path, method, run__generations=60), "--quiet")
-    wait_for(lambda: (path / "lock").exists() or process.poll() is not None)
-    time.sleep(moments[0])
-    process.kill()
-    assert process.wait() == -signal.SIGKILL, process.communicate()
 
-    process = spawn("resume", str(path), "--quiet")
-    wait_for(lambda: f"process {process.pid}" in (path / "lock").read_text())
-    time.sleep(moments[1])
-    process.kill()
-    process.wait()
-
-    run = conevo.Run(path)
-    if run.status != "finished":
-        assert run.status == "interrupted"
-        run.resume(threads=2)
-    assert content(path) == content(whole.path), moments
+def is_past(path: Path, process: subprocess.Popen[str], generation: int) -> bool:
+    """Whether a process is at work in a run that has finished so many generations, or has ended."""
+    lock, log = path / "lock", path / "generations.jsonl"
+    is_at_work = lock.exists() and lock.read_text() == f"process {process.pid}"
+    return process.poll() is not None or (
+        is_at_work and log.read_bytes().count(b"\n") >= generation
+    )
 
 
 class Crash(BaseException):
@@ -69,10 +74,10 @@ def test_resume_after_a_failure_at_every_write(
 ) -> None:
     changes = {"run__generations": 3, "run__checkpoint_every": every}
     with monkeypatch.context() as patch:
-        n_writes = len(calls := fail_at(patch, -1, problem))
+        calls = fail_at(patch, -1, problem)
         whole = content(evolve_tiny(tmp_path / "whole", **changes).path)
-        n_writes = len(calls)
-    assert n_writes > 30
+    n_writes = len(calls)
+    assert n_writes >= 30
     for call in range(n_writes):
         path = tmp_path / "broken"
         with monkeypatch.context() as patch:
@@ -94,7 +99,7 @@ def test_resume_after_a_failure_at_every_write(
 
 
 def test_interrupt_keeps_the_last_finished_generation(tmp_path: Path) -> None:
-    changes = {"run__generations": 400, "run__checkpoint_every": 1000}
+    changes = {"run__generations": 150, "run__checkpoint_every": 1000}
     path = tmp_path / "run"
     process = spawn(*command(path, "mesp", **changes))
     log = path / "generations.jsonl"
@@ -106,7 +111,7 @@ def test_interrupt_keeps_the_last_finished_generation(tmp_path: Path) -> None:
     run = conevo.Run(path)
     count = len(run.generations())
     assert run.status == "interrupted"
-    assert 3 <= count < 400
+    assert 3 <= count < 150
     assert f"interrupted after {count} generations" in said
     starts: list[int] = []
     run.resume(threads=1, watch=lambda _, record: starts.append(record["generation"]))
@@ -122,24 +127,16 @@ def interrupted(path: Path, *, after: int = 3) -> conevo.Run:
         if record["generation"] == after - 1:
             raise KeyboardInterrupt
 
-    from conevo.runs.config import resolve
-    from conevo.runs.run import start
-    from runs.tiny import TASK, tiny_settings
-
     run = start(resolve(TASK, "cone", "smoke", overrides=tiny_settings("cone")), path, threads=1)
     with pytest.raises(KeyboardInterrupt):
         run.resume(threads=1, watch=stop)
     return conevo.Run(path)
 
 
-def newest(path: Path) -> Path:
-    return max(path.glob("checkpoint-?.npz"), key=lambda p: p.stat().st_mtime_ns)
-
-
 def test_a_damaged_newest_checkpoint_falls_back_to_the_one_before(tmp_path: Path) -> None:
     whole = evolve_tiny(tmp_path / "whole")
     run = interrupted(tmp_path / "run")
-    damaged = newest(run.path)
+    damaged = max(run.path.glob("checkpoint-?.npz"), key=lambda p: p.stat().st_mtime_ns)
     damaged.write_bytes(damaged.read_bytes()[:-100])
     remarks: list[str] = []
     run.resume(threads=1, remark=remarks.append)

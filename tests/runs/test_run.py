@@ -1,4 +1,4 @@
-"""A whole run: stop conditions, the record, the champion, the testing phase, the same bits twice."""
+"""A whole run: stop conditions, record, champion, testing phase, the same bits twice."""
 
 from __future__ import annotations
 
@@ -9,13 +9,15 @@ from typing import Any
 
 import numpy as np
 import pytest
-from runs.tiny import TASK, content, evolve_tiny, tiny_settings
 
 import conevo
 from conevo.errors import EnvironmentFailure, UsageError
 from conevo.evolution.methods.registry import METHODS
 from conevo.rng import fold
 from conevo.runs.champions import Team, sampled_generations
+from conevo.runs.config import resolve
+from conevo.runs.run import start
+from runs.tiny import TASK, content, evolve_tiny, tiny_settings
 
 
 def make_team(generation: int, *fitness: float) -> Team:
@@ -148,6 +150,13 @@ def test_testing_again_gives_the_same_and_writes_nothing(tmp_path: Path) -> None
     assert len(run.test(7)["performance"]["area"]["values"]) == 7
     assert run.test(seed=5)["performance"] != again["performance"]
     assert {p: p.read_bytes() for p in run.path.rglob("*") if p.is_file()} == before
+
+
+def test_a_run_without_a_finished_generation_has_no_team_to_test(tmp_path: Path) -> None:
+    run = start(resolve(TASK, preset="smoke", overrides=tiny_settings("cone")), tmp_path / "run")
+    assert (run.status, run.generations(), run.champion) == ("interrupted", [], None)
+    with pytest.raises(UsageError, match="has no finished generation yet"):
+        run.test()
 
 
 def test_a_run_can_be_repeated_from_its_own_configuration(tmp_path: Path) -> None:

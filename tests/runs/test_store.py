@@ -8,12 +8,12 @@ import sys
 from pathlib import Path
 
 import pytest
-from runs.tiny import command, evolve_tiny, spawn, wait_for
 
 import conevo
 from conevo.errors import EnvironmentFailure, UsageError
 from conevo.runs.config import resolve
 from conevo.runs.store import Store, create
+from runs.tiny import command, evolve_tiny, spawn, wait_for
 
 HOLD = """
 import fcntl, os, sys
@@ -140,9 +140,7 @@ def test_the_seal_names_files_that_were_changed(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("out", ["file/run", "/proc/run", "/dev/null/run"])
-def test_a_place_that_cannot_be_written_is_an_environment_failure(
-    out: str, tmp_path: Path
-) -> None:
+def test_a_place_that_cannot_be_written_is_an_environment_failure(out: str, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(EnvironmentFailure) as caught:
         fresh_store(tmp_path / out)

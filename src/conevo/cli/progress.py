@@ -147,6 +147,7 @@ class Display:
                 f"{last['recombinations']} recombinations between populations",
             )
         yield "neurons", neurons(last["n_hidden"])
-        yield "speed", f"{number(self.pace.rate)} team evaluations/s, {count(self.pace.spent)} spent"
+        spent = f"{count(self.pace.spent)} spent"
+        yield "speed", f"{number(self.pace.rate)} team evaluations/s, {spent}"
         if last["n_nonfinite"]:
             yield "not finite", f"{last['n_nonfinite']} scores, ranked last"

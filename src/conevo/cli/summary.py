@@ -108,9 +108,8 @@ def next_commands(run: Run) -> list[str]:
         for key, value in config.tables()[section].items()
         if key != "seed" and value != plain[section].get(key)
     ]
-    world = config.task.replace(config.world, config.world.rpartition("-v")[0])
     seed = config.run.seed
-    repeat = f"conevo run {world} --method {other} --preset {config.preset} --seed {seed}"
+    repeat = f"conevo run {config.task} --method {other} --preset {config.preset} --seed {seed}"
     again = f"conevo run --config {run.path}/config.toml --seed {seed + 1}"
     commands = {
         f"conevo show {run.path}": "its generations",

@@ -14,7 +14,8 @@
 
 Within a generation teams are written first, then the log line, then the checkpoint. What is newer
 than the checkpoint is written again, to the bit, when the run is resumed. A directory appears under
-its name only when the first three files are in it.
+its name only when the first three files are in it; a kill before that leaves at most a hidden
+directory beside it, which nothing reads.
 """
 
 from __future__ import annotations
@@ -63,15 +64,22 @@ def create(path: Path, config: RunConfig, provenance: Record) -> Store:
         replace_file(draft / GENERATIONS, b"")
         with writing(path):
             draft.chmod(0o777 & ~_umask())
-            draft.rename(path)
+            _appear(draft, path)
             sync_directory(path.parent)
-    except BaseException as error:
-        shutil.rmtree(draft, ignore_errors=True)
-        if not isinstance(error, EnvironmentFailure):
-            raise
-        refuse_existing(path)  # another process may have been faster
+    except EnvironmentFailure as error:
         raise EnvironmentFailure(str(error).replace(str(draft), str(path))) from error
+    finally:
+        shutil.rmtree(draft, ignore_errors=True)  # gone by now if all went well
     return Store(path)
+
+
+def _appear(draft: Path, path: Path) -> None:
+    """Give a finished draft its name, unless another process was faster."""
+    try:
+        draft.rename(path)
+    except OSError:
+        refuse_existing(path)
+        raise
 
 
 def refuse_existing(path: Path) -> None:

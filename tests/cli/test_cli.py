@@ -1,0 +1,287 @@
+"""The command line: a whole session of it, every bad input in one line, and an instant help."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import resource
+import shlex
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+import conevo
+from conevo.cli.main import VERBS, main
+from conevo.runs.run import Run
+from runs.tiny import TASK, command, content, evolve_tiny, spawn, wait_for
+
+
+class Said:
+    """Exit code and output of one command."""
+
+    def __init__(self, code: int, out: str, err: str) -> None:
+        self.code, self.out, self.err = code, out, err
+
+
+@pytest.fixture
+def say(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]):
+    """Return a function that runs a command in an empty directory."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(*arguments: str) -> Said:
+        with pytest.raises(SystemExit) as caught:
+            main(arguments)
+        out, err = capsys.readouterr()
+        return Said(int(caught.value.code or 0), out, err)
+
+    return run
+
+
+def tiny(*more: str, method: str = "cone") -> list[str]:
+    """Return the words of a tiny run in the default place."""
+    words = command(Path("unused"), method)
+    at = words.index("--out")
+    return [*words[:at], *words[at + 2 :], "--threads", "1", *more]
+
+
+def test_a_session_from_run_to_the_commands_it_recommends(say, tmp_path: Path) -> None:
+    said = say(*tiny())
+    assert (said.code, said.err) == (0, "")
+    assert "generation 1/5  value" in said.out
+    assert "generation 5/5  value" in said.out
+    assert "Testing phase, 3 fresh scenarios" in said.out
+    assert "5 of 5 generations" in said.out
+    recommended = re.findall(r"^  (conevo .*?) +# ", said.out, flags=re.MULTILINE)
+    assert [line.split()[1] for line in recommended] == ["show", "test", "run", "run"]
+    for line in recommended:
+        again = say(*shlex.split(line)[1:])
+        assert again.code == 0, again.err
+    assert len(list((tmp_path / "runs").iterdir())) == 3
+    listed = json.loads(say("list", "runs", "--json").out)
+    assert [(row["method"], row["seed"]) for row in listed] == [
+        ("cone", "1"), ("cone", "2"), ("mesp", "1"),
+    ]  # fmt: skip
+    assert {row["status"] for row in listed} == {"finished"}
+    assert {row["generations"] for row in listed} == {"5/5"}
+
+
+def test_the_other_method_is_run_with_the_same_run_and_world_settings(say) -> None:
+    out = say(*tiny()).out
+    line = next(line for line in out.splitlines() if "--method mesp" in line).split("#")[0]
+    say(*shlex.split(line)[1:])
+    one, other = (run.config for run in (Run(row["run"]) for row in json.loads(
+        say("list", "runs", "--json").out)))  # fmt: skip
+    assert (one.run, one.world_params) == (other.run, other.world_params)
+
+
+def test_json_is_one_object_per_generation_and_one_at_the_end(say) -> None:
+    said = say(*tiny("--json"))
+    lines = [json.loads(line) for line in said.out.splitlines()]
+    assert [line["generation"] for line in lines[:-1]] == [0, 1, 2, 3, 4]
+    run = Run(lines[-1]["run"])
+    assert lines[:-1] == run.generations()
+    assert lines[-1]["test"] == run.test_result
+    assert lines[-1]["status"] == "finished"
+
+
+def test_quiet_prints_the_directory_only(say) -> None:
+    said = say(*tiny("--quiet"))
+    assert said.err == ""
+    assert Run(said.out.strip()).status == "finished"
+    assert said.out.count("\n") == 1
+
+
+def test_verbose_prints_every_generation(say) -> None:
+    out = say(*tiny("--verbose")).out
+    assert [f"generation {k}/5" in out for k in range(1, 7)] == [True] * 5 + [False]
+
+
+def test_show_finds_a_run_by_the_beginning_of_its_name(say) -> None:
+    name = Path(say(*tiny("--quiet")).out.strip()).name
+    said = say("show", name[:20])
+    assert said.code == 0
+    assert f"runs/{name}: finished" in said.out
+    assert "SST" in said.out
+    everything = json.loads(say("show", name[:20], "--json").out)
+    assert everything["config"]["run"]["world"] == "rover-v1/complex-1"
+    assert len(everything["generations"]) == 5
+    assert everything["changed_files"] == []
+    say(*tiny("--quiet", "--seed", "2"))
+    said = say("show", "rover")
+    assert said.code == 2
+    assert "may be any of these runs" in said.err
+
+
+def test_show_says_so_if_a_sealed_file_was_changed(say, tmp_path: Path) -> None:
+    run = evolve_tiny(tmp_path / "run")
+    (run.path / "champion.npz").write_bytes(b"")
+    assert "CHANGED SINCE: champion.npz" in say("show", "run").out
+
+
+def test_test_prints_fresh_scenarios(say, tmp_path: Path) -> None:
+    run = evolve_tiny(tmp_path / "run")
+    assert run.test_result is not None
+    assert json.loads(say("test", "run", "--json").out) == run.test_result["champion"]
+    said = say("test", "run", "--scenarios", "6", "--seed", "9")
+    assert "Testing phase, 6 fresh scenarios" in said.out
+
+
+def test_an_interrupted_run_is_shown_and_resumed(say, tmp_path: Path) -> None:
+    path = tmp_path / "run"
+    process = spawn(*command(path, "cone", run__generations=60), "--quiet")
+    wait_for(lambda: path.exists() and (path / "generations.jsonl").read_bytes().count(b"\n") > 2)
+    process.kill()
+    process.wait()
+    shown = say("show", "run")
+    assert "run: interrupted" in shown.out
+    assert "Continue it with: conevo resume run" in shown.out
+    assert say("test", "run", "--scenarios", "2").code == 0
+    assert say("resume", "run", "--quiet").code == 0
+    assert content(path) == content(evolve_tiny(tmp_path / "whole", run__generations=60).path)
+
+
+def test_lists(say) -> None:
+    worlds = json.loads(say("list", "worlds", "--json").out)
+    assert [row["world"] for row in worlds] == list(conevo.WORLDS)
+    assert "complex-1..10" in worlds[0]["environments"]
+    methods = json.loads(say("list", "methods", "--json").out)
+    assert [row["method"] for row in methods] == list(conevo.METHODS)
+    assert "HomCNE" in say("list", "methods").out
+    assert "no runs in runs/" in say("list", "runs").out
+
+
+BAD = [
+    (["run"], "which world"),
+    (["run", "rovr/complex-1"], "did you mean 'rover'"),
+    (["run", "rover/complx-1"], "did you mean 'complex-1'"),
+    (["run", "rover"], "rover/simple-1"),
+    (["run", TASK, "--method", "coen"], "did you mean 'cone'"),
+    (["run", TASK, "--preset", "smok"], "did you mean 'smoke'"),
+    (["run", TASK, "--set", "generations"], "expected key=value"),
+    (["run", TASK, "--set", "run.generatoins=3"], "did you mean 'run.generations'"),
+    (["run", TASK, "--set", "world.iterations=many"], "world.iterations = 'many' on the command"),
+    (["run", TASK, "--set", "world.low_range=9"], "less than or equal to 0.5"),
+    (["run", TASK, "--seed", "-1"], "greater than or equal to 0"),
+    (["run", TASK, "--seed", "x"], "'x' is not a valid integer"),
+    (["run", TASK, "--threads", "0"], "0 is not in the range x>=1"),
+    (["run", TASK, "--budget-evaluations", "-5"], "run.budget_evaluations = -5"),
+    (["run", TASK, "--preset", "smoke", "--budget-evaluations", "5"], "does not pay for one"),
+    (["run", TASK, "--json", "--quiet"], "exclude each other"),
+    (["run", TASK, "--sed", "1"], "--sed"),
+    (["rum", TASK], "did you mean 'run'"),
+    (["resume", "nothing"], "unknown run 'nothing'"),
+    (["show", "."], "is no run"),
+    (["test"], "Missing argument"),
+    (["list", "robots"], "'robots' is not one of"),
+    (["list", "worlds", "here"], "takes no folder"),
+    (["list", "runs", "nowhere"], "nowhere is no directory"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("arguments", "words"), BAD, ids=[" ".join(words) for words, _ in BAD])
+def test_bad_input_is_one_line_with_code_2_and_nothing_written(
+    arguments: list[str], words: str, say, tmp_path: Path
+) -> None:
+    said = say(*arguments)
+    assert said.code == 2
+    assert said.out == ""
+    assert said.err.startswith("conevo: error: ")
+    assert said.err.count("\n") == 1
+    assert words in said.err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_what_the_machine_refuses_is_one_line_with_code_3(say, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    for arguments, words in (
+        (tiny("--out", "file/run"), "cannot write file/run: "),
+        (tiny("--out", "/proc/run"), "cannot write /proc/run: "),
+        (tiny("--config", "none.toml"), "cannot read none.toml: No such file"),
+    ):
+        said = say(*arguments)
+        assert said.code == 3
+        assert said.err.startswith("conevo: error: ")
+        assert said.err.count("\n") == 1
+        assert words in said.err
+    assert [p.name for p in tmp_path.iterdir()] == ["file"]
+
+
+def test_a_refusal_in_mid_run_leaves_a_run_to_resume(say, tmp_path: Path) -> None:
+    """The kernel itself refuses: no file of this process may grow beyond 6000 bytes."""
+    path, changes = tmp_path / "run", {"method__genotypes": 12}
+    process = subprocess.Popen(
+        [sys.executable, "-m", "conevo", *command(path, "cone", **changes), "--quiet"],
+        stderr=subprocess.PIPE,
+        text=True,
+        env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)},
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (6000, 6000)),
+    )
+    _, err = process.communicate()
+    assert process.returncode == 3, err
+    assert re.search(rf"conevo: error: cannot write {path}/\S+: File too large; when that", err)
+    assert f"conevo resume {path}\n" in err
+    assert say("resume", "run", "--quiet").code == 0
+    assert content(path) == content(evolve_tiny(tmp_path / "whole", **changes).path)
+
+
+def test_existing_runs_are_refused_with_what_can_be_done(say) -> None:
+    say(*tiny("--quiet", "--out", "here"))
+    said = say(*tiny("--out", "here"))
+    assert said.code == 2
+    assert "already holds a run, finished: see it with 'conevo show here'" in said.err
+    said = say("resume", "here")
+    assert said.code == 2
+    assert "here is finished" in said.err
+
+
+def test_help_names_every_verb(say) -> None:
+    said = say("--help")
+    assert said.code == 0
+    for verb, summary in VERBS.items():
+        assert re.search(rf"  {verb} +{re.escape(summary)}", said.out)
+        assert say(verb, "--help").code == 0
+    assert say("--version").out == f"conevo {conevo.__version__}\n"
+
+
+@pytest.mark.timing
+@pytest.mark.parametrize("arguments", [["--help"], ["run", "--help"]])
+def test_help_is_instant(arguments: list[str]) -> None:
+    times = []
+    for _ in range(5):
+        started = time.perf_counter()
+        subprocess.run(
+            [sys.executable, "-m", "conevo", *arguments],
+            check=True,
+            capture_output=True,
+            env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)},
+        )
+        times.append(time.perf_counter() - started)
+    assert min(times) < 0.3
+
+
+def test_importing_conevo_and_its_commands_loads_nothing_heavy() -> None:
+    code = (
+        "import sys, conevo, conevo.cli.main, conevo.cli.run, conevo.cli.show; "
+        "heavy = {'numpy', 'warp', 'scipy', 'pydantic', 'rich', 'matplotlib'}; "
+        "print(sorted(heavy & set(sys.modules)))"
+    )
+    found = subprocess.run(
+        [sys.executable, "-c", code],
+        check=True,
+        capture_output=True,
+        text=True,
+        env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)},
+    )
+    assert found.stdout.strip() == "[]"
+
+
+def test_public_names_are_few_and_there() -> None:
+    assert len(conevo.__all__) <= 20
+    for name in conevo.__all__:
+        assert getattr(conevo, name) is not None
+    with pytest.raises(AttributeError, match="has no attribute 'evolv'"):
+        _ = conevo.evolv  # type: ignore[attr-defined]

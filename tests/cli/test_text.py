@@ -1,0 +1,89 @@
+"""Numbers, spans, bars and tables as people read them; the live view from a few records."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+import pytest
+from rich.console import Console
+
+from conevo.cli.progress import Display, Pace
+from conevo.cli.text import bars, castes, duration, neurons, number, table
+from runs.tiny import evolve_tiny
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (None, "-"),
+        (0.0, "0"),
+        (0.123456, "0.1235"),
+        (-12.3456, "-12.35"),
+        (4321.4, "4321"),
+        (2.5e9, "2.5e+09"),
+    ],
+)
+def test_numbers_have_four_digits(value: float | None, text: str) -> None:
+    assert number(value) == text
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"),
+    [(0.4, "0 s"), (59, "59 s"), (59.6, "1 min 00 s"), (245, "4 min 05 s"), (12000, "3 h 20 min")],
+)
+def test_durations(seconds: float, text: str) -> None:
+    assert duration(seconds) == text
+
+
+def test_bars_show_the_shape_of_a_series() -> None:
+    assert bars([0, 1, 2, 3, 4, 5, 6, 7], 40) == "▁▂▃▄▅▆▇█"
+    assert bars([0, 0, 7, 7], 2) == "▁█"
+    assert bars([3, 3], 40) == "▁▁"
+    assert bars([], 40) == ""
+
+
+def test_castes_and_neurons_are_short() -> None:
+    assert castes({"low": 12, "non-specialized": 8}) == "low 12, non-specialized 8"
+    assert (neurons([10, 10]), neurons([8, 12, 9])) == ("10", "8-12")
+
+
+def test_numbers_stand_to_the_right_and_words_to_the_left() -> None:
+    text = table(["name", "n"], [["a", "1,000"], ["long", "7"], ["20 rovers", "-"]])
+    assert text.splitlines() == [
+        "name           n",
+        "a          1,000",
+        "long           7",
+        "20 rovers      -",
+    ]
+
+
+def test_pace_counts_down_to_the_last_generation_or_the_end_of_the_budget(tmp_path: Path) -> None:
+    run = evolve_tiny(tmp_path / "run", run__budget_evaluations=1000, run__generations=2)
+    pace = Pace(run)
+    pace.spent = 0
+    for generation in range(2):
+        pace.add({"team_evaluations": 100 * (generation + 1), "seconds": 2.0})
+    assert pace.rate == 50
+    pace.settings = type(pace.settings)(generations=250, budget_evaluations=1000)
+    assert pace.remaining(1) == 16  # 800 evaluations left at 50 per second
+    pace.settings = type(pace.settings)(generations=5, budget_evaluations=1000)
+    assert pace.remaining(1) == 6  # three generations of two seconds
+
+
+def test_the_live_view_names_all_that_is_asked_of_it(tmp_path: Path) -> None:
+    run = evolve_tiny(tmp_path / "run")
+    display = Display(run)
+    display.records = []
+    for record in run.generations():
+        display.add(run, record)
+    console = Console(file=io.StringIO(), width=120)
+    console.print(display.render())
+    assert isinstance(console.file, io.StringIO)
+    shown = console.file.getvalue()
+    for words in (
+        "rover-v1/complex-1, CONE, preset smoke, seed 1", "generation 5 of 5", "left", "value",
+        "area", "best", "mean", "castes", "SST", "GST", "recombinations between populations",
+        "neurons", "team evaluations/s",
+    ):  # fmt: skip
+        assert words in shown
