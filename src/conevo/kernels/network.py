@@ -180,13 +180,17 @@ def think(nets: Networks, shape: Shape, i: int) -> None:
         h = wide_vector()
         for k in range(WIDE):
             h[k] = shape.bias
-        for j in range(shape.n_inputs):
+        j = int(0)
+        while j < shape.n_inputs:  # not range: see worlds.rover_dynamics
             h += nets.w_in[c * shape.n_inputs + j] * nets.inputs[inputs + j]
+            j += 1
         for k in range(WIDE):
             h[k] = sigmoid(h[k])
         h = wp.cw_mul(h, nets.filled[c])
-        for k in range(wp.min(used - chunk * WIDE, WIDE)):
+        k = int(0)
+        while k < wp.min(used - chunk * WIDE, WIDE):
             out += nets.w_out[c * WIDE + k] * h[k]
+            k += 1
         if chunk == 0:
             first = h
     # Written only now: every chunk must read the context of the previous iteration.

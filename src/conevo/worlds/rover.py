@@ -224,7 +224,6 @@ class RoverWorld:
         params.report_cost = p.report_cost
         params.min_distance_2 = p.min_distance**2
         params.separation_2 = p.separation**2
-        params.mate_range_2 = (2.0 * max(ranges)) ** 2
         params.fitness_is_product = int(p.fitness == "value_times_area")
         r = p.n_robots
         one_per_robot = (

@@ -2,6 +2,9 @@
 
 State, reset, sense, act, commit, resolve, outcome; the rules and the choices stand on the card of
 ``worlds.rover``. Every function is called for one robot and writes only that robot's data.
+
+Hot loops over a number known only at run time are written with ``while``: Warp keeps the iterator
+of such a ``range`` in memory (whole kernel 1.4 times as fast without, on the CPU).
 """
 
 import warp as wp
@@ -49,7 +52,6 @@ class Params:
     report_cost: float
     min_distance_2: float
     separation_2: float
-    mate_range_2: float
     fitness_is_product: int
 
 
@@ -196,15 +198,18 @@ def sense(team: Team, scene: Scene, p: Params, i: int, t: int) -> None:
     for k in range(16):
         team.nets.inputs[base + k] = 0.0
     near = int(0)
-    for j in range(p.n_robots):
+    j = int(0)
+    while j < p.n_robots:
         dx = team.x[j] - x
         dy = team.y[j] - y
         near += int(dx * dx + dy * dy < p.rover_range_2)
+        j += 1
     if near > 1:
         for o in range(8):
             closest = float(p.rover_range_2)
             setting = int(0)
-            for j in range(p.n_robots):
+            j = int(0)
+            while j < p.n_robots:
                 dx = team.x[j] - x
                 dy = team.y[j] - y
                 d2 = dx * dx + dy * dy
@@ -212,6 +217,7 @@ def sense(team: Team, scene: Scene, p: Params, i: int, t: int) -> None:
                     if octant(dx, dy) == o:
                         closest = d2
                         setting = team.setting[j] + 1
+                j += 1
             team.nets.inputs[base + o] = (
                 float(setting) * p.min_distance_2 / (3.0 * wp.max(closest, p.min_distance_2))
             )
@@ -221,9 +227,12 @@ def sense(team: Team, scene: Scene, p: Params, i: int, t: int) -> None:
         z = octants()
         first = rock_cell(x - r)
         last = rock_cell(x + r)
-        for row in range(rock_cell(y - r), rock_cell(y + r) + 1):
-            cells = row * ROCK_CELLS
-            for k in range(scene.cell[cells + first], scene.cell[cells + last + 1]):
+        row = int(rock_cell(y - r))
+        last_row = rock_cell(y + r)
+        while row <= last_row:
+            k = int(scene.cell[row * ROCK_CELLS + first])
+            end = scene.cell[row * ROCK_CELLS + last + 1]
+            while k < end:
                 dx = scene.rock_x[k] - x
                 dy = scene.rock_y[k] - y
                 d2 = dx * dx + dy * dy
@@ -233,6 +242,8 @@ def sense(team: Team, scene: Scene, p: Params, i: int, t: int) -> None:
                         z[o] = z[o] + (
                             scene.rock_value[k] * p.min_distance_2 / wp.max(d2, p.min_distance_2)
                         )
+                k += 1
+            row += 1
         for o in range(8):
             team.nets.inputs[base + 8 + o] = z[o] / (1.0 + z[o])
 
@@ -249,10 +260,12 @@ def is_refused(team: Team, scene: Scene, p: Params, i: int, x: float, y: float) 
     if scene.canal[int(y * n) * CANAL_CELLS + int(x * n)] != wp.uint8(0):
         return True
     close = int(0)
-    for j in range(p.n_robots):
+    j = int(0)
+    while j < p.n_robots:
         dx = team.x[j] - x
         dy = team.y[j] - y
         close += int(dx * dx + dy * dy < p.separation_2 and j != i)
+        j += 1
     return close > 0
 
 
@@ -316,10 +329,12 @@ def commit(team: Team, scene: Scene, p: Params, i: int, t: int) -> None:
     if a == MOVE:
         if x != team.x[i] or y != team.y[i]:
             close = int(0)
-            for j in range(i):
+            j = int(0)
+            while j < i:
                 dx = team.to_x[j] - x
                 dy = team.to_y[j] - y
                 close += int(dx * dx + dy * dy < p.separation_2)
+                j += 1
             if close == 0:
                 team.x[i] = x
                 team.y[i] = y
@@ -363,15 +378,9 @@ def resolve(team: Team, scene: Scene, p: Params, i: int, t: int) -> None:
         fresh = cover_disc(team.cover, i * COVER_WORDS, x, y, r)
         team.covered[i] = team.covered[i] + fresh
         team.covered_range[i] = r
-    crowd = int(0)
-    for j in range(p.n_robots):
-        dx = team.x[j] - x
-        dy = team.y[j] - y
-        crowd += int(dx * dx + dy * dy < p.mate_range_2)
-    if crowd == 1:
-        return
     mates = wp.uint64(0)
-    for j in range(p.n_robots):
+    j = int(0)
+    while j < p.n_robots:
         b = team.action[j]
         if j != i and b != NONE and b != MOVE and wp.abs(b - a) <= 1:
             dx = team.x[j] - x
@@ -379,26 +388,32 @@ def resolve(team: Team, scene: Scene, p: Params, i: int, t: int) -> None:
             reach = r + p.ranges[b]
             if dx * dx + dy * dy < reach * reach:
                 mates = mates | (wp.uint64(1) << wp.uint64(j))
+        j += 1
     if mates == wp.uint64(0):
         return
     gained = float(0.0)
     nearness = float(0.0)
     first = rock_cell(x - r)
     last = rock_cell(x + r)
-    for row in range(rock_cell(y - r), rock_cell(y + r) + 1):
-        cells = row * ROCK_CELLS
-        for k in range(scene.cell[cells + first], scene.cell[cells + last + 1]):
-            need = partner(scene.rock_type[k], a)
+    row = int(rock_cell(y - r))
+    last_row = rock_cell(y + r)
+    while row <= last_row:
+        k = int(scene.cell[row * ROCK_CELLS + first])
+        end = scene.cell[row * ROCK_CELLS + last + 1]
+        while k < end:
             dx = scene.rock_x[k] - x
             dy = scene.rock_y[k] - y
             d2 = dx * dx + dy * dy
-            if need != NONE and d2 < r * r:
-                if team.detected[k] >= t:
+            if d2 < r * r:
+                need = partner(scene.rock_type[k], a)
+                if need != NONE and team.detected[k] >= t:
                     if uniform(scene.seed[0], t, k, i) < p.accuracy[a]:
                         if is_paired(team, scene, p, mates, need, k, t):
                             team.detected[k] = t
                             gained = gained + scene.rock_value[k]
                             nearness = nearness + scene.rock_value[k] / wp.max(d2, p.min_distance_2)
+            k += 1
+        row += 1
     if gained > 0.0:
         area = float(team.covered[i]) / float(COVER_CELLS * COVER_CELLS)
         team.value[i] = team.value[i] + gained
@@ -412,13 +427,15 @@ def is_paired(
 ) -> bool:
     """Return whether one of the mates has the needed setting and succeeds on rock ``k``."""
     r = p.ranges[need]
-    for j in range(p.n_robots):
+    j = int(0)
+    while j < p.n_robots:
         if ((mates >> wp.uint64(j)) & wp.uint64(1)) != wp.uint64(0) and team.action[j] == need:
             dx = scene.rock_x[k] - team.x[j]
             dy = scene.rock_y[k] - team.y[j]
             if dx * dx + dy * dy < r * r:
                 if uniform(scene.seed[0], t, k, j) < p.accuracy[need]:
                     return True
+        j += 1
     return False
 
 
