@@ -9,7 +9,7 @@ __all__ = ["ConevoError", "EnvironmentFailure", "UsageError", "unknown_name"]
 
 
 class ConevoError(Exception):
-    """An error with a message meant for the user: one line, what was wrong, where, what is allowed."""
+    """An error with one line for the user: what was wrong, where, what is allowed."""
 
     exit_code = 2
 

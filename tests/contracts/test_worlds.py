@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from conevo.rng import fold, stream
 from conevo.worlds.registry import WORLDS, world
 from conevo.worlds.rollout import Rollout

@@ -107,7 +107,8 @@ def test_best_team_is_rank_one_in_every_slot():
 def test_lesion_teams_lack_one_neuron_each():
     team = np.array([[4, -1, 10], [-1, 22, -1]])
     teams, robot, slot = lesion_teams(team, np.array([True, False]))
-    assert teams.tolist() == [[[-1, -1, 10], [-1, 22, -1]], [[4, -1, -1], [-1, 22, -1]]]
+    assert teams[0].tolist() == team.tolist()
+    assert teams[1:].tolist() == [[[-1, -1, 10], [-1, 22, -1]], [[4, -1, -1], [-1, 22, -1]]]
     assert robot.tolist() == [0, 0]
     assert slot.tolist() == [0, 2]
     assert team.tolist() == [[4, -1, 10], [-1, 22, -1]]

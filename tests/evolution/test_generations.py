@@ -32,9 +32,10 @@ def play(learner, state, generations, fitness=1.0, specialization=0.0, lesion=1.
         trials = learner.ask(state)
         f, s = (v(state.generation) if callable(v) else v for v in (fitness, specialization))
         before = state.generation
-        state = learner.tell(
-            state, trials, scores(trials, lesion if trials.phase == "lesion" else f, s)
-        )
+        if trials.phase == "lesion":  # the first team is whole
+            f = np.array(np.broadcast_to(f, trials.teams.shape[:2]))
+            f[1:] = lesion
+        state = learner.tell(state, trials, scores(trials, f, s))
         if state.generation > before:
             seen.append(state)
     return seen
@@ -251,9 +252,9 @@ def test_stagnating_controllers_grow_when_every_neuron_is_needed(name, config, p
     assert (np.abs(new) <= 1).all()
     assert len(np.unique(new)) == new.size
     assert not states[grown].genes[1, 2].any()
-    # Lesions are paid for: two neurons of robot 0, later three.
+    # Lesions are paid for: the whole team, two neurons of robot 0, later three.
     cost = np.diff([s.team_evaluations for s in states])
-    assert cost[grown - 1] - cost[grown - 2] == 2
+    assert cost[grown - 1] - cost[grown - 2] == 3
 
 
 def test_a_neuron_that_nobody_misses_goes_and_its_slot_is_emptied():
@@ -264,11 +265,11 @@ def test_a_neuron_that_nobody_misses_goes_and_its_slot_is_emptied():
         trials = learner.ask(state)
         state = learner.tell(state, trials, scores(trials))
     trials = learner.ask(state)
-    assert trials.teams.shape == (6, 2, 4)
-    assert [int((team >= 0).sum()) for team in trials.teams] == [5] * 6
+    assert trials.teams.shape == (7, 2, 4)
+    assert [int((team >= 0).sum()) for team in trials.teams] == [6] + [5] * 6
     # Robot 0: without slot 1 it keeps 0.95; robot 1: slot 2 is worth 0.2, all are needed.
-    left = np.array([[0.5, 1], [0.95, 1], [0.1, 1], [1, 0.0], [1, 0.1], [1, 0.8]])
-    state = learner.tell(state, trials, Scores(left, np.zeros((6, 2))))
+    left = np.array([[1, 1], [0.5, 1], [0.95, 1], [0.1, 1], [1, 0.0], [1, 0.1], [1, 0.8]])
+    state = learner.tell(state, trials, Scores(left, np.zeros((7, 2))))
     assert state.active.tolist() == [[True, False, True, False], [True, True, True, True]]
     assert state.n_hidden.tolist() == [2, 4]
     assert not state.genes[0, 1].any()

@@ -94,9 +94,11 @@ def test_controller_size_after_lesions(active, without, expected):
     assert before.astype(int).tolist() == [active, active]
 
 
-def test_controller_size_with_fitness_below_zero_or_unknown():
-    before = np.array([[1, 1, 1, 0]] * 3, dtype=bool)
-    without = np.array([[-11.0, -20.0, -30.0, NAN], [-11.1, -20.0, -30.0, NAN], [9.0] * 3 + [NAN]])
-    fitness = np.array([-10.0, -10.0, NAN])
-    after = resized(before, fitness, without, np.ones(3, dtype=bool), 0.9)
-    assert after.astype(int).tolist() == [[0, 1, 1, 0], [1, 1, 1, 1], [1, 1, 1, 0]]
+def test_controller_size_with_fitness_below_zero_unknown_or_nothing():
+    before = np.array([[1, 1, 1, 0]] * 4, dtype=bool)
+    nine = [9.0] * 3 + [NAN]
+    without = np.array([[-11.0, -20.0, -30.0, NAN], [-11.1, -20.0, -30.0, NAN], nine, nine])
+    fitness = np.array([-10.0, -10.0, NAN, 0.0])
+    after = resized(before, fitness, without, np.ones(4, dtype=bool), 0.9)
+    kept = [1, 1, 1, 0]
+    assert after.astype(int).tolist() == [[0, 1, 1, 0], [1, 1, 1, 1], kept, kept]

@@ -5,6 +5,9 @@ import math
 import numpy as np
 import pytest
 import warp as wp
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
 from conevo.kernels import engine
 from conevo.kernels.geometry import COVER_WORDS, cover_disc, covered_by_any, octant
 from conevo.kernels.network import (
@@ -18,8 +21,6 @@ from conevo.kernels.network import (
     wide_vector,
 )
 from conevo.kernels.random import uniform
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from oracles import rover_oracle, splitmix
 
 engine.start()

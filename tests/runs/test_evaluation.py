@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from conevo.runs.evaluation import describe, score
+from conevo.evolution.protocol import Trials
+from conevo.rng import stream
+from conevo.runs.evaluation import describe, make_evaluator, score
 from conevo.worlds.protocol import Outcome
+from conevo.worlds.registry import world
+from conevo.worlds.rollout import Rollout
 
 ACTIONS = ("dig", "move")
 
@@ -48,3 +52,21 @@ def test_a_portrait_names_castes_by_the_most_executed_action() -> None:
     assert portrait.labels == ["dig", "non-specialized", "move"]
     assert portrait.castes == {"dig": 1, "move": 1, "non-specialized": 1}
     np.testing.assert_allclose(portrait.specialization, [0, 1, 0.3])
+
+
+def test_a_generation_shares_scenarios_and_all_fittest_teams_share_others() -> None:
+    task = world("rover/complex-1", n_robots=3, iterations=60, n_hidden=2, max_hidden=2)
+    evaluate = make_evaluator(
+        Rollout(task, n_threads=1), task, seed=1, epochs=2, fittest_epochs=3, credit="robot"
+    )
+    genes = stream(1, "genes").uniform(-1, 1, (6, 23)).astype(np.float32)
+    team = np.arange(6, dtype=np.int32).reshape(1, 3, 2)
+
+    def counts(phase: str, generation: int) -> np.ndarray:
+        return evaluate(Trials(phase, generation, genes, team)).outcome.counts
+
+    assert counts("genotypes", 4).shape[1] == 2
+    np.testing.assert_array_equal(counts("genotypes", 4), counts("lesion", 4))
+    assert not np.array_equal(counts("genotypes", 4), counts("genotypes", 5))
+    assert counts("fittest", 4).shape[1] == 3
+    np.testing.assert_array_equal(counts("fittest", 4), counts("fittest", 5))

@@ -20,6 +20,7 @@ TASK = "rover/complex-1"
 TINY: dict[str, Any] = {
     "run.generations": 5,
     "run.epochs": 2,
+    "run.fittest_epochs": 2,
     "run.n_tests": 3,
     "world.n_robots": 3,
     "world.iterations": 12,

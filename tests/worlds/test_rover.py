@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+
 from conevo.rng import fold, stream
 from conevo.worlds.registry import world
 from conevo.worlds.rollout import Rollout
@@ -14,7 +15,7 @@ LOW, MED, HI, MOVE, NONE = 0, 1, 2, 3, -1
 
 
 def crowd(scenarios, n_robots, seed, side=0.12):
-    """Put the rovers of one scenario into a small square, so that they meet rocks and each other."""
+    """Put the rovers of one scenario into a small square: they meet rocks and each other."""
     rng = stream(seed, "crowd")
     mask = scenarios.canal.astype(bool)
     k = rng.integers(scenarios.rock_x.shape[1])

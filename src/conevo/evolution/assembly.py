@@ -110,20 +110,21 @@ def best_team(active: BoolArray, elite: IntArray, n_genotypes: int) -> IntArray:
 
 
 def lesion_teams(team: IntArray, suspects: BoolArray) -> tuple[IntArray, IntArray, IntArray]:
-    """Return the fittest team once for each neuron that is tried for being missed.
+    """Return the fittest team whole, then once for each neuron that is tried for being missed.
 
-    Nitschke 2009, section 3.6.
+    Nitschke 2009, section 3.6. Choice: the whole team is evaluated beside its lesions, in the same
+    scenarios, or the lesions would be compared with the luck of other ones.
 
     Args:
         team: [R, U] rows of the fittest team.
         suspects: [R] the robots whose neurons are lesioned, one at a time.
 
     Returns:
-        Teams [N, R, U], and the robot and the slot [N] each of them lacks.
+        Teams [1 + N, R, U], and the robot and the slot [N] that each but the first lacks.
     """
     robot, slot = np.nonzero((team >= 0) & suspects[:, None])
-    teams = np.repeat(team[None], len(robot), axis=0)
-    teams[np.arange(len(robot)), robot, slot] = -1
+    teams = np.repeat(team[None], 1 + len(robot), axis=0)
+    teams[1 + np.arange(len(robot)), robot, slot] = -1
     return teams, robot, slot
 
 

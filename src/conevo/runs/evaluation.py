@@ -46,16 +46,20 @@ Evaluate = Callable[[Trials], Evaluation]
 
 
 def make_evaluator(
-    rollout: Rollout, world: World, *, seed: int, epochs: int, credit: str
+    rollout: Rollout, world: World, *, seed: int, epochs: int, fittest_epochs: int, credit: str
 ) -> Evaluate:
     """Return the function that plays trials in a world.
 
     All trials of a generation meet the same ``epochs`` scenarios, addressed by seed, generation
-    and epoch, so a score depends neither on the batch nor on when it is computed.
+    and epoch, so a score depends neither on the batch nor on when it is computed. The fittest teams
+    of all generations meet the same ``fittest_epochs`` scenarios.
     """
 
     def evaluate(trials: Trials) -> Evaluation:
-        keys = [fold(seed, "epoch", trials.generation, epoch) for epoch in range(epochs)]
+        if trials.phase == "fittest":
+            keys = [fold(seed, "fittest", epoch) for epoch in range(fittest_epochs)]
+        else:
+            keys = [fold(seed, "epoch", trials.generation, epoch) for epoch in range(epochs)]
         genes = np.asarray(trials.genes, dtype=np.float32)
         teams = np.asarray(trials.teams, dtype=np.int32)
         outcome = rollout.evaluate(genes, teams, world.scenarios(keys))

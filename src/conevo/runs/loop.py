@@ -26,7 +26,7 @@ def evolve_generations(
     *,
     settings: RunSettings,
     actions: tuple[str, ...],
-    steps_per_evaluation: int,
+    iterations: int,
     last: Record | None = None,
     on_generation: Callable[[State, Record], None],
 ) -> str:
@@ -38,7 +38,7 @@ def evolve_generations(
         evaluate: plays trials.
         settings: the stop conditions.
         actions: names of the world's actions.
-        steps_per_evaluation: team-steps that one team evaluation takes (epochs x iterations).
+        iterations: of one epoch of the world.
         last: record of the generation before, if there was one.
         on_generation: called with the state after a generation and the generation's record.
 
@@ -55,7 +55,7 @@ def evolve_generations(
         if finished is None:
             return "budget"
         generation, (state, portrait) = state.generation, finished
-        steps = state.team_evaluations * steps_per_evaluation
+        steps = _team_steps(state, settings, iterations)
         last = _record(state, portrait, generation, steps, time.perf_counter() - started)
         on_generation(state, last)
 
@@ -100,6 +100,13 @@ def _run_generation(
     if portrait is None:
         raise RuntimeError(f"{method.name} finished a generation without its fittest team")
     return state, portrait
+
+
+def _team_steps(state: State, settings: RunSettings, iterations: int) -> int:
+    """Return the team-steps so far; one evaluation of each generation is its fittest team's."""
+    others = int(state.team_evaluations) - state.generation
+    epochs = others * settings.epochs + state.generation * settings.fittest_epochs
+    return epochs * iterations
 
 
 def _record(

@@ -273,7 +273,7 @@ class Run:
                 lab.evaluate,
                 settings=settings,
                 actions=lab.world.actions,
-                steps_per_evaluation=settings.epochs * lab.world.iterations,
+                iterations=lab.world.iterations,
                 last=records[-1] if records else None,
                 on_generation=keep,
             )
@@ -311,6 +311,7 @@ class _Lab:
                 world,
                 seed=config.run.seed,
                 epochs=config.run.epochs,
+                fittest_epochs=config.run.fittest_epochs,
                 credit=config.run.credit,
             ),
         )

@@ -126,8 +126,8 @@ class Mesp:
         fittest = best_team(state.active, state.elite, self.config.genotypes)[0]
         _, robot, slot = lesion_teams(fittest, suspects)
         without = np.full(state.active.shape, np.nan)
-        without[robot, slot] = credit.of_robot(scores.fitness, robot)
-        whole = state.fittest_fitness
+        whole, lesioned = scores.fitness[0], scores.fitness[1:]
+        without[robot, slot] = credit.of_robot(lesioned, robot)
         return resized(state.active, whole, without, suspects, self.config.lesion_ratio)
 
     def pairs(self, state: State) -> IntArray:
