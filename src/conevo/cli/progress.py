@@ -62,6 +62,19 @@ class Pace:
         seconds = sum(s for s, _ in self.recent)
         return sum(n for _, n in self.recent) / seconds if seconds else 0.0
 
+    def done(self, generation: int) -> float:
+        """Return the share of the run that is over, by generations or by budget."""
+        budget = self.settings.budget_evaluations
+        share = (generation + 1) / self.settings.generations
+        return max(share, self.spent / budget) if budget else share
+
+    def place(self, generation: int) -> str:
+        """Return where the run stands: its generation, and the budget if that will end it."""
+        budget = self.settings.budget_evaluations
+        if budget and self.spent / budget > (generation + 1) / self.settings.generations:
+            return f"generation {generation + 1}, {count(self.spent)}/{count(budget)} evaluations"
+        return f"generation {generation + 1}/{self.settings.generations}"
+
     def remaining(self, generation: int) -> float:
         """Return the seconds until the last generation, or until the budget is spent."""
         if not self.recent:
@@ -88,7 +101,7 @@ class Lines:
         self.next = time.monotonic() + self.pause
         measures = "  ".join(f"{k} {number(v)}" for k, v in record["performance"].items())
         click.echo(
-            f"generation {generation + 1}/{total}  {measures}  "
+            f"{self.pace.place(generation)}  {measures}  "
             f"fitness best {number(record['best_fitness'])} mean {number(record['mean_fitness'])}  "
             f"S {number(record['specialization'])}  {castes(record['castes'])}  "
             f"{number(self.pace.rate)} evaluations/s  "
@@ -114,7 +127,7 @@ class Display:
         from rich.progress_bar import ProgressBar
         from rich.table import Table
 
-        total, done = self.run.config.run.generations, len(self.records)
+        done = len(self.records)
         grid = Table.grid(padding=(0, 2))
         for label, text in (
             self._rows() if self.records else [("", "the first generation is under way")]
@@ -122,8 +135,8 @@ class Display:
             grid.add_row(f"[bold]{label}[/bold]", text)
         return Group(
             f"[bold]{title(self.run.config)}[/bold]\n{self.run.path}",
-            ProgressBar(total=total, completed=done, width=60),
-            f"generation {done} of {total}, {duration(time.monotonic() - self.started)} so far, "
+            ProgressBar(total=1.0, completed=self.pace.done(done - 1), width=60),
+            f"{self.pace.place(done - 1)}, {duration(time.monotonic() - self.started)} so far, "
             f"{duration(self.pace.remaining(done - 1))} left",
             grid,
         )

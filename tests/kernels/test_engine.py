@@ -1,0 +1,141 @@
+"""The compiled kernels are those of the sources: never stale, never compiled twice, CUDA too."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import conevo
+import pytest
+import warp as wp
+from conevo.errors import EnvironmentFailure
+from conevo.kernels import engine
+from conevo.worlds.registry import world
+from conevo.worlds.rollout import Rollout, episode_kernel
+
+PACKAGE = Path(conevo.__file__).parent
+PLAY = """
+import json, sys
+import numpy as np
+from conevo.worlds.registry import world
+from conevo.worlds.rollout import Rollout
+
+task = world("rover/complex-5", n_robots=6, iterations=30)
+pool = np.random.default_rng(1).uniform(-1, 1, (60, 31)).astype(np.float32)
+teams = np.full((1, 6, 20), -1, np.int32)
+teams[:, :, :10] = np.arange(60).reshape(1, 6, 10)
+rollout = Rollout(task, n_threads=1)
+seen = rollout.record(pool, teams[0], task.scenarios([1]))
+sums = {name: float(np.float64(values).sum()) for name, values in seen.items()}
+print(json.dumps({"hash": rollout.kernel_hash, "seen": sums}))
+"""
+
+
+def play(source: Path, cache: Path) -> dict:
+    """Run the package at ``source`` in a process of its own, with compiled kernels in ``cache``."""
+    environment = os.environ | {"PYTHONPATH": str(source), "WARP_CACHE_PATH": str(cache)}
+    done = subprocess.run(
+        [sys.executable, "-c", PLAY], env=environment, capture_output=True, text=True, check=True
+    )
+    assert done.stderr == ""  # Warp says nothing, GPU or not
+    return json.loads(done.stdout)
+
+
+def compiled(cache: Path) -> dict[str, int]:
+    return {str(p.relative_to(cache)): p.stat().st_mtime_ns for p in cache.rglob("*.o")}
+
+
+def edit(source: Path, file: str, old: str, new: str) -> None:
+    path = source / "conevo" / file
+    text = path.read_text()
+    assert text.count(old) == 1, (file, old)
+    path.write_text(text.replace(old, new))
+
+
+@pytest.mark.slow
+def test_edited_kernels_are_never_stale_and_unchanged_ones_never_compiled_again(tmp_path):
+    source, cache = tmp_path / "source", tmp_path / "cache"
+    shutil.copytree(PACKAGE, source / "conevo", ignore=shutil.ignore_patterns("__pycache__"))
+    first = play(source, cache)
+    before = compiled(cache)
+    assert before
+
+    assert play(source, cache) == first
+    assert compiled(cache) == before  # a second start compiles nothing
+
+    edits = [
+        # a constant, a function called by a function, the body of a phase, an imported constant
+        (
+            "worlds/rover_dynamics.py",
+            "ROCK_CELLS = wp.constant(40)",
+            "ROCK_CELLS = wp.constant(20)",
+        ),
+        ("kernels/random.py", "* 5.9604644775390625e-08", "* 4.0e-08"),
+        ("worlds/rover_dynamics.py", "team.energy[i] = p.energy\n", "team.energy[i] = 0.5\n"),
+        ("kernels/geometry.py", "COVER_CELLS = wp.constant(100)", "COVER_CELLS = wp.constant(50)"),
+    ]
+    hashes = {first["hash"]}
+    for file, old, new in edits:
+        edit(source, file, old, new)
+        changed = play(source, cache)
+        fresh = play(source, tmp_path / f"fresh-{len(hashes)}")
+        assert changed == fresh  # what a machine without any cache computes
+        hashes.add(changed["hash"])
+        edit(source, file, new, old)
+    assert len(hashes) == 1 + len(edits)
+    known = compiled(cache)
+    assert play(source, cache) == first  # taken back: the first compilation serves again
+    assert compiled(cache) == known
+
+
+def test_edits_that_matter_change_what_is_computed(tmp_path):
+    """The edit of a parameter of the rules above would show: rovers start with less energy."""
+    source = tmp_path / "source"
+    shutil.copytree(PACKAGE, source / "conevo", ignore=shutil.ignore_patterns("__pycache__"))
+    edit(
+        source, "worlds/rover_dynamics.py", "team.energy[i] = p.energy\n", "team.energy[i] = 0.5\n"
+    )
+    cache = tmp_path / "cache"
+    assert play(source, cache)["seen"]["energy"] < 0.5 * 6 * 30
+    edit(
+        source, "worlds/rover_dynamics.py", "team.energy[i] = 0.5\n", "team.energy[i] = p.energy\n"
+    )
+    assert play(source, cache)["seen"]["energy"] > 900 * 6 * 30
+
+
+def test_the_cuda_form_compiles_for_sm_90_without_a_device(tmp_path):
+    engine.start()
+    kernel = episode_kernel(world("rover/complex-1").simulation())
+    files = wp.compile_aot_module(kernel.module, arch=90, module_dir=tmp_path)
+    assert [f.suffixes[-2:] for f in files] == [[".sm90", ".cubin"]]
+    assert files[0].read_bytes()[:4] == b"\x7fELF"
+    assert files[0].stat().st_size > 20_000
+
+
+@pytest.mark.cuda
+@pytest.mark.skipif(not wp.is_cuda_available(), reason="no CUDA device on this machine")
+def test_a_cuda_device_gives_the_bits_of_the_cpu():
+    from contracts.test_worlds import assert_same_bits, keys, random_teams
+
+    task = world("rover/complex-5", iterations=200)
+    genes, teams = random_teams(task, 8)
+    scenarios = task.scenarios(keys(2))
+    assert_same_bits(
+        Rollout(task).evaluate(genes, teams, scenarios),
+        Rollout(task, device="cuda").evaluate(genes, teams, scenarios),
+    )
+
+
+@pytest.mark.skipif(wp.is_cuda_available(), reason="there is a CUDA device here")
+def test_a_missing_cuda_device_is_one_clear_line():
+    with pytest.raises(EnvironmentFailure, match="no CUDA device on this machine"):
+        Rollout(world("rover/complex-1"), device="cuda")
+
+
+def test_kernel_hash_is_the_same_for_all_environments_and_sizes_of_a_world():
+    one = Rollout(world("rover/complex-1")).kernel_hash
+    assert Rollout(world("rover/simple-10", n_robots=3, n_hidden=4)).kernel_hash == one
+    assert len(one) == 16
+    assert int(one, 16) > 0
