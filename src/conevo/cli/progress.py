@@ -128,6 +128,8 @@ class Display:
         from rich.table import Table
 
         done = len(self.records)
+        bar = Table.grid()  # a bar by itself does not end its line
+        bar.add_row(ProgressBar(total=1.0, completed=self.pace.done(done - 1), width=60))
         grid = Table.grid(padding=(0, 2))
         for label, text in (
             self._rows() if self.records else [("", "the first generation is under way")]
@@ -135,7 +137,7 @@ class Display:
             grid.add_row(f"[bold]{label}[/bold]", text)
         return Group(
             f"[bold]{title(self.run.config)}[/bold]\n{self.run.path}",
-            ProgressBar(total=1.0, completed=self.pace.done(done - 1), width=60),
+            bar,
             f"{self.pace.place(done - 1)}, {duration(time.monotonic() - self.started)} so far, "
             f"{duration(self.pace.remaining(done - 1))} left",
             grid,

@@ -87,18 +87,21 @@ def test_text(result: dict[str, Any]) -> str:
                 str(tested["generation"]),
                 *(f"{number(s['mean'])} +- {number(s['sd'])}" for s in spread),
                 number(mean_s),
-                castes(tested["castes"]),
             ]
         )
-    head = ["", "generation", *measures, "S", "castes (robots)"]
+    head = ["", "generation", *measures, "S"]
+    teams = "\n".join(
+        f"castes of the {row[0]}: {castes(tested['castes'])}"
+        for row, tested in zip(rows, result.values(), strict=True)
+    )
     return (
         f"Testing phase, {some['scenarios']} fresh scenarios (mean +- standard deviation)\n"
-        f"{table(head, rows)}"
+        f"{table(head, rows)}\n{teams}"
     )
 
 
 def next_commands(run: Run) -> list[str]:
-    """Return the exact commands for what can be done with a finished run."""
+    """Return the exact commands for what can be done with a finished run, each after a comment."""
     config = run.config
     other = "mesp" if config.method.startswith("cone") else "cone"
     plain = resolve(config.task, config.method, config.preset).tables()
@@ -117,8 +120,7 @@ def next_commands(run: Run) -> list[str]:
         again: "the same with another seed",
         repeat + "".join(changes): "the same with another method",
     }
-    width = max(map(len, commands))
-    return [f"{command.ljust(width)}   # {what}" for command, what in commands.items()]
+    return [line for command, what in commands.items() for line in (f"# {what}", command)]
 
 
 def _state(run: Run) -> str:
