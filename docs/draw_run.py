@@ -39,6 +39,12 @@ def styles(actions):
     return dict(zip((*actions, NON_SPECIALIZED), STYLES, strict=True))
 
 
+def world_of(run):
+    """Return the world a run was made in."""
+    config = run.config
+    return WORLDS[config.world].build(config.environment, config.world_params)
+
+
 def replay(run, scenario):
     """Play a run's champion once more in a scenario of its testing phase.
 
@@ -46,10 +52,9 @@ def replay(run, scenario):
         The scenarios object, paths x and y [T, R], each rover's caste [R], which rocks were
         detected [K], and the value the lander recorded.
     """
-    config = run.config
-    world = WORLDS[config.world].build(config.environment, config.world_params)
+    world = world_of(run)
     rollout = Rollout(world, n_threads=1)
-    scene = world.scenarios([fold(config.run.seed, "test", scenario)])
+    scene = world.scenarios([fold(run.config.run.seed, "test", scenario)])
     genes, teams = run.champion.as_trial()
     seen = rollout.record(genes, teams[0], scene)
     # Recorded arrays have one element per robot; the rocks' are read where they were left.
@@ -91,14 +96,13 @@ def draw_castes(ax, run, looks):
     for caste, (colour, _, _, hatch) in looks.items():
         size = np.array([record["castes"].get(caste, 0) for record in records])
         if size.any():
-            top = below + size
-            ax.fill_between(
-                generation, below, top, step="mid", facecolor=colour, hatch=hatch, linewidth=0
-            )
+            look = {"facecolor": colour, "hatch": hatch, "linewidth": 0}
+            ax.fill_between(generation, below, below + size, step="mid", label=caste, **look)
         below = below + size
     ax.set(ylabel="rovers", xlabel="generation", ylim=(0, below.max()))
     ax.xaxis.set_major_locator(MaxNLocator(integer=True))
     ax.set_title("Its castes", loc="left")
+    ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False, reverse=True)
 
 
 def draw_world(ax, run, looks):
@@ -110,7 +114,7 @@ def draw_world(ax, run, looks):
     rocks = np.stack([scene.rock_x[0], scene.rock_y[0]])
     for which, size, colour, name in (
         (~detected, 1.4, "#8C8C8C", "rock, undetected"),
-        (detected, 8.0, "#C2410C", "rock, detected"),
+        (detected, 9.0, "#8B1A00", "rock, detected"),
     ):
         ax.scatter(*rocks[:, which], s=size, color=colour, linewidth=0)
         ax.plot([], [], "o", color=colour, ms=3 if size < 2 else 5, mec="none", label=name)
@@ -124,15 +128,14 @@ def draw_world(ax, run, looks):
             ax.plot([], [], line, color=colour, marker=marker, mec="white", ms=7, label=name)
     ax.set(xlim=(0, 1), ylim=(0, 1), xticks=(0, 0.5, 1), yticks=(0, 0.5, 1), aspect="equal")
     ax.legend(loc="upper left", bbox_to_anchor=(1.01, 1), frameon=False, markerscale=1.2)
-    ax.set_title(
-        f"The champion in a fresh scenario: {value:.0f} of 5000 detected", loc="left"
-    )
+    ax.set_title(f"The champion in a fresh scenario: {value:.0f} of 5000 detected", loc="left")
 
 
 def title(run):
     """Return two lines: what was run at what cost, and what the testing phase found."""
     config, last, tested = run.config, run.generations()[-1], run.test_result
-    champion, first = (tested[name]["performance"]["value"] for name in ("champion", "generation_0"))
+    values = {name: result["performance"]["value"] for name, result in tested.items()}
+    champion, first = values["champion"], values["generation_0"]
     return (
         f"{config.task}, {config.method}, preset {config.preset}, seed {config.run.seed}, "
         f"{last['team_evaluations']:,} team evaluations\n"
@@ -144,7 +147,7 @@ def title(run):
 
 def draw(run, picture):
     """Write the picture of a finished run of the multi-rover world."""
-    looks = styles(WORLDS[run.config.world].build(run.config.environment, None).actions)
+    looks = styles(world_of(run).actions)
     figure, axes = plt.subplot_mosaic(
         [["learning", "world"], ["castes", "world"]],
         figsize=(12.5, 5.6),
