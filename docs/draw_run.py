@@ -14,7 +14,6 @@ import numpy as np
 from PIL import Image
 
 matplotlib.use("Agg")
-matplotlib.rcParams.update({"hatch.color": "white", "hatch.linewidth": 0.6})
 import matplotlib.pyplot as plt
 from matplotlib.ticker import MaxNLocator
 
@@ -22,6 +21,7 @@ from conevo import WORLDS, Rollout, Run
 from conevo.rng import fold
 from conevo.specialization.individual import NON_SPECIALIZED, degree, label
 
+matplotlib.rcParams.update({"hatch.color": "white", "hatch.linewidth": 0.6})
 PICTURES = Path(__file__).parent / "pictures"
 # Caste by caste: colour (Okabe and Ito 2008), line, marker, hatch. Colours differ in lightness too,
 # so the picture can be read in grey and by readers who see few colours.

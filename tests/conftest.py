@@ -1,8 +1,14 @@
 """Fixtures that several folders of tests share."""
 
+import os
 from contextlib import contextmanager
 
 import pytest
+
+if os.environ.get("CONEVO_TEST_WARP_MODE"):  # "debug": array accesses out of bounds are errors
+    import warp
+
+    warp.config.mode = os.environ["CONEVO_TEST_WARP_MODE"]
 
 
 @pytest.fixture

@@ -101,7 +101,9 @@ def launch(
                 kernel, dim=[count], inputs=[*inputs, first], block_dim=lanes, device="cpu"
             )
 
-    if n_threads == 1:
+    # Warp's CPU code keeps a static pointer to the block's scratch memory: written at entry, read
+    # by debug assertions and by fibers only. So a release kernel may run on several threads.
+    if n_threads == 1 or wp.config.mode != "release" or wp.config.enable_cpu_blocks:
         for piece in _pieces(n_worlds, 1):
             run(piece)
     else:

@@ -1,0 +1,188 @@
+"""Write the tables of the pages that the package itself can fill: ``python docs/make_tables.py``.
+
+A table stands between ``<!-- table: NAME -->`` and ``<!-- end -->``; everything between the two is
+replaced. ``tests/test_docs.py`` fails while a page is behind the package.
+"""
+
+import dataclasses
+import re
+from importlib import import_module, resources
+from pathlib import Path
+from typing import Annotated, Literal, get_args, get_origin, get_type_hints
+
+from conevo import METHODS, WORLDS, UsageError
+from conevo.runs.config import PRESETS, resolve
+from conevo.worlds import rocks
+from conevo.worlds.rover import RoverParams
+
+ROOT = Path(__file__).resolve().parent.parent
+PAGES = ("README.md", "docs/quickstart.md", "docs/worlds.md")
+MARKED = re.compile(r"(<!-- table: ([^>]+?) -->\n).*?(<!-- end -->)", re.DOTALL)
+ARTICLE = "rover/complex-1"  # the task of which the presets table speaks
+
+# What a parameter of the multi-rover world means, and its unit. "side": side of the square.
+ROVER_MEANING = {
+    "n_robots": ("rovers", "rovers in a team"),
+    "iterations": ("iterations", "length of an epoch"),
+    "energy": ("energy", "of a rover at the start of an epoch"),
+    "low_range": ("side", "radius of a detection with setting low"),
+    "med_range": ("side", "the same, med"),
+    "hi_range": ("side", "the same, hi"),
+    "low_accuracy": ("probability", "that a rover succeeds on a rock in range with setting low"),
+    "med_accuracy": ("probability", "the same, med"),
+    "hi_accuracy": ("probability", "the same, hi"),
+    "low_cost": ("energy", "of a detection with setting low"),
+    "med_cost": ("energy", "the same, med"),
+    "hi_cost": ("energy", "the same, hi"),
+    "rover_sensor_range": ("side", "how far the rover sensors see"),
+    "rover_sensor_cost": ("energy", "of the rover sensors, in every iteration"),
+    "move_range": ("side", "the largest step"),
+    "move_cost": ("energy", "of a move, refused or not"),
+    "report_cost": ("energy", "of reporting, in an iteration with a detection"),
+    "min_distance": ("side", "lower bound of distances in eqs 5.1 and 5.4"),
+    "separation": ("side", "a rover may not come closer than this to another"),
+    "fitness": ("", "what a rover is credited with: eq. 5.4, or value times area"),
+    "n_hidden": ("neurons", "hidden neurons of a controller at the start"),
+    "max_hidden": ("neurons", "hidden neurons a controller can grow to"),
+}
+BOUNDS = {"ge": ">=", "gt": ">", "le": "<=", "lt": "<"}
+
+
+def table(head, rows):
+    """Return a Markdown table."""
+    lines = [head, ["---"] * len(head), *rows]
+    return "".join(f"| {' | '.join(map(str, line))} |\n" for line in lines)
+
+
+def worlds_by_methods():
+    """Return which presets there are for each method in each world."""
+    rows = []
+    for name, entry in METHODS.items():
+        cells = []
+        for world in WORLDS.values():
+            task = f"{world.name}/{world.environments[0]}"
+            have = [preset for preset in PRESETS if _resolves(task, name, preset)]
+            cells.append("all presets" if len(have) == len(PRESETS) else ", ".join(have) or "no")
+        rows.append([f"`{name}`", entry.title, entry.summary, *cells])
+    worlds = [f"`{world.name}` ({world.title})" for world in WORLDS.values()]
+    return table(["method", "published as", "what it is", *worlds], rows)
+
+
+def _resolves(task, method, preset):
+    try:
+        resolve(task, method, preset)
+    except UsageError:
+        return False
+    return True
+
+
+def presets():
+    """Return what each preset means for CONE in the multi-rover world."""
+    rows = []
+    for preset in PRESETS:
+        config = resolve(ARTICLE, "cone", preset)
+        run, method = config.run, config.method_config
+        rows.append(
+            [
+                f"`{preset}`",
+                _purpose(preset),
+                f"{run.generations:,}",
+                f"{run.budget_evaluations:,}" if run.budget_evaluations else "none",
+                f"{run.epochs} x {config.world_params.iterations:,}",
+                method.evaluation,
+                method.genotypes,
+                run.n_tests,
+            ]
+        )
+    head = (
+        "preset | what for | generations at most | budget of team evaluations | epochs x iterations"
+    )
+    head += " | evaluation | genotypes per sub-population | test scenarios"
+    return table(head.split(" | "), rows)
+
+
+def _purpose(preset):
+    """Return the beginning of a preset file's first comment."""
+    text = (resources.files("conevo.runs") / "presets" / f"{preset}.toml").read_text()
+    comment = " ".join(line.strip("# ") for line in text.split("\n\n")[0].splitlines())
+    return re.split(r"[.:](?: |$)", comment)[0]
+
+
+def card(module):
+    """Return the table on the card of a world, the docstring of its module, in Markdown."""
+    lines = import_module(module).__doc__.splitlines()
+    first, last = (k for k, line in enumerate(lines) if re.fullmatch(r"=+ +=+", line))
+    rows = [re.split(r" {2,}", line, maxsplit=1) for line in lines[first + 1 : last]]
+    return table(["", ""], [[name, text.replace("``", "`")] for name, text in rows])
+
+
+def rover_environments():
+    """Return canal layout and rocks of every multi-rover environment."""
+    rows = []
+    for kind in ("simple", "complex"):
+        same = {tuple(rocks.mix(f"{kind}-{e}")) for e in range(1, 11)}
+        assert len(same) == 1, kind
+        rows.append([f"`{kind}-1` to `{kind}-10`", "1 to 10", *same.pop()])
+    for e in range(1, 11):
+        name = f"extended-{e}"
+        rows.append([f"`{name}`", rocks.layout(name), *rocks.mix(name)])
+    return table(["environment", "canal layout", *rocks.TYPES], rows)
+
+
+def rover_settings():
+    """Return the three sensor settings with their defaults."""
+    p = RoverParams()
+    rows = [
+        [name, *(getattr(p, f"{name}_{what}") for what in ("range", "accuracy", "cost"))]
+        for name in ("low", "med", "hi")
+    ]
+    return table(["setting", "range (sides)", "accuracy", "cost (energy)"], rows)
+
+
+def rover_parameters():
+    """Return every parameter of the multi-rover world with unit, default and bounds."""
+    hints = get_type_hints(RoverParams, include_extras=True)
+    rows = []
+    for field in dataclasses.fields(RoverParams):
+        unit, meaning = ROVER_MEANING[field.name]
+        default, allowed = f"`{field.default}`", _allowed(hints[field.name])
+        rows.append([f"`{field.name}`", default, unit, allowed, meaning])
+    return table(["parameter", "default", "unit", "allowed", "what it is"], rows)
+
+
+def _allowed(hint):
+    """Return the values that a type annotation allows."""
+    if get_origin(hint) is Literal:
+        return ", ".join(f"`{value}`" for value in get_args(hint))
+    assert get_origin(hint) is Annotated, hint
+    bounds = [(f, getattr(b, f)) for b in get_args(hint)[1:] for f in BOUNDS if hasattr(b, f)]
+    return ", ".join(f"{BOUNDS[name]} {limit:,}" for name, limit in bounds)
+
+
+TABLES = {
+    "worlds x methods": worlds_by_methods,
+    "presets": presets,
+    "rover card": lambda: card("conevo.worlds.rover"),
+    "rover environments": rover_environments,
+    "rover settings": rover_settings,
+    "rover parameters": rover_parameters,
+}
+
+
+def updated(text):
+    """Return a page with all its tables as the package has them now."""
+    return MARKED.sub(lambda m: f"{m[1]}{TABLES[m[2]]()}{m[3]}", text)
+
+
+def main():
+    """Bring all pages up to date."""
+    for page in PAGES:
+        path = ROOT / page
+        text = path.read_text(encoding="utf-8")
+        if (new := updated(text)) != text:
+            path.write_text(new, encoding="utf-8")
+            print(f"{page}: written")
+
+
+if __name__ == "__main__":
+    main()
