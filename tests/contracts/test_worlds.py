@@ -96,6 +96,8 @@ def test_record_equals_evaluate_bit_for_bit(some_world):
     for n in range(2):
         seen = rollout.record(genes, teams[n], scenarios, heuristic[n])
         assert seen["fitness"].shape == (ITERATIONS, some_world.n_robots)
+        n_inputs = some_world.controller.n_inputs
+        assert seen["inputs"].shape == (ITERATIONS, some_world.n_robots, n_inputs)
         assert seen["fitness"][-1].tobytes() == out.fitness[n, 0].tobytes()
         for a in range(len(some_world.actions)):
             assert np.array_equal((seen["action"] == a).sum(axis=0), out.counts[n, 0, :, a])
@@ -134,6 +136,7 @@ def test_wrong_shapes_and_rows_are_refused_in_one_line(some_world):
         (genes[:, 1:], teams, "genes must be"),
         (genes, teams[:, 1:], "teams must be"),
         (genes, outside, "rows"),
+        (genes, teams[:0], "at least one team"),
     ):
         with pytest.raises(ValueError, match=match):
             rollout.evaluate(bad_genes, bad_teams, scenarios)

@@ -7,9 +7,10 @@ import subprocess
 import sys
 from pathlib import Path
 
-import conevo
 import pytest
 import warp as wp
+
+import conevo
 from conevo.errors import EnvironmentFailure
 from conevo.kernels import engine
 from conevo.worlds.registry import world

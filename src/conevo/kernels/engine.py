@@ -11,7 +11,7 @@ import os
 import sys
 import tempfile
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from typing import Any
@@ -73,7 +73,6 @@ def launch(
     device: str = "cpu",
     n_threads: int = 1,
     lanes: int = 1,
-    stop: Callable[[], bool] | None = None,
 ) -> None:
     """Run ``kernel`` for worlds 0..n_worlds-1; its last two arguments are set here.
 
@@ -87,7 +86,6 @@ def launch(
         device: "cpu" or a CUDA device.
         n_threads: CPU threads to launch from.
         lanes: lanes of a block; 1 on the CPU unless CPU blocks are being tested.
-        stop: asked between slices; true abandons the rest (results are then incomplete).
     """
     if device != "cpu":
         wp.launch_tiled(kernel, dim=[n_worlds], inputs=[*inputs, 0], block_dim=lanes, device=device)
@@ -95,11 +93,8 @@ def launch(
         return
 
     def run(piece: tuple[int, int]) -> None:
-        if stop is None or not stop():
-            first, count = piece
-            wp.launch_tiled(
-                kernel, dim=[count], inputs=[*inputs, first], block_dim=lanes, device="cpu"
-            )
+        first, count = piece
+        wp.launch_tiled(kernel, dim=[count], inputs=[*inputs, first], block_dim=lanes, device="cpu")
 
     # Warp's CPU code keeps a static pointer to the block's scratch memory: written at entry, read
     # by debug assertions and by fibers only. So a release kernel may run on several threads.
@@ -107,9 +102,12 @@ def launch(
         for piece in _pieces(n_worlds, 1):
             run(piece)
     else:
-        with ThreadPoolExecutor(n_threads) as pool:
+        pool = ThreadPoolExecutor(n_threads)
+        try:
             for _ in pool.map(run, _pieces(n_worlds, n_threads)):
                 pass
+        finally:  # after Ctrl-C, wait for the slices under way only
+            pool.shutdown(cancel_futures=True)
 
 
 def _pieces(n: int, n_threads: int) -> Iterator[tuple[int, int]]:

@@ -4,7 +4,6 @@ Teams are rows of a genotype pool: the kernel builds each network itself, so a g
 thousand teams needs no unpacked weights. Batches larger than the workspace run in parts.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -21,7 +20,9 @@ from conevo.worlds.protocol import Outcome, Simulation, World
 
 __all__ = ["Rollout", "episode_kernel"]
 
-CHUNK = 512  # worlds simulated at once: bounds memory, large enough to keep all threads busy
+# Worlds simulated at once: bounds memory (about 0.13 MB each), keeps all threads or blocks busy.
+CHUNK = 512
+CUDA_CHUNK = 8192
 
 
 @wp.struct
@@ -100,13 +101,20 @@ def _episode_kernel(
     return episode
 
 
+def _check_device(device: str) -> None:
+    """Refuse a device that this machine does not have."""
+    allowed = ["cpu", *(d.alias for d in wp.get_cuda_devices())]
+    if device not in (*allowed, *(["cuda"] if len(allowed) > 1 else [])):
+        why = "no CUDA device on this machine; " if len(allowed) == 1 else ""
+        raise EnvironmentFailure(f"device {device!r}: {why}allowed here: {', '.join(allowed)}")
+
+
 @dataclass
 class _Workspace:
     """Arrays of a batch of at most ``n`` worlds, used again and again."""
 
     n: int
     state: Any
-    host: dict[str, Any]
 
 
 class Rollout:
@@ -130,10 +138,8 @@ class Rollout:
         self.device = device
         self.n_threads = n_threads or engine.usable_threads()
         self.lanes = 32 if device != "cpu" else lanes
-        if device != "cpu" and not wp.is_cuda_available():
-            raise EnvironmentFailure(
-                f"device {device!r}: no CUDA device on this machine; allowed here: cpu"
-            )
+        self._chunk = CHUNK if device == "cpu" else CUDA_CHUNK
+        _check_device(device)
         self._simulation = world.simulation()
         self._kernel = episode_kernel(self._simulation)
         spec = world.controller
@@ -160,7 +166,6 @@ class Rollout:
         teams: npt.NDArray[np.int32],
         scenarios: Any,
         heuristic: npt.NDArray[np.int32] | None = None,
-        stop: Callable[[], bool] | None = None,
     ) -> Outcome:
         """Run every team in every scenario and return what happened.
 
@@ -169,7 +174,6 @@ class Rollout:
             teams: pool rows of the neurons [N, R, U] (team, robot, slot), -1 for an empty slot.
             scenarios: E scenarios of this world.
             heuristic: [N, R], index of a heuristic controller of the world, -1 for the network.
-            stop: asked now and then; true ends the work early with KeyboardInterrupt.
 
         Raises:
             ValueError: shapes or rows that do not fit this world.
@@ -179,14 +183,12 @@ class Rollout:
         n_actions = len(self.world.actions)
         parts = []
         scene = self._scene(scenarios)
-        step = max(1, CHUNK // e)
+        step = max(1, self._chunk // e)
         for first in range(0, n_teams, step):
             some = slice(first, min(first + step, n_teams))
             batch = self._batch((some.stop - some.start) * e)
             job = self._job(genes, teams[some], heuristic[some], e)
-            self._launch(batch, scene, job, (some.stop - some.start) * e, stop)
-            if stop is not None and stop():
-                raise KeyboardInterrupt
+            self._launch(batch, scene, job, (some.stop - some.start) * e)
             parts.append(self._collect(batch, some.stop - some.start, e))
         joined = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
         return Outcome(
@@ -227,17 +229,16 @@ class Rollout:
         scene, batch = self._scene(scenarios), self._batch(1)
         job = self._job(genes, teams, modes, 1)
         steps: dict[str, list[npt.NDArray[Any]]] = {n: [] for n in self._simulation.recorded}
-        inputs = []
+        inputs: list[npt.NDArray[Any]] = []
+        r, n_inputs = self.world.n_robots, self._shape.n_inputs
         for t in range(self.world.iterations):
             job.t_begin, job.t_end = t, t + 1
-            self._launch(batch, scene, job, 1, None)
+            self._launch(batch, scene, job, 1)
             for name, values in steps.items():
-                values.append(getattr(batch.state, name).numpy()[: self.world.n_robots].copy())
-            inputs.append(batch.state.nets.inputs.numpy().copy())
-        r = self.world.n_robots
-        return {name: np.stack(values) for name, values in steps.items()} | {
-            "inputs": np.stack(inputs).reshape(self.world.iterations, r, -1)
-        }
+                values.append(getattr(batch.state, name).numpy()[:r].copy())
+            first = batch.state.nets.inputs.numpy()[: r * n_inputs]
+            inputs.append(first.reshape(r, n_inputs).copy())
+        return {name: np.stack(values) for name, values in (steps | {"inputs": inputs}).items()}
 
     def _checked(
         self,
@@ -250,7 +251,9 @@ class Rollout:
             raise ValueError(f"genes must be [K, {spec.n_genes}], got {list(genes.shape)}")
         if teams.ndim != 3 or teams.shape[1:] != (r, spec.max_hidden):
             raise ValueError(f"teams must be [N, {r}, {spec.max_hidden}], got {list(teams.shape)}")
-        if teams.size and not (teams.min() >= -1 and teams.max() < len(genes)):
+        if not len(teams):
+            raise ValueError("teams must hold at least one team")
+        if teams.min() < -1 or teams.max() >= len(genes):
             raise ValueError(f"teams must hold rows -1..{len(genes) - 1} of the pool")
         if heuristic is None:
             heuristic = np.full(teams.shape[:2], -1, dtype=np.int32)
@@ -307,12 +310,10 @@ class Rollout:
             nets.n_used = wp.zeros(n * r, dtype=int, **zeros)
             nets.inputs = wp.zeros(n * r * self._shape.n_inputs, dtype=float, **zeros)
             nets.sums = wp.zeros(n * r, dtype=out_vector, **zeros)
-            self._workspace = _Workspace(n, state, {})
+            self._workspace = _Workspace(n, state)
         return self._workspace
 
-    def _launch(
-        self, batch: _Workspace, scene: Any, job: Any, n: int, stop: Callable[[], bool] | None
-    ) -> None:
+    def _launch(self, batch: _Workspace, scene: Any, job: Any, n: int) -> None:
         job.n_worlds = batch.n
         engine.launch(
             self._kernel,
@@ -321,7 +322,6 @@ class Rollout:
             device=self.device,
             n_threads=self.n_threads,
             lanes=self.lanes,
-            stop=stop,
         )
 
     def _collect(self, batch: _Workspace, n_teams: int, e: int) -> dict[str, npt.NDArray[Any]]:
