@@ -115,7 +115,8 @@ def test_interrupt_keeps_the_last_finished_generation(tmp_path: Path) -> None:
     assert f"interrupted after {count} generations" in said
     starts: list[int] = []
     run.resume(threads=1, watch=lambda _, record: starts.append(record["generation"]))
-    assert starts[0] == count
+    # Ctrl-C between the log's line and the next statement: that generation is made again.
+    assert starts[0] in (count - 1, count)
     whole = evolve_tiny(tmp_path / "whole", "mesp", **changes)
     assert content(path) == content(whole.path)
 

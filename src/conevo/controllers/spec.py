@@ -11,7 +11,7 @@ __all__ = ["ControllerSpec"]
 class ControllerSpec:
     """One hidden layer of sigmoid units; inputs are sensors plus previous hidden activations.
 
-    Nitschke 2009, sections 3.1, 4.1, 5.2.4 and 6.2.7. A genotype is one hidden neuron: its input
+    Nitschke 2009, sections 3.1, 4.1, 5.2 and 6.2.7. A genotype is one hidden neuron: its input
     weights (sensors, then context) followed by its output weights. Genes lie in [-1, 1]; a
     connection weight is ``weight_scale`` times its gene.
 

@@ -132,7 +132,7 @@ def grade(state: State, fitness: FloatArray, n_elite: int, phase: str) -> State:
 
 
 def crown(state: State, asked: Trials, scores: Scores) -> State:
-    """Return the state with the fittest team on record (SPEC: evaluated together once more)."""
+    """Return the state with the fittest team on record: it is evaluated together once more."""
     team: IntArray = asked.teams[0]
     return replace(
         state,

@@ -99,10 +99,12 @@ def resized(
 
     If the least needed neuron leaves at least ``ratio`` of the fitness, its slot is emptied, but
     never below two; otherwise every neuron is worth keeping and the lowest empty slot, if there is
-    one, gets a new sub-population. Choice: for a negative fitness the bound lies as far below it,
-    f - (1 - ratio) |f|. Choice: a controller whose fitness is not finite, or 0, keeps its size: of a
-    controller that earns nothing, no lesion says which neurons it needs (by the letter of the rule
-    such controllers shrink to two neurons).
+    one, gets a new sub-population.
+
+    Choice: for a negative fitness the bound lies as far below it, f - (1 - ratio) |f|.
+    Choice: a controller whose fitness is not finite, or 0, keeps its size: of a controller that
+    earns nothing, no lesion says which neurons it needs (by the letter of the rule such controllers
+    shrink to two neurons).
 
     Args:
         active: [P, U] slots in use.

@@ -4,7 +4,7 @@ import warp as wp
 
 __all__ = ["COVER_CELLS", "COVER_WORDS", "cover_disc", "covered_by_any", "octant"]
 
-COVER_CELLS = wp.constant(100)  # Choice (SPEC 5.1): area covered is counted on a 100 x 100 grid
+COVER_CELLS = wp.constant(100)  # Choice: area covered is counted on a 100 x 100 grid
 COVER_WORDS = wp.constant(200)  # 64-bit words of one grid: two for each row of 100 cells
 
 

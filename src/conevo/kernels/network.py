@@ -1,6 +1,6 @@
 """The controller inside a kernel: a simple recurrent network with slots for hidden neurons.
 
-Nitschke 2009, sections 3.1 and 5.2.4. The shape is data (``Shape``), so one compiled kernel serves
+Nitschke 2009, sections 3.1 and 5.2. The shape is data (``Shape``), so one compiled kernel serves
 every size of controller a world can have. Hidden slots are computed ``WIDE`` at a time.
 """
 
@@ -167,7 +167,7 @@ def sigmoid(a: float) -> float:
 def think(nets: Networks, shape: Shape, i: int) -> None:
     """Run robot ``i``'s network once: inputs to output sums, hidden activations to next context.
 
-    An empty slot neither contributes to an output nor feeds the context (SPEC section 2).
+    An empty slot neither contributes to an output nor feeds the context.
     """
     inputs = i * shape.n_inputs
     used = nets.n_used[i]

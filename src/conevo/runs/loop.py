@@ -54,9 +54,9 @@ def evolve_generations(
         finished = _run_generation(method, state, evaluate, actions, settings.budget_evaluations)
         if finished is None:
             return "budget"
-        generation, (state, portrait) = state.generation, finished
+        began, (state, portrait) = state, finished
         steps = _team_steps(state, settings, iterations)
-        last = _record(state, portrait, generation, steps, time.perf_counter() - started)
+        last = _record(began, state, portrait, steps, time.perf_counter() - started)
         on_generation(state, last)
 
 
@@ -110,11 +110,14 @@ def _team_steps(state: State, settings: RunSettings, iterations: int) -> int:
 
 
 def _record(
-    state: State, portrait: Portrait, generation: int, team_steps: int, seconds: float
+    began: State, state: State, portrait: Portrait, team_steps: int, seconds: float
 ) -> Record:
-    """Return what the run's log says about a generation."""
+    """Return what the run's log says about a generation, given the states before and after it.
+
+    Thresholds and sizes are those the generation was played and bred with, not the next one's.
+    """
     return {
-        "generation": generation,
+        "generation": began.generation,
         "team_evaluations": int(state.team_evaluations),
         "team_steps": int(team_steps),
         "seconds": round(seconds, 4),
@@ -124,10 +127,10 @@ def _record(
         "performance": {name: _finite(value) for name, value in portrait.performance.items()},
         "castes": portrait.castes,
         "specialization": _finite(np.mean(state.fittest_specialization)),
-        "sst": _finite(state.sst),
-        "gst": _finite(state.gst),
+        "sst": _finite(began.sst),
+        "gst": _finite(began.gst),
         "recombinations": int(state.recombinations),
-        "n_hidden": [int(n) for n in np.atleast_1d(state.n_hidden)],
+        "n_hidden": [int(n) for n in np.atleast_1d(began.n_hidden)],
         "n_nonfinite": int(state.n_nonfinite),
     }
 

@@ -27,7 +27,7 @@ Choices, all declared in ``RoverParams`` or here, with their sensitivity on the 
 - If more than two rovers succeed on one rock in one iteration, all that belong to a valid pair are
   credited; the team's value counts the rock once. So no order of rovers decides who is paid.
 - A rover without energy stays where it is as a body that others sense, and does nothing more.
-- The lander records a detection one iteration later (section 5.1.3), so those of the last iteration
+- The lander records a detection one iteration later (section 5.1), so those of the last iteration
   are not in ``value``.
 - A rover that has not activated yet shows setting 1, or rovers would be invisible at the start.
 
@@ -86,7 +86,7 @@ class RoverParams:
     move_cost: NonNegative = 0.01
     report_cost: NonNegative = 0.05  # Choice: paid in an iteration in which the rover detects
     min_distance: Positive = 0.01  # Choice: the bound of eq. 5.1, read as a maximum
-    separation: NonNegative = 0.002  # Choice: "only one rover can occupy any position" (5.1.1)
+    separation: NonNegative = 0.002  # Choice: "only one rover can occupy any position" (5.1)
     fitness: Literal["eq_5_4", "value_times_area"] = "eq_5_4"
     n_hidden: Annotated[int, Ge(2), Le(16)] = 10
     max_hidden: Annotated[int, Ge(2), Le(32)] = 20  # Choice: twice the initial number
@@ -147,7 +147,7 @@ class RoverWorld:
 
     @property
     def controller(self) -> ControllerSpec:
-        """The rover's network (section 5.2.4)."""
+        """The rover's network (section 5.2)."""
         return ControllerSpec(
             n_sensors=16,
             n_hidden=self.params.n_hidden,

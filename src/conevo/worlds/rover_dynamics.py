@@ -271,7 +271,7 @@ def is_refused(team: Team, scene: Scene, p: Params, i: int, x: float, y: float) 
 
 @wp.func
 def act(team: Team, scene: Scene, p: Params, i: int, t: int) -> None:
-    """Choose rover ``i``'s action from its outputs (section 5.2.5) and propose where it will be.
+    """Choose rover ``i``'s action from its outputs (section 5.2) and propose where it will be.
 
     A heuristic rover draws its action from table 5.3 and, if it moves, a random direction.
     """
@@ -301,7 +301,7 @@ def act(team: Team, scene: Scene, p: Params, i: int, t: int) -> None:
                 best = sums[k]
                 a = wp.min(k, MOVE)
         if a == MOVE:
-            # "Normalized and scaled" (5.2.6): both outputs at an extreme make the largest step.
+            # Choice: "normalized and scaled" (5.2): both at an extreme make the largest step.
             dx = p.move_range * 1.4142135 * (sigmoid(sums[3]) - 0.5)
             dy = p.move_range * 1.4142135 * (sigmoid(sums[4]) - 0.5)
     team.chosen[i] = a

@@ -1,0 +1,89 @@
+"""Random search: a team of clones of every genotype; all but the elitists are drawn anew.
+
+Made up: what a method must at least be better than. The recipe *add a method* of CONTRIBUTING.md
+puts this file into the package. It also works from outside: ``python examples/random_search.py``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Annotated
+
+import numpy as np
+from annotated_types import Ge
+
+from conevo.evolution import credit
+from conevo.evolution.assembly import rows
+from conevo.evolution.generation import advance, begin, count, crown, grade, trials
+from conevo.evolution.population import elite_count, random_genes
+from conevo.evolution.protocol import Layout, Scores, State, Trials
+from conevo.evolution.variation import VariationConfig
+from conevo.rng import stream
+
+__all__ = ["RandomSearch", "RandomSearchConfig"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class RandomSearchConfig(VariationConfig):
+    """Parameters of random search; of the elite portion only the first is kept.
+
+    Attributes:
+        genotypes: M, whole networks in the population; each costs one team evaluation.
+    """
+
+    genotypes: Annotated[int, Ge(2)] = 10_000
+
+
+@dataclass(frozen=True)
+class RandomSearch:
+    """Random search; see the module."""
+
+    config: RandomSearchConfig = field(default_factory=RandomSearchConfig)
+    name: str = "random-search"
+    title: str = "random search"
+
+    def init(self, layout: Layout, root: int) -> State:
+        """Return generation 0 with random genotypes."""
+        return begin(
+            layout, root, n_populations=1, n_genotypes=self.config.genotypes, networks=True
+        )
+
+    def ask(self, state: State) -> Trials:
+        """Return a team of clones of every genotype, then of the fittest."""
+        m, robots = self.config.genotypes, state.fittest_fitness.size
+        chosen = np.arange(m) if state.phase == "genotypes" else state.elite[0, :1]
+        clones = np.broadcast_to(chosen[:, None, None], (len(chosen), robots, 1))
+        return trials(state, rows(state.active, clones, m))
+
+    def tell(self, state: State, trials: Trials, scores: Scores) -> State:
+        """Return the state after these scores."""
+        state = count(state, trials, scores)
+        if state.phase == "genotypes":
+            fitness = credit.of_clones(scores.fitness)[None]
+            n_elite = elite_count(self.config.elite_portion, self.config.genotypes)
+            return grade(state, fitness, n_elite, phase="fittest")
+        state = crown(state, trials, scores)
+        generator = stream(state.root, "breed", state.generation)
+        genes = random_genes(generator, state.genes.shape)
+        genes[:, :, :1] = state.genes[:, :, state.elite[0, :1]]
+        return advance(state, genes, state.active)
+
+
+def main() -> None:
+    """Search for the places of ``own_function.py``, and let HomCNE do so at the same cost."""
+    from own_function import evaluate
+
+    from conevo import method
+
+    layout = Layout(n_robots=4, n_hidden=3, max_hidden=3, n_genes=2)
+    for chosen in (RandomSearch(RandomSearchConfig(genotypes=20)), method("homcne", genotypes=20)):
+        state = chosen.init(layout, root=1)
+        while state.generation < 60:
+            asked = chosen.ask(state)
+            state = chosen.tell(state, asked, evaluate(asked))
+        worth = state.fittest_fitness[0]
+        print(f"{chosen.title}: {worth:.3f} after {state.team_evaluations} team evaluations")
+
+
+if __name__ == "__main__":
+    main()

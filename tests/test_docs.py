@@ -1,0 +1,144 @@
+"""The pages are true: tables are the package's own, examples run, links lead somewhere."""
+
+import importlib.util
+import os
+import re
+import shutil
+import subprocess
+import sys
+from dataclasses import fields
+from pathlib import Path
+
+import pytest
+
+from conevo.worlds.rover import RoverParams
+
+ROOT = Path(__file__).resolve().parent.parent
+EXECUTED = ("README.md", "docs/quickstart.md", "docs/worlds.md")
+LINKED = (*EXECUTED, "CONTRIBUTING.md", "docs/index.md", "examples/README.md")
+MARKED = re.compile(r"<!-- ([a-z]+): (\S+) -->\n```\w+\n(.*?)```\n", re.DOTALL)
+
+
+def script(name):
+    """Return a script of docs/ as a module."""
+    spec = importlib.util.spec_from_file_location(name, ROOT / "docs" / f"{name}.py")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+make_tables = script("make_tables")
+run_page = script("run_page")
+
+
+@pytest.mark.parametrize("page", make_tables.PAGES)
+def test_tables_are_those_of_the_package(page):
+    text = (ROOT / page).read_text()
+    assert make_tables.MARKED.search(text), "no table in this page"
+    assert make_tables.updated(text) == text, "run: python docs/make_tables.py"
+
+
+def test_every_table_that_can_be_made_has_its_page():
+    pages = "".join((ROOT / page).read_text() for page in make_tables.PAGES)
+    assert sorted(m[2] for m in make_tables.MARKED.finditer(pages)) == sorted(make_tables.TABLES)
+
+
+def test_a_stale_table_is_noticed_and_mended():
+    text = (ROOT / "README.md").read_text()
+    stale = text.replace("| `cone-3` |", "| `cone-4` |")
+    assert stale != text
+    assert make_tables.updated(stale) == text
+
+
+def test_every_parameter_of_the_rover_world_is_explained():
+    assert list(make_tables.ROVER_MEANING) == [field.name for field in fields(RoverParams)]
+
+
+@pytest.mark.parametrize("page", EXECUTED)
+def test_examples_run_and_print_what_the_page_says(page):
+    executed = [block for block in run_page.blocks((ROOT / page).read_text()) if block.is_run]
+    assert executed
+    assert run_page.differences(ROOT / page) == []
+
+
+def test_a_changed_word_is_noticed_and_a_changed_number_is_not():
+    said = "value 41.4  move 5, low 4, hi 1  2 s left"
+    assert run_page.shape("value 9  non-specialized 20  1 min 02 s left") == run_page.shape(said)
+    assert run_page.shape("value 41.4  move 5, low 4, hi 1  2 s more") != run_page.shape(said)
+    assert run_page.shape("area 41.4  move 5, low 4, hi 1  2 s left") != run_page.shape(said)
+
+
+def test_an_example_that_fails_is_noticed(tmp_path):
+    page = tmp_path / "page.md"
+    for text in (
+        "```sh\nconevo list world\n```\n",
+        "```sh\nconevo list worlds\n```\n\n```text\nconevo: error: no\n```\n",
+    ):
+        page.write_text(text)
+        with pytest.raises(RuntimeError, match="exit code"):
+            run_page.differences(page)
+
+
+@pytest.mark.parametrize("page", LINKED)
+def test_links_lead_somewhere(page):
+    path = ROOT / page
+    links = re.findall(r"\]\(([^)#:]+)(?:#[^)]*)?\)", path.read_text())
+    assert links
+    assert [link for link in links if not (path.parent / link).exists()] == []
+
+
+def recipes():
+    """Return (mark, argument, text) of every block of the recipes that stands for a file."""
+    return MARKED.findall((ROOT / "CONTRIBUTING.md").read_text())
+
+
+def test_the_recipes_quote_their_examples():
+    quoted = [(name, text) for mark, name, text in recipes() if mark == "from"]
+    assert len(quoted) >= 5
+    assert [text for name, text in quoted if text not in (ROOT / name).read_text()] == []
+
+
+@pytest.mark.slow
+def test_following_the_recipes_adds_a_world_and_a_method(tmp_path):
+    """Do what CONTRIBUTING says in a copy; the contract tests enrol both by their entries."""
+    for name in ("src", "tests", "examples"):
+        shutil.copytree(ROOT / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copy(ROOT / "pyproject.toml", tmp_path)
+    package = tmp_path / "src" / "conevo"
+    for example, place in (("light", "worlds"), ("random_search", "evolution/methods")):
+        text = (ROOT / "examples" / f"{example}.py").read_text()
+        text = re.sub(r"\n\ndef main\(\).*", "", text, flags=re.DOTALL)
+        text = re.sub(r"^from conevo import .*\n", "", text, flags=re.MULTILINE)
+        (package / place / f"{example}.py").write_text(text)
+    for mark, name, text in recipes():
+        if mark == "entry":
+            registry = tmp_path / name
+            head, end, tail = registry.read_text().partition("\n    )\n}\n")
+            registry.write_text(f"{head}\n{text.rstrip()}{end}{tail}")
+        elif mark == "preset":
+            with (package / "runs" / "presets" / f"{name}.toml").open("a") as file:
+                file.write(f"\n{text}")
+    environment = os.environ | {"PYTHONPATH": str(tmp_path / "src")}
+
+    def run(*arguments):
+        done = subprocess.run(
+            [sys.executable, "-m", *arguments],
+            cwd=tmp_path, env=environment, text=True, check=False,
+            stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+        )  # fmt: skip
+        assert done.returncode == 0, done.stdout
+        return done.stdout
+
+    assert "light-v1" in run("conevo", "list", "worlds")
+    assert "random-search" in run("conevo", "list", "methods")
+    options = ("--preset", "smoke", "--method", "random-search")
+    assert "stopped by: generations" in run("conevo", "run", "light/dark-1", *options[:2],
+                                            "--method", "homcne")  # fmt: skip
+    assert "stopped by: generations" in run("conevo", "run", "rover/complex-1", *options,
+                                            "--set", "run.generations=2")  # fmt: skip
+    contracts = run("pytest", "-q", "-p", "no:cacheprovider", "tests/contracts",
+                    "-k", "light or random")  # fmt: skip
+    found = re.search(r"(\d+) passed", contracts)
+    assert found, contracts
+    assert int(found[1]) >= 16  # seven for the world, nine for the method
