@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+import conevo
 from conevo.worlds.rover import RoverParams
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -78,6 +79,28 @@ def test_an_example_that_fails_is_noticed(tmp_path):
         page.write_text(text)
         with pytest.raises(RuntimeError, match="exit code"):
             run_page.differences(page)
+
+
+def test_a_run_can_be_drawn_and_shows_the_rocks_it_detected(tmp_path):
+    pytest.importorskip("matplotlib")
+    from PIL import Image
+
+    draw_run = script("draw_run")
+    few = {"run.generations": 2, "run.n_tests": 3, "method.genotypes": 20}
+    run = conevo.evolve(
+        "rover/complex-1", "homcne", "smoke", out=tmp_path / "run", overrides=few, threads=1
+    )
+    values = run.test_result["champion"]["performance"]["value"]["values"]
+    middle = draw_run.median_scenario(run)
+    assert values[middle] == sorted(values)[1]
+    scene, x, _, castes, detected, value = draw_run.replay(run, middle)
+    assert value == values[middle] > 0
+    assert scene.rock_value[0, detected].sum() >= value  # the last iteration's are not recorded
+    assert x.shape == (run.config.world_params.iterations, len(castes))
+    draw_run.draw(run, tmp_path / "run.png")
+    with Image.open(tmp_path / "run.png") as picture:
+        assert picture.width > picture.height > 500
+        assert len(picture.convert("RGB").getcolors(2**20)) > 50
 
 
 @pytest.mark.parametrize("page", LINKED)

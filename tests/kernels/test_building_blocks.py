@@ -14,7 +14,6 @@ from conevo.kernels.network import (
     Networks,
     Shape,
     load,
-    networks_of,
     out_vector,
     sigmoid,
     think,
@@ -24,6 +23,7 @@ from conevo.kernels.random import uniform
 from oracles import rover_oracle, splitmix
 
 engine.start()
+networks_of = engine.view_of(Networks)
 
 
 @wp.kernel

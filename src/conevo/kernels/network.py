@@ -12,7 +12,6 @@ __all__ = [
     "Networks",
     "Shape",
     "load",
-    "networks_of",
     "out_vector",
     "sigmoid",
     "think",
@@ -57,33 +56,6 @@ class Networks:
     n_used: wp.array[int]
     inputs: wp.array[float]
     sums: wp.array[out_vector]
-
-
-@wp.func
-def networks_of(batch: Networks, b: int, n_batch: int) -> Networks:
-    """Return the networks of team ``b`` as contiguous views of the batch's arrays."""
-    q = wp.uint64(b)
-    n_in = batch.w_in.shape[0] // n_batch
-    n_out = batch.w_out.shape[0] // n_batch
-    n_filled = batch.filled.shape[0] // n_batch
-    n = batch.n_used.shape[0] // n_batch
-    n_inputs = batch.inputs.shape[0] // n_batch
-    nets = Networks()
-    nets.w_in = wp.array(
-        ptr=batch.w_in.ptr + q * wp.uint64(n_in * 64), shape=(n_in,), dtype=wide_vector
-    )
-    nets.w_out = wp.array(
-        ptr=batch.w_out.ptr + q * wp.uint64(n_out * 32), shape=(n_out,), dtype=out_vector
-    )
-    nets.filled = wp.array(
-        ptr=batch.filled.ptr + q * wp.uint64(n_filled * 64), shape=(n_filled,), dtype=wide_vector
-    )
-    nets.n_used = wp.array(ptr=batch.n_used.ptr + q * wp.uint64(n * 4), shape=(n,), dtype=int)
-    nets.inputs = wp.array(
-        ptr=batch.inputs.ptr + q * wp.uint64(n_inputs * 4), shape=(n_inputs,), dtype=float
-    )
-    nets.sums = wp.array(ptr=batch.sums.ptr + q * wp.uint64(n * 32), shape=(n,), dtype=out_vector)
-    return nets
 
 
 @wp.func

@@ -35,10 +35,10 @@ class Simulation:
 
     state: struct type of a team's state, with a field ``nets`` of networks; its other arrays are
         flat over a batch of teams. sizes: elements that one team needs of each of them.
-    scene: struct type of a scenario; its arrays are those of the scenarios object, by name.
+    scene: struct type of a scenario; its arrays are those of the scenarios object, by name: flat
+        over the scenarios, or of two and more dimensions if all scenarios share them.
     params_type, params: struct type of the parameters, and the parameters.
-    functions: the views and the phases of an iteration: view, view_scene, reset, sense, act,
-        commit, resolve, outcome.
+    functions: the phases of an epoch: reset, sense, act, commit, resolve, outcome.
     recorded: state arrays of one element per robot that ``Rollout.record`` keeps.
     """
 

@@ -51,7 +51,7 @@ def episode_kernel(simulation: Simulation) -> Any:
     )
 
 
-_PHASES = ("view", "view_scene", "reset", "sense", "act", "commit", "resolve", "outcome")
+_PHASES = ("reset", "sense", "act", "commit", "resolve", "outcome")
 
 
 @cache
@@ -59,8 +59,6 @@ def _episode_kernel(
     State: Any,
     Scene: Any,
     Params: Any,
-    view: Any,
-    view_scene: Any,
     reset: Any,
     sense: Any,
     act: Any,
@@ -68,13 +66,15 @@ def _episode_kernel(
     resolve: Any,
     outcome: Any,
 ) -> Any:
+    view_team, view_scene = engine.view_of(State), engine.view_of(Scene)
+
     @wp.kernel(module="unique", module_options=engine.options, grid_stride=False)
     def episode(batch: State, scenes: Scene, p: Params, job: Job, first: int) -> None:
         index, lane = wp.tid()
         b = first + index
         lanes = wp.block_dim()
         n = b // job.n_scenarios
-        team = view(batch, b, job.n_worlds)
+        team = view_team(batch, b, job.n_worlds)
         scene = view_scene(scenes, b % job.n_scenarios, job.n_scenarios)
         if job.t_begin == 0:
             for i in range(lane, job.n_robots, lanes):
@@ -269,7 +269,9 @@ class Rollout:
     def _scene(self, scenarios: Any) -> Any:
         scene = self._simulation.scene()
         for name in self._simulation.scene.vars:
-            setattr(scene, name, self._array(getattr(scenarios, name).reshape(-1)))
+            values = getattr(scenarios, name)
+            is_shared = self._simulation.scene.vars[name].type.ndim > 1
+            setattr(scene, name, self._array(values if is_shared else values.reshape(-1)))
         return scene
 
     def _array(self, values: npt.NDArray[Any]) -> Any:

@@ -10,7 +10,7 @@ of such a ``range`` in memory (whole kernel 1.4 times as fast without, on the CP
 import warp as wp
 
 from conevo.kernels.geometry import COVER_CELLS, COVER_WORDS, cover_disc, covered_by_any, octant
-from conevo.kernels.network import Networks, networks_of, sigmoid
+from conevo.kernels.network import Networks, sigmoid
 from conevo.kernels.random import uniform
 from conevo.worlds import canals
 
@@ -64,7 +64,7 @@ class Scene:
     rock_value: wp.array[float]
     rock_type: wp.array[int]
     cell: wp.array[int]
-    canal: wp.array[wp.uint8]
+    canal: wp.array2d[wp.uint8]  # [rows, columns], the same in all scenarios
     start_x: wp.array[float]
     start_y: wp.array[float]
     seed: wp.array[wp.uint64]
@@ -93,61 +93,6 @@ class Team:
     counts: wp.array[int]  # [R, A]
     switches: wp.array[int]
     performance: wp.array[float]  # value, area
-
-
-@wp.func
-def view(batch: Team, b: int, n: int) -> Team:
-    """Return team ``b`` of a batch of ``n`` as contiguous views (faster than slices: measured)."""
-    q = wp.uint64(b)
-    team = Team()
-    team.nets = networks_of(batch.nets, b, n)
-    r = batch.x.shape[0] // n
-    q4 = q * wp.uint64(4 * r)
-    team.x = wp.array(ptr=batch.x.ptr + q4, shape=(r,), dtype=float)
-    team.y = wp.array(ptr=batch.y.ptr + q4, shape=(r,), dtype=float)
-    team.to_x = wp.array(ptr=batch.to_x.ptr + q4, shape=(r,), dtype=float)
-    team.to_y = wp.array(ptr=batch.to_y.ptr + q4, shape=(r,), dtype=float)
-    team.action = wp.array(ptr=batch.action.ptr + q4, shape=(r,), dtype=int)
-    team.chosen = wp.array(ptr=batch.chosen.ptr + q4, shape=(r,), dtype=int)
-    team.setting = wp.array(ptr=batch.setting.ptr + q4, shape=(r,), dtype=int)
-    team.heuristic = wp.array(ptr=batch.heuristic.ptr + q4, shape=(r,), dtype=int)
-    team.energy = wp.array(ptr=batch.energy.ptr + q4, shape=(r,), dtype=float)
-    team.covered = wp.array(ptr=batch.covered.ptr + q4, shape=(r,), dtype=int)
-    team.covered_range = wp.array(ptr=batch.covered_range.ptr + q4, shape=(r,), dtype=float)
-    team.value = wp.array(ptr=batch.value.ptr + q4, shape=(r,), dtype=float)
-    team.fitness = wp.array(ptr=batch.fitness.ptr + q4, shape=(r,), dtype=float)
-    team.switches = wp.array(ptr=batch.switches.ptr + q4, shape=(r,), dtype=int)
-    a = r * N_ACTIONS
-    team.counts = wp.array(ptr=batch.counts.ptr + q * wp.uint64(4 * a), shape=(a,), dtype=int)
-    k = batch.detected.shape[0] // n
-    team.detected = wp.array(ptr=batch.detected.ptr + q * wp.uint64(4 * k), shape=(k,), dtype=int)
-    c = r * COVER_WORDS
-    team.cover = wp.array(ptr=batch.cover.ptr + q * wp.uint64(8 * c), shape=(c,), dtype=wp.uint64)
-    team.performance = wp.array(
-        ptr=batch.performance.ptr + q * wp.uint64(8), shape=(2,), dtype=float
-    )
-    return team
-
-
-@wp.func
-def view_scene(scenes: Scene, e: int, n: int) -> Scene:
-    """Return scenario ``e`` of ``n`` as contiguous views."""
-    q = wp.uint64(e)
-    scene = Scene()
-    k = scenes.rock_x.shape[0] // n
-    q4 = q * wp.uint64(4 * k)
-    scene.rock_x = wp.array(ptr=scenes.rock_x.ptr + q4, shape=(k,), dtype=float)
-    scene.rock_y = wp.array(ptr=scenes.rock_y.ptr + q4, shape=(k,), dtype=float)
-    scene.rock_value = wp.array(ptr=scenes.rock_value.ptr + q4, shape=(k,), dtype=float)
-    scene.rock_type = wp.array(ptr=scenes.rock_type.ptr + q4, shape=(k,), dtype=int)
-    c = scenes.cell.shape[0] // n
-    scene.cell = wp.array(ptr=scenes.cell.ptr + q * wp.uint64(4 * c), shape=(c,), dtype=int)
-    scene.canal = wp.array(ptr=scenes.canal.ptr, shape=(CANAL_CELLS * CANAL_CELLS,), dtype=wp.uint8)
-    r = scenes.start_x.shape[0] // n
-    scene.start_x = wp.array(ptr=scenes.start_x.ptr + q * wp.uint64(4 * r), shape=(r,), dtype=float)
-    scene.start_y = wp.array(ptr=scenes.start_y.ptr + q * wp.uint64(4 * r), shape=(r,), dtype=float)
-    scene.seed = wp.array(ptr=scenes.seed.ptr + q * wp.uint64(8), shape=(1,), dtype=wp.uint64)
-    return scene
 
 
 # --- reset ----------------------------------------------------------------------------------------
@@ -257,7 +202,7 @@ def is_refused(team: Team, scene: Scene, p: Params, i: int, x: float, y: float) 
     if x < 0.0 or x >= 1.0 or y < 0.0 or y >= 1.0:
         return True
     n = float(CANAL_CELLS)
-    if scene.canal[int(y * n) * CANAL_CELLS + int(x * n)] != wp.uint8(0):
+    if scene.canal[int(y * n), int(x * n)] != wp.uint8(0):
         return True
     close = int(0)
     j = int(0)
@@ -458,8 +403,6 @@ def outcome(team: Team, scene: Scene, p: Params, t_end: int) -> None:
 
 
 FUNCTIONS = {
-    "view": view,
-    "view_scene": view_scene,
     "reset": reset,
     "sense": sense,
     "act": act,
