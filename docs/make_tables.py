@@ -6,11 +6,12 @@ replaced. ``tests/test_docs.py`` fails while a page is behind the package.
 
 import dataclasses
 import re
+import tomllib
 from importlib import import_module, resources
 from pathlib import Path
 from typing import Annotated, Literal, get_args, get_origin, get_type_hints
 
-from conevo import METHODS, WORLDS, UsageError
+from conevo import METHODS, WORLDS
 from conevo.runs.config import PRESETS, resolve
 from conevo.worlds import rocks
 from conevo.worlds.rover import RoverParams
@@ -55,25 +56,26 @@ def table(head, rows):
 
 
 def worlds_by_methods():
-    """Return which presets there are for each method in each world."""
+    """Return which presets hold sizes for each method in each world."""
     rows = []
     for name, entry in METHODS.items():
         cells = []
         for world in WORLDS.values():
-            task = f"{world.name}/{world.environments[0]}"
-            have = [preset for preset in PRESETS if _resolves(task, name, preset)]
-            cells.append("all presets" if len(have) == len(PRESETS) else ", ".join(have) or "no")
+            have = [preset for preset in PRESETS if _has_sizes(preset, world.short_name, name)]
+            cells.append("all presets" if len(have) == len(PRESETS) else ", ".join(have) or "none")
         rows.append([f"`{name}`", entry.title, entry.summary, *cells])
     worlds = [f"`{world.name}` ({world.title})" for world in WORLDS.values()]
     return table(["method", "published as", "what it is", *worlds], rows)
 
 
-def _resolves(task, method, preset):
-    try:
-        resolve(task, method, preset)
-    except UsageError:
-        return False
-    return True
+def _has_sizes(preset, world, method):
+    """Whether a preset says anything about a method, or its family, in a world."""
+    methods = tomllib.loads(_preset_text(preset)).get(world, {}).get("method", {})
+    return method in methods or method.split("-")[0] in methods
+
+
+def _preset_text(preset):
+    return (resources.files("conevo.runs") / "presets" / f"{preset}.toml").read_text()
 
 
 def presets():
@@ -103,8 +105,9 @@ def presets():
 
 def _purpose(preset):
     """Return the beginning of a preset file's first comment."""
-    text = (resources.files("conevo.runs") / "presets" / f"{preset}.toml").read_text()
-    comment = " ".join(line.strip("# ") for line in text.split("\n\n")[0].splitlines())
+    comment = " ".join(
+        line.strip("# ") for line in _preset_text(preset).split("\n\n")[0].splitlines()
+    )
     return re.split(r"[.:](?: |$)", comment)[0]
 
 

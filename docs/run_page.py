@@ -30,6 +30,8 @@ CASTES = re.compile(r"(?:\b(?:low|med|hi|move|rest|non-specialized) \d+(?:, )?)+
 CASTES_JSON = re.compile(r"\{(?:['\"][a-z-]+['\"]: \d+,? ?)+\}")
 NUMBER = re.compile(r"-?\d[\d,.]*(?:e[-+]?\d+)?")
 SPAN = re.compile(r"# h # min|# min # s|# s\b")
+SPACE = re.compile(r"(?<=\[) +| +(?= )")
+REPLACED = ((CASTES, "CASTES"), (CASTES_JSON, "CASTES"), (NUMBER, "#"), (SPAN, "TIME"), (SPACE, ""))
 
 
 @dataclass(frozen=True)
@@ -56,9 +58,7 @@ def blocks(page):
 
 def shape(text):
     """Return what must be the same on every machine and in every run."""
-    for pattern, word in (
-        (CASTES, "CASTES"), (CASTES_JSON, "CASTES"), (NUMBER, "#"), (SPAN, "TIME"), (r" +", " "), (r"\[ ", "["),
-    ):  # fmt: skip
+    for pattern, word in REPLACED:
         text = re.sub(pattern, word, text)
     lines = [line.strip() for line in text.strip().splitlines()]
     return [line for k, line in enumerate(lines) if k == 0 or line != lines[k - 1]]

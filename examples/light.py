@@ -31,7 +31,7 @@ from annotated_types import Ge, Gt, Le
 
 from conevo import Layout, Rollout, Scores, method
 from conevo.controllers import ControllerSpec
-from conevo.kernels.network import Networks, networks_of, sigmoid
+from conevo.kernels.network import Networks, sigmoid
 from conevo.kernels.random import uniform
 from conevo.rng import fold, stream
 from conevo.worlds.protocol import Simulation
@@ -92,48 +92,6 @@ class Team:
     counts: wp.array[int]  # [R, A]
     switches: wp.array[int]
     performance: wp.array[float]
-
-
-@wp.func
-def floats(a: wp.array[float], b: int, n: int) -> wp.array[float]:
-    """Return part ``b`` of an array that holds ``n`` equal parts."""
-    size = a.shape[0] // n
-    return wp.array(ptr=a.ptr + wp.uint64(b) * wp.uint64(4 * size), shape=(size,), dtype=float)
-
-
-@wp.func
-def ints(a: wp.array[int], b: int, n: int) -> wp.array[int]:
-    """Return part ``b`` of an array that holds ``n`` equal parts."""
-    size = a.shape[0] // n
-    return wp.array(ptr=a.ptr + wp.uint64(b) * wp.uint64(4 * size), shape=(size,), dtype=int)
-
-
-@wp.func
-def view(batch: Team, b: int, n: int) -> Team:
-    """Return team ``b`` of a batch of ``n``."""
-    team = Team()
-    team.nets = networks_of(batch.nets, b, n)
-    team.x = floats(batch.x, b, n)
-    team.y = floats(batch.y, b, n)
-    team.action = ints(batch.action, b, n)
-    team.chosen = ints(batch.chosen, b, n)
-    team.heuristic = ints(batch.heuristic, b, n)
-    team.fitness = floats(batch.fitness, b, n)
-    team.counts = ints(batch.counts, b, n)
-    team.switches = ints(batch.switches, b, n)
-    team.performance = floats(batch.performance, b, n)
-    return team
-
-
-@wp.func
-def view_scene(scenes: Scene, e: int, n: int) -> Scene:
-    """Return scenario ``e`` of ``n``."""
-    scene = Scene()
-    scene.start_x = floats(scenes.start_x, e, n)
-    scene.start_y = floats(scenes.start_y, e, n)
-    scene.light = floats(scenes.light, e, n)
-    scene.seed = wp.array(ptr=scenes.seed.ptr + wp.uint64(8 * e), shape=(1,), dtype=wp.uint64)
-    return scene
 
 
 # --- one iteration --------------------------------------------------------------------------------
@@ -201,8 +159,6 @@ def outcome(team: Team, scene: Scene, p: Params, t_end: int) -> None:
 
 
 FUNCTIONS = {
-    "view": view,
-    "view_scene": view_scene,
     "reset": reset,
     "sense": sense,
     "act": act,

@@ -84,7 +84,7 @@ def view_of(struct: Any) -> Any:
                 f"    {name}_size = batch.{name}.shape[0] // n",
                 f"    {name}_at = wp.uint64(index) * wp.uint64({name}_size * {size})",
                 f"    part.{name} = wp.array(",
-                f"        ptr=batch.{name}.ptr + {name}_at, shape=({name}_size,), dtype={name}_type",
+                f"        ptr=batch.{name}.ptr + {name}_at, shape=({name}_size,), dtype={name}_type"
                 "    )",
             ]
         elif isinstance(kind, type(struct)):
