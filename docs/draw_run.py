@@ -57,8 +57,7 @@ def replay(run, scenario):
     scene = world.scenarios([fold(run.config.run.seed, "test", scenario)])
     genes, teams = run.champion.as_trial()
     seen = rollout.record(genes, teams[0], scene)
-    # Recorded arrays have one element per robot; the rocks' are read where they were left.
-    detected = rollout._batch(1).state.detected.numpy()[: scene.rock_x.shape[1]] < 2**31 - 1
+    detected = seen["detected"] < 2**31 - 1
     outcome = rollout.evaluate(genes, teams, scene)
     s = degree(outcome.switches[0, 0], outcome.counts[0, 0])
     castes = [

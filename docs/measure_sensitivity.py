@@ -254,6 +254,7 @@ def grid(rows: list[Row], cell: Any, corner: str, kinds: list[str]) -> str:
 
 def ratio_cell(measured: str) -> Any:
     """Return how a ratio is written: bold if further than three standard errors from 1."""
+    digits = 2 if measured == "value" else 3
 
     def cell(row: Row) -> str:
         if row["identical"]:
@@ -261,7 +262,9 @@ def ratio_cell(measured: str) -> Any:
         value, se = row[f"{measured}_ratio"], row[f"{measured}_ratio_se"]
         if np.isnan(value):
             return "-"
-        text = f"{value:.2f} ± {se:.2f}"
+        if value == 1 and se == 0:
+            return "same value" if measured == "value" else "same area"
+        text = f"{value:.{digits}f} ± {se:.{digits}f}"
         return f"**{text}**" if abs(value - 1) > 3 * se else text
 
     return cell

@@ -99,6 +99,8 @@ def test_record_equals_evaluate_bit_for_bit(some_world):
         n_inputs = some_world.controller.n_inputs
         assert seen["inputs"].shape == (ITERATIONS, some_world.n_robots, n_inputs)
         assert seen["fitness"][-1].tobytes() == out.fitness[n, 0].tobytes()
+        for name in some_world.simulation().recorded_at_end:
+            assert seen[name].shape == (some_world.simulation().sizes[name],)
         for a in range(len(some_world.actions)):
             assert np.array_equal((seen["action"] == a).sum(axis=0), out.counts[n, 0, :, a])
 

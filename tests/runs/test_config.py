@@ -26,11 +26,12 @@ def test_every_preset_resolves_for_every_world_and_method(
 
 
 def test_thesis_preset_has_the_sizes_of_the_thesis() -> None:
-    sizes = {name: resolve(TASK, name, "thesis").method_config.genotypes for name in METHODS}
-    assert sizes == {
+    sizes = {
         "homcne": 10_000, "hetcne": 10_000, "ccga": 500, "mesp": 50,
         "cone": 50, "cone-1": 50, "cone-2": 50, "cone-3": 50,
     }  # fmt: skip
+    for name, size in sizes.items():
+        assert resolve(TASK, name, "thesis").method_config.genotypes == size
     run = resolve(TASK, "cone", "thesis").run
     assert (run.generations, run.epochs) == (250, 10)
 

@@ -87,7 +87,7 @@ class Pace:
 
 
 class Lines:
-    """One plain line per generation, at most one every ``pause`` seconds; first and last always."""
+    """One plain line per generation, at most one every ``pause`` seconds; the first always."""
 
     def __init__(self, run: Run, pause: float) -> None:
         self.pace, self.pause, self.next = Pace(run), pause, 0.0

@@ -291,10 +291,12 @@ def _read_preset(preset: str, world: str, method: str) -> Layer:
     worlds = tomllib.loads(source.read_text(encoding="utf-8"))
     name = world.rsplit("-v", 1)[0]
     if name not in worlds:
-        raise unknown_name("world", name, worlds, f"in preset {preset!r}")
+        raise UsageError(f"preset {preset!r} has no settings for world {name!r}")
     tables = dict(worlds[name])
     by_method = tables.pop("method", {})
     family = method.split("-")[0]
+    if not {family, method} & set(by_method):
+        raise UsageError(f"preset {preset!r} has no settings for method {method!r} in {name!r}")
     tables["method"] = by_method.get(family, {}) | by_method.get(method, {})
     return _as_layer(tables, f"in preset {preset!r}")
 

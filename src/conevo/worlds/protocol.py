@@ -39,7 +39,8 @@ class Simulation:
         over the scenarios, or of two and more dimensions if all scenarios share them.
     params_type, params: struct type of the parameters, and the parameters.
     functions: the phases of an epoch: reset, sense, act, commit, resolve, outcome.
-    recorded: state arrays of one element per robot that ``Rollout.record`` keeps.
+    recorded: state arrays of one element per robot that ``Rollout.record`` keeps, iteration by
+        iteration. recorded_at_end: state arrays of any size, kept at the end.
     """
 
     state: Any
@@ -49,10 +50,14 @@ class Simulation:
     params: Any
     functions: dict[str, Any]
     recorded: tuple[str, ...]
+    recorded_at_end: tuple[str, ...] = ()
 
 
 class World(Protocol):
-    """One environment of a task, with its parameters."""
+    """One environment of a task, with its parameters.
+
+    The dataclass of its parameters has a field ``iterations``; ``heuristics`` names at least one.
+    """
 
     name: ClassVar[str]
     actions: ClassVar[tuple[str, ...]]

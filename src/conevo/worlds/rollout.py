@@ -219,7 +219,8 @@ class Rollout:
             heuristic: [R] or None.
 
         Returns:
-            The world's recorded arrays, each [T, R], and ``inputs`` [T, R, sensors + context].
+            The world's recorded arrays, each [T, R], those it records at the end as they are, and
+            ``inputs`` [T, R, sensors + context].
         """
         if len(scenarios) != 1:
             raise ValueError(f"record takes one scenario, got {len(scenarios)}")
@@ -238,7 +239,11 @@ class Rollout:
                 values.append(getattr(batch.state, name).numpy()[:r].copy())
             first = batch.state.nets.inputs.numpy()[: r * n_inputs]
             inputs.append(first.reshape(r, n_inputs).copy())
-        return {name: np.stack(values) for name, values in (steps | {"inputs": inputs}).items()}
+        final = {n: getattr(batch.state, n).numpy() for n in self._simulation.recorded_at_end}
+        sizes = self._simulation.sizes
+        return {name: np.stack(values) for name, values in (steps | {"inputs": inputs}).items()} | {
+            name: values[: sizes[name]].copy() for name, values in final.items()
+        }
 
     def _checked(
         self,
@@ -271,11 +276,12 @@ class Rollout:
         for name in self._simulation.scene.vars:
             values = getattr(scenarios, name)
             is_shared = self._simulation.scene.vars[name].type.ndim > 1
-            setattr(scene, name, self._array(values if is_shared else values.reshape(-1)))
+            setattr(scene, name, self._array(values if is_shared else values.ravel()))
         return scene
 
     def _array(self, values: npt.NDArray[Any]) -> Any:
         dtype = wp.dtype_from_numpy(values.dtype)
+        values = np.ascontiguousarray(values)  # views are made from pointers: strides would be lost
         return wp.array(values, dtype=dtype, device=self.device, copy=self.device != "cpu")
 
     def _job(

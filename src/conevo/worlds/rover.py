@@ -244,4 +244,5 @@ class RoverWorld:
             params=params,
             functions=FUNCTIONS,
             recorded=("x", "y", "action", "setting", "energy", "covered", "value", "fitness"),
+            recorded_at_end=("detected",),
         )
