@@ -38,4 +38,4 @@ def unknown_name(kind: str, name: str, allowed: Iterable[str], where: str = "") 
     hint = f"; did you mean {near[0]!r}?" if near else ""
     place = f" {where}" if where else ""
     shown = ", ".join(names) if len(names) <= 40 else ", ".join(names[:40]) + ", ..."
-    return UsageError(f"unknown {kind} {name!r}{place}{hint} (known: {shown})")
+    return UsageError(f"unknown {kind} {name!r}{place}{hint} (known: {shown or 'none'})")

@@ -46,6 +46,7 @@ def carry_on(run: Run, threads: int | None, style: str) -> None:
     def remark(text: str) -> None:
         click.echo(f"conevo: note: {text}", err=True)
 
+    run.refuse_finished()
     advice = f"conevo resume {run.path}"
     try:
         with watching(run, style) as watch:

@@ -166,9 +166,9 @@ class Run:
             UsageError: finished, in use, made with other kernels, or no usable checkpoint.
             EnvironmentFailure: the machine refused; the run can be resumed when it no longer does.
         """
-        self._refuse_finished()
+        self.refuse_finished()
         with self._store.locked():
-            self._refuse_finished()
+            self.refuse_finished()
             lab = self._equip(threads)
             stopped_by = self._evolve(lab, watch, remark)
             champion, first = self._best_so_far(), self._store.load_team(0)
@@ -214,7 +214,8 @@ class Run:
             raise UsageError(f"{self.path} has lost its champion.npz: it cannot be resumed")
         return champion
 
-    def _refuse_finished(self) -> None:
+    def refuse_finished(self) -> None:
+        """Raise UsageError if there is nothing left to do."""
         if self._store.is_finished:
             raise UsageError(
                 f"{self.path} is finished; see it with 'conevo show {self.path}', or start another "
