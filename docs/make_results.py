@@ -2,7 +2,7 @@
 
     python docs/make_results.py RUNS_DIRECTORY docs/results/NAME
 
-writes ``NAME.csv`` (one row per run), ``NAME-curves.csv`` (every tenth part of each run),
+Runs are named METHOD-sSEED, or METHOD-WHAT-IS-DIFFERENT-sSEED. It writes ``NAME.csv`` (one row per run), ``NAME-curves.csv`` (every tenth part of each run),
 ``NAME.png`` (learning curves) and puts the table between the markers of ``NAME.md``. Needs
 matplotlib.
 """
@@ -38,9 +38,9 @@ def read_runs(folder: Path) -> list[tuple[Row, list[Row]]]:
         lines = (run / "generations.jsonl").read_text().splitlines()
         generations = [json.loads(line) for line in lines]
         champion, first = test["champion"], test["generation_0"]
-        label = config["run"]["method"]
-        if config["method"].get("evaluation") == "systematic":
-            label += " systematic"
+        method = config["run"]["method"]
+        label = " ".join(run.name.removeprefix(method).rsplit("-s", 1)[0].strip("-").split("-"))
+        label = f"{method} {label}".strip()
         row = {
             "run": run.name,
             "method": label,
