@@ -2,9 +2,9 @@
 
     python docs/make_results.py RUNS_DIRECTORY docs/results/NAME
 
-Runs are named METHOD-sSEED, or METHOD-WHAT-IS-DIFFERENT-sSEED. It writes ``NAME.csv`` (one row per
-run), ``NAME-curves.csv`` (every tenth part of each run) and ``NAME.png`` (learning curves), and puts
-the table between the markers of ``NAME.md``. Needs matplotlib.
+Runs are named METHOD-sSEED, or METHOD-WHAT-IS-DIFFERENT-sSEED. It writes ``NAME.csv`` (one row
+per run), ``NAME-curves.csv`` (every tenth part of each run) and ``NAME.png`` (learning curves),
+and puts the table between the markers of ``NAME.md``. Needs matplotlib.
 """
 
 from __future__ import annotations
