@@ -114,7 +114,7 @@ def test_no_module_is_named_for_leftovers() -> None:
 
 
 def test_no_pickle_and_no_global_random_state() -> None:
-    """HOUSE rules 4 and 5: data on disk is npz and JSON; randomness has an address."""
+    """House rules: data on disk is npz and JSON; randomness has an address."""
     forbidden = re.compile(
         r"^\s*(import|from) (pickle|cloudpickle|dill|joblib|random)\b"
         r"|allow_pickle=True|np\.random\.(seed|default_rng|rand)\b",
