@@ -147,13 +147,16 @@ def draw(points: list[Row], path: Path) -> None:
                 [p["value"] for p in one],
                 color=colour,
                 linestyle=styles[k % len(styles)],
-                marker="os^Dvx"[k % 6],
+                marker="os^DvxP"[k % 7],
                 markersize=4,
                 label=title(label) if one[0]["seed"] == min(p["seed"] for p in points) else None,
             )
+    axes.set_yscale("log")
+    axes.set_yticks([20, 50, 100, 200, 500, 1000], ["20", "50", "100", "200", "500", "1000"])
+    axes.minorticks_off()
     axes.set_xlabel("team evaluations")
     axes.set_ylabel("red rock value, fittest team of a generation\n(mean of a tenth of the run)")
-    axes.legend(frameon=False)
+    axes.legend(frameon=False, fontsize="small", loc="center left", bbox_to_anchor=(1.0, 0.5))
     axes.spines[["top", "right"]].set_visible(False)
     figure.savefig(path, dpi=130, metadata={"Software": None})
 
