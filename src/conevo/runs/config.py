@@ -68,9 +68,8 @@ class RunSettings:
         generations: the run ends after this many.
         epochs: simulated trials per team evaluation (q); all teams of a generation meet the same.
         fittest_epochs: simulated trials in which each generation's fittest team is evaluated once
-            more, and lesioned. Choice: as many as the thesis' q, and the same in all generations,
-            so that progress, the champion of a run and the size of controllers are not a matter of
-            lucky scenarios.
+            more. Choice: as many as the thesis' q, and the same in all generations, so that
+            progress and the champion of a run are not a matter of lucky scenarios.
         credit: "robot" gives each robot its own fitness as the world reports it (eq. 5.4, 6.8);
             "team" gives every robot the sum over the team (eq. 5.5).
         budget_evaluations: the run never spends more team evaluations than this; 0 is no limit.

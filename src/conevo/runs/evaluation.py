@@ -52,11 +52,11 @@ def make_evaluator(
 
     All trials of a generation meet the same ``epochs`` scenarios, addressed by seed, generation
     and epoch, so a score depends neither on the batch nor on when it is computed. The fittest teams
-    of all generations, and their lesions, meet the same ``fittest_epochs`` scenarios.
+    of all generations meet the same ``fittest_epochs`` scenarios.
     """
 
     def evaluate(trials: Trials) -> Evaluation:
-        if trials.phase in ("fittest", "lesion"):
+        if trials.phase == "fittest":
             keys = [fold(seed, "fittest", epoch) for epoch in range(fittest_epochs)]
         else:
             keys = [fold(seed, "epoch", trials.generation, epoch) for epoch in range(epochs)]

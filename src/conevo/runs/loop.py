@@ -54,8 +54,8 @@ def evolve_generations(
         finished = _run_generation(method, state, evaluate, actions, settings.budget_evaluations)
         if finished is None:
             return "budget"
-        began, (state, portrait, epochs) = state, finished
-        steps = (last["team_steps"] if last is not None else 0) + epochs * iterations
+        began, (state, portrait) = state, finished
+        steps = _team_steps(state, settings, iterations)
         last = _record(began, state, portrait, steps, time.perf_counter() - started)
         on_generation(state, last)
 
@@ -81,29 +81,32 @@ def check_budget(method: Method, state: State, budget: int) -> None:
 
 def _run_generation(
     method: Method, state: State, evaluate: Evaluate, actions: tuple[str, ...], budget: int
-) -> tuple[State, Portrait, int] | None:
-    """Return the state after one generation, its fittest team's portrait and the epochs played.
-
-    None if the budget cannot pay for it.
+) -> tuple[State, Portrait] | None:
+    """Return the state after one generation and its fittest team's portrait, None if unpayable.
 
     Choice: a phase that the budget cannot pay is not begun, and a generation that could not be
     finished does not count, so that a run never spends more than its budget.
     """
     generation = state.generation
     portrait: Portrait | None = None
-    epochs = 0
     while state.generation == generation:
         trials = method.ask(state)
         if budget and state.team_evaluations + len(trials.teams) > budget:
             return None
         evaluation = evaluate(trials)
-        epochs += evaluation.outcome.counts.shape[0] * evaluation.outcome.counts.shape[1]
         if trials.phase == "fittest":
             portrait = describe(evaluation.outcome, actions)
         state = method.tell(state, trials, evaluation.scores)
     if portrait is None:
         raise RuntimeError(f"{method.name} finished a generation without its fittest team")
-    return state, portrait, epochs
+    return state, portrait
+
+
+def _team_steps(state: State, settings: RunSettings, iterations: int) -> int:
+    """Return the team-steps so far; one evaluation of each generation is its fittest team's."""
+    others = int(state.team_evaluations) - state.generation
+    epochs = others * settings.epochs + state.generation * settings.fittest_epochs
+    return epochs * iterations
 
 
 def _record(
