@@ -89,7 +89,9 @@ def view_of(struct: Any) -> Any:
                 f"    {name}_size = batch.{name}.shape[0] // n",
                 f"    {name}_at = wp.uint64(index) * wp.uint64({name}_size * {size})",
                 f"    part.{name} = wp.array(",
-                f"        ptr=batch.{name}.ptr + {name}_at, shape=({name}_size,), dtype={name}_type"
+                f"        ptr=batch.{name}.ptr + {name}_at,",
+                f"        shape=({name}_size,),",
+                f"        dtype={name}_type,",
                 "    )",
             ]
         elif isinstance(kind, type(struct)):
@@ -118,7 +120,7 @@ def launch(
     n_threads: int = 1,
     lanes: int = 1,
 ) -> None:
-    """Run ``kernel`` for worlds 0..n_worlds-1; its last two arguments are set here.
+    """Run ``kernel`` for worlds 0..n_worlds-1; its last argument is set here.
 
     The kernel's arguments are ``inputs`` and ``first``, the first world of a slice. Worlds are
     independent, so neither the slicing nor the number of threads changes a result.
