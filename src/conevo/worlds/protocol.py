@@ -39,8 +39,8 @@ class Simulation:
         over the scenarios, or of two and more dimensions if all scenarios share them.
     params_type, params: struct type of the parameters, and the parameters.
     functions: the phases of an epoch: reset, sense, act, commit, resolve, outcome.
-    recorded: state arrays of one element per robot that ``Rollout.record`` keeps, iteration by
-        iteration. recorded_at_end: state arrays of any size, kept at the end.
+    recorded: state arrays that ``Rollout.record`` keeps, iteration by iteration.
+    recorded_at_end: state arrays that it keeps at the end.
     """
 
     state: Any

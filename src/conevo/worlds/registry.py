@@ -64,6 +64,26 @@ WORLDS: dict[str, WorldEntry] = {
             params_name="RoverParams",
             world_name="RoverWorld",
         ),
+        WorldEntry(
+            name="pursuit-v1",
+            title="Pursuit-evasion",
+            summary="2 to 6 Khepera predators immobilize one or two prey that are faster",
+            source="Nitschke 2009, chapter 4",
+            environments=tuple(f"team-{n}" for n in range(1, 11)),
+            module="conevo.worlds.pursuit",
+            params_name="PursuitParams",
+            world_name="PursuitWorld",
+        ),
+        WorldEntry(
+            name="prey-v1",
+            title="Prey shaping",
+            summary="one or two prey learn to run fast and straight without a collision",
+            source="Nitschke 2009, section 4.3",
+            environments=tuple(f"shaping-{n}" for n in range(1, 7)),
+            module="conevo.worlds.prey",
+            params_name="PreyParams",
+            world_name="PreyWorld",
+        ),
     )
 }
 

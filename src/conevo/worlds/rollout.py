@@ -219,8 +219,8 @@ class Rollout:
             heuristic: [R] or None.
 
         Returns:
-            The world's recorded arrays, each [T, R], those it records at the end as they are, and
-            ``inputs`` [T, R, sensors + context].
+            The world's recorded arrays, each [T, its size], those it records at the end as they
+            are, and ``inputs`` [T, R, sensors + context].
         """
         if len(scenarios) != 1:
             raise ValueError(f"record takes one scenario, got {len(scenarios)}")
@@ -231,16 +231,15 @@ class Rollout:
         job = self._job(genes, teams, modes, 1)
         steps: dict[str, list[npt.NDArray[Any]]] = {n: [] for n in self._simulation.recorded}
         inputs: list[npt.NDArray[Any]] = []
-        r, n_inputs = self.world.n_robots, self._shape.n_inputs
+        r, n_inputs, sizes = self.world.n_robots, self._shape.n_inputs, self._simulation.sizes
         for t in range(self.world.iterations):
             job.t_begin, job.t_end = t, t + 1
             self._launch(batch, scene, job, 1)
             for name, values in steps.items():
-                values.append(getattr(batch.state, name).numpy()[:r].copy())
+                values.append(getattr(batch.state, name).numpy()[: sizes[name]].copy())
             first = batch.state.nets.inputs.numpy()[: r * n_inputs]
             inputs.append(first.reshape(r, n_inputs).copy())
         final = {n: getattr(batch.state, n).numpy() for n in self._simulation.recorded_at_end}
-        sizes = self._simulation.sizes
         return {name: np.stack(values) for name, values in (steps | {"inputs": inputs}).items()} | {
             name: values[: sizes[name]].copy() for name, values in final.items()
         }

@@ -1,0 +1,210 @@
+"""The walled arena of predators and prey: its parameters, and scenarios drawn at random.
+
+Nitschke 2009, sections 4.1 to 4.3, table 4.1. Shared by ``worlds.pursuit`` and ``worlds.prey``.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+import numpy as np
+import numpy.typing as npt
+import warp as wp
+from annotated_types import Ge, Gt, Le
+
+from conevo.kernels.khepera import RADIUS
+from conevo.rng import stream
+from conevo.worlds.protocol import Simulation
+from conevo.worlds.pursuit_dynamics import N_ACTIONS, N_OBSTACLES, Params, Scene, Team
+
+__all__ = ["ArenaParams", "ArenaScenarios", "draw_scenarios", "simulate"]
+
+RECORDED = ("x", "y", "heading", "left", "right", "collided", "action", "fitness")
+
+
+@dataclass(frozen=True, kw_only=True)
+class ArenaParams:
+    """What both worlds have in common; lengths in cm, one iteration is 0.1 s.
+
+    Nitschke 2009, table 4.1, unless marked.
+
+    Attributes:
+        iterations: of an epoch (table 4.3).
+        arena_cm: side of the arena. Choice: a tenth of the printed 1000, in which robots of this
+            speed do not meet (docs/results/arena.md).
+        sensor_range_cm: of infrared and light sensors, from their place on the rim.
+        sensor_angle_deg: half angle of the cone a sensor sees. Choice: 30, so that the sensors
+            ahead overlap and a gap remains behind the shoulders, as on the real robot.
+        max_speed_cm: how far a predator drives in an iteration at most. Choice: 0.8, the 8 cm/s of
+            Khepera simulators. At 5 (0.5 m/s, the robot's own limit) bodies still cannot jump past
+            one another.
+        prey_speed: a prey's speed in predators' (section 4.1).
+    """
+
+    iterations: Annotated[int, Ge(2), Le(1_000_000)] = 1000
+    arena_cm: Annotated[float, Ge(60), Le(5000)] = 100.0
+    sensor_range_cm: Annotated[float, Gt(0), Le(200)] = 22.0
+    sensor_angle_deg: Annotated[float, Gt(0), Le(89)] = 30.0
+    max_speed_cm: Annotated[float, Gt(0), Le(5)] = 0.8
+    prey_speed: Annotated[float, Gt(0), Le(1.2)] = 1.2
+
+
+@dataclass(frozen=True)
+class ArenaScenarios:
+    """E scenarios: places in cm, headings in [-pi, pi). The team's R robots come first.
+
+    x, y, heading [E, B] float32; n_bodies [E] int32, the bodies beyond are absent; obstacle_x,
+    obstacle_y [E, 6] float32; n_obstacles [E] int32; prey_in [Q * H, 8], prey_out [Q * H, 2]
+    float32, weights of the prey's networks; clamp [R, S] float32, sensor inputs held at a value,
+    NaN where free; seed [E] uint64.
+    """
+
+    x: npt.NDArray[np.float32]
+    y: npt.NDArray[np.float32]
+    heading: npt.NDArray[np.float32]
+    n_bodies: npt.NDArray[np.int32]
+    obstacle_x: npt.NDArray[np.float32]
+    obstacle_y: npt.NDArray[np.float32]
+    n_obstacles: npt.NDArray[np.int32]
+    prey_in: npt.NDArray[np.float32]
+    prey_out: npt.NDArray[np.float32]
+    clamp: npt.NDArray[np.float32]
+    seed: npt.NDArray[np.uint64]
+
+    def __len__(self) -> int:
+        """Return the number of scenarios."""
+        return len(self.seed)
+
+
+def draw_scenarios(
+    keys: Sequence[int],
+    name: str,
+    arena_cm: float,
+    robots: int,
+    others: tuple[int, int],
+    obstacles: tuple[int, int],
+    *,
+    n_sensors: int,
+    prey: tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]] | None = None,
+) -> ArenaScenarios:
+    """Return one scenario per key: numbers of bodies, places and headings, all at random.
+
+    Args:
+        keys: of the scenarios.
+        name: of the world.
+        arena_cm: side of the arena.
+        robots: R, robots of the team.
+        others: least and most of the other bodies.
+        obstacles: least and most of the obstacles.
+        n_sensors: S.
+        prey: weights of the prey's networks, [Q * H, 8] and [Q * H, 2].
+    """
+    most = robots + others[1]
+    drawn = [_draw(stream(key, name), arena_cm, robots, others, obstacles) for key in keys]
+    stacked: dict[str, Any] = {k: np.stack([one[k] for one in drawn]) for k in drawn[0]}
+    places, n_bodies = stacked["places"], stacked["n_bodies"]
+    empty = np.zeros((1, 8), dtype=np.float32), np.zeros((1, 2), dtype=np.float32)
+    prey_in, prey_out = prey or empty
+    return ArenaScenarios(
+        x=places[:, :most, 0],
+        y=places[:, :most, 1],
+        heading=stacked["heading"],
+        n_bodies=n_bodies,
+        obstacle_x=places[:, most:, 0],
+        obstacle_y=places[:, most:, 1],
+        n_obstacles=stacked["n_obstacles"],
+        prey_in=prey_in,
+        prey_out=prey_out,
+        clamp=np.full((robots, n_sensors), np.nan, dtype=np.float32),
+        seed=np.array(keys, dtype=np.uint64),
+    )
+
+
+def _draw(
+    rng: np.random.Generator,
+    arena_cm: float,
+    robots: int,
+    others: tuple[int, int],
+    obstacles: tuple[int, int],
+) -> dict[str, Any]:
+    """Draw one scenario; ``places`` holds all bodies and obstacles, absent ones at 0."""
+    most = robots + others[1]
+    n_bodies = robots + rng.integers(others[0], others[1], endpoint=True, dtype=np.int32)
+    n_obstacles = rng.integers(obstacles[0], obstacles[1], endpoint=True, dtype=np.int32)
+    places = np.zeros((most + int(N_OBSTACLES), 2), dtype=np.float32)
+    taken: list[npt.NDArray[np.float64]] = []
+    for at in (*range(n_bodies), *range(most, most + n_obstacles)):
+        taken.append(_free_place(rng, arena_cm, taken))
+        places[at] = taken[-1]
+    heading = rng.uniform(-math.pi, math.pi, most).astype(np.float32)
+    return {
+        "places": places,
+        "heading": heading,
+        "n_bodies": n_bodies,
+        "n_obstacles": np.int32(n_obstacles),
+    }
+
+
+def _free_place(
+    rng: np.random.Generator, arena_cm: float, taken: list[npt.NDArray[np.float64]]
+) -> npt.NDArray[np.float64]:
+    """Draw a place for a body, a little away from walls and from all places taken."""
+    margin = 0.01  # more than float32 rounds in the largest arena
+    edge = float(RADIUS) + margin
+    while True:
+        place = rng.uniform(edge, arena_cm - edge, 2)
+        if all(math.dist(place, other) >= 2 * float(RADIUS) + margin for other in taken):
+            return place
+
+
+def simulate(
+    params: ArenaParams,
+    functions: dict[str, Any],
+    *,
+    robots: int,
+    bodies: int,
+    team_is_prey: bool,
+    performance: int,
+    prey_mode: int = 0,
+    prey_hidden: int = 0,
+    window: int = 1,
+    moved_share: float = 0.0,
+    moved_least: float = 0.0,
+    n_captors: int = 0,
+) -> Simulation:
+    """Return the Warp side of a world of predators and prey; see ``pursuit_dynamics.Params``."""
+    p = Params()
+    p.n_robots = robots
+    p.team_is_prey = int(team_is_prey)
+    p.arena = params.arena_cm
+    p.reach = params.sensor_range_cm
+    angle = math.radians(params.sensor_angle_deg)
+    p.cone = wp.vec2f(math.cos(angle), math.sin(angle))
+    p.speed = params.max_speed_cm
+    p.prey_speed = params.max_speed_cm * params.prey_speed
+    p.prey_mode, p.prey_hidden = prey_mode, prey_hidden
+    p.window, p.moved_share, p.moved_least = window, moved_share, moved_least
+    p.n_captors = n_captors
+    prey = 1 if team_is_prey else bodies - robots
+    per_body = (
+        "x y heading to_x to_y to_heading left right refused collided collisions "
+        "wander known known_x known_y"
+    ).split()
+    sizes = (
+        dict.fromkeys(per_body, bodies)
+        | dict.fromkeys(("heuristic", "action", "fitness", "switches"), robots)
+        | dict.fromkeys(("captured", "captures"), prey)
+        | dict.fromkeys(("moved", "commanded"), prey * window)
+        | {"infrared": bodies * 8, "counts": robots * int(N_ACTIONS), "first": 1}
+        | {"performance": performance}
+    )
+    return Simulation(
+        state=Team,
+        sizes=sizes,
+        scene=Scene,
+        params_type=Params,
+        params=p,
+        functions=functions,
+        recorded=RECORDED if team_is_prey else (*RECORDED, "captured"),
+    )

@@ -1,0 +1,135 @@
+"""Prey shaping: a prey learns to run fast and straight without running into anything.
+
+=============  =========================================================================
+name           ``prey-v1``
+source         Nitschke 2009, section 4.3
+environments   ``shaping-1``: 2 to 6 obstacles; ``shaping-2``: 2 to 6 heuristic predators;
+               ``shaping-3``: both; ``shaping-4..6``: the same with two prey
+robots         one or two prey
+epoch          1000 iterations of 0.1 s
+sensors        8 infrared
+actions        stop, forward, left, right, reverse (motor primitives)
+controller     8-5-2 feed-forward network
+performance    ``path`` in cm, see below; ``collided``, share of the prey that did
+=============  =========================================================================
+
+**Fitness.** The way a prey has come, the straighter the more: the sum over iterations of the
+distance driven times 1 - sqrt(half the difference of its wheel commands). A prey whose own move is
+refused has collided: its fitness is 0 and its epoch is over; it stays as a body.
+
+The rules of motion, sensing and collisions are those of ``worlds.pursuit``; the predators are its
+heuristic predators. Experiments 1 to 6 in turn, each beginning with the populations of the one
+before, are ``conevo shape-prey``.
+
+Choice: a predator that runs into a prey is refused like any move; that is no collision of the prey.
+
+Version history:
+
+- v1: first version.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Annotated, ClassVar
+
+from annotated_types import Ge, Le
+
+from conevo.controllers import ControllerSpec
+from conevo.errors import UsageError
+from conevo.worlds.arena import ArenaParams, ArenaScenarios, draw_scenarios, simulate
+from conevo.worlds.protocol import Simulation
+from conevo.worlds.pursuit_dynamics import ACTIONS, PREY_FUNCTIONS
+
+__all__ = ["PreyParams", "PreyWorld"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class PreyParams(ArenaParams):
+    """Parameters of the world, beside those of the arena.
+
+    Attributes:
+        least: of the obstacles and of the predators of an epoch (section 4.3).
+        most: of the same.
+        n_hidden: hidden units at the start (section 4.1).
+        max_hidden: hidden units at most. Choice: twice the initial number.
+    """
+
+    least: Annotated[int, Ge(0), Le(6)] = 2
+    most: Annotated[int, Ge(0), Le(6)] = 6
+    n_hidden: Annotated[int, Ge(2), Le(16)] = 5
+    max_hidden: Annotated[int, Ge(2), Le(32)] = 10
+
+    def __post_init__(self) -> None:
+        for low, high in (("n_hidden", "max_hidden"), ("least", "most")):
+            if getattr(self, high) < getattr(self, low):
+                raise UsageError(
+                    f"world.{high} ({getattr(self, high)}) must not be below {low} "
+                    f"({getattr(self, low)})"
+                )
+
+
+@dataclass(frozen=True)
+class PreyWorld:
+    """One shaping experiment."""
+
+    environment: str
+    params: PreyParams = field(default_factory=PreyParams)
+
+    name: ClassVar[str] = "prey-v1"
+    actions: ClassVar[tuple[str, ...]] = ACTIONS
+    performance: ClassVar[tuple[str, ...]] = ("path", "collided")
+    heuristics: ClassVar[tuple[str, ...]] = ("heuristic", "random")
+
+    @property
+    def experiment(self) -> int:
+        """Number of the shaping experiment, from 1."""
+        return int(self.environment.rpartition("-")[2])
+
+    @property
+    def n_robots(self) -> int:
+        """Number of prey."""
+        return 1 + (self.experiment - 1) // 3
+
+    @property
+    def iterations(self) -> int:
+        """Iterations of one epoch."""
+        return self.params.iterations
+
+    @property
+    def controller(self) -> ControllerSpec:
+        """The prey's network (fig. 4.2)."""
+        return ControllerSpec(
+            n_sensors=8,
+            n_hidden=self.params.n_hidden,
+            n_outputs=2,
+            max_hidden=self.params.max_hidden,
+            recurrent=False,
+        )
+
+    @property
+    def _predators(self) -> tuple[int, int]:
+        return (0, 0) if self.experiment % 3 == 1 else (self.params.least, self.params.most)
+
+    def scenarios(self, keys: Sequence[int]) -> ArenaScenarios:
+        """Return one scenario per key: random numbers, places and headings."""
+        has_obstacles = self.experiment % 3 != 2
+        return draw_scenarios(
+            keys,
+            self.name,
+            self.params.arena_cm,
+            self.n_robots,
+            self._predators,
+            (self.params.least, self.params.most) if has_obstacles else (0, 0),
+            n_sensors=8,
+        )
+
+    def simulation(self) -> Simulation:
+        """Return the Warp side of this world."""
+        return simulate(
+            self.params,
+            PREY_FUNCTIONS,
+            robots=self.n_robots,
+            bodies=self.n_robots + self._predators[1],
+            team_is_prey=True,
+            performance=len(self.performance),
+        )

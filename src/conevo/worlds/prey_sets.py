@@ -1,0 +1,126 @@
+"""Evolved prey as data: the networks of one prey and of two, with the command that made them.
+
+Nitschke 2009, section 4.3: the fittest controllers of shaping experiments 3 (one prey) and 6 (two
+prey) are the opponents of the pursuit-evasion experiments. A prey set is one npz file.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+from dataclasses import dataclass, field
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from conevo.errors import EnvironmentFailure, UsageError
+
+__all__ = ["PreySet", "digest", "load", "save"]
+
+FORMAT = "conevo prey set 1"
+SHIPPED = "prey-v1.npz"
+N_GENES = 10  # eight sensors, two wheels (fig. 4.2)
+
+
+@dataclass(frozen=True)
+class PreySet:
+    """Neuron genotypes of prey controllers, in [-1, 1].
+
+    Attributes:
+        one: [1, U, G] float32, the prey that evolved alone.
+        one_active: [1, U] bool, whether a slot holds a neuron.
+        two: [2, U, G] float32, the two that evolved together.
+        two_active: [2, U] bool.
+        about: the command, seed and versions that made them.
+    """
+
+    one: npt.NDArray[np.float32]
+    one_active: npt.NDArray[np.bool_]
+    two: npt.NDArray[np.float32]
+    two_active: npt.NDArray[np.bool_]
+    about: dict[str, Any] = field(default_factory=dict)
+
+    def weights(
+        self, n_prey: int, scale: float
+    ) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]:
+        """Return input weights [Q * U, 8] and output weights [Q * U, 2]; empty slots are zero.
+
+        Args:
+            n_prey: Q, one or two.
+            scale: weight of gene 1.
+        """
+        genes, active = (self.one, self.one_active) if n_prey == 1 else (self.two, self.two_active)
+        scaled = np.where(active[..., None], genes, 0) * np.float32(scale)
+        flat = scaled.reshape(-1, N_GENES).astype(np.float32)
+        return flat[:, :8].copy(), flat[:, 8:].copy()
+
+
+def save(path: Path, prey: PreySet) -> None:
+    """Write a prey set; the same set always gives the same bytes.
+
+    Raises:
+        EnvironmentFailure: the file cannot be written.
+    """
+    about = json.dumps({"format": FORMAT} | prey.about, sort_keys=True).encode()
+    buffer = io.BytesIO()
+    np.savez(
+        buffer,
+        allow_pickle=False,
+        about=np.frombuffer(about, dtype=np.uint8),
+        one=prey.one,
+        one_active=prey.one_active,
+        two=prey.two,
+        two_active=prey.two_active,
+    )
+    try:
+        path.write_bytes(buffer.getvalue())
+    except OSError as error:
+        raise EnvironmentFailure(f"cannot write {path}: {error.strerror}") from error
+
+
+def load(path: str | Path | None = None) -> PreySet:
+    """Return a prey set, by default the one that is shipped.
+
+    Raises:
+        UsageError: the file cannot be read, or is no prey set.
+    """
+    data = _read(path)
+    try:
+        with np.load(io.BytesIO(data), allow_pickle=False) as archive:
+            arrays = {name: archive[name] for name in archive.files}
+        about = json.loads(arrays.pop("about").tobytes())
+        if about.pop("format") != FORMAT:
+            raise ValueError("another format")
+        prey = PreySet(**arrays, about=about)
+        for n, genes, active in ((1, prey.one, prey.one_active), (2, prey.two, prey.two_active)):
+            if genes.shape != (n, *active.shape[1:], N_GENES) or active.shape[0] != n:
+                raise ValueError(f"wrong shape {genes.shape}")
+            if genes.dtype != np.float32 or active.dtype != np.bool_ or not active.any(1).all():
+                raise ValueError("wrong content")
+            if not (np.abs(genes) <= 1).all():
+                raise ValueError("genes outside [-1, 1]")
+    except Exception as error:  # whatever a damaged file makes its readers say
+        raise UsageError(f"{path} is damaged or no prey set ({error})") from error
+    return prey
+
+
+def digest(path: str | Path) -> str:
+    """Return twelve hex digits of a file's content.
+
+    Raises:
+        UsageError: the file cannot be read.
+    """
+    return hashlib.blake2b(_read(path), digest_size=6).hexdigest()
+
+
+def _read(path: str | Path | None) -> bytes:
+    if path is None:
+        return (resources.files(__package__) / "data" / SHIPPED).read_bytes()
+    try:
+        return Path(path).read_bytes()
+    except OSError as error:
+        raise UsageError(f"cannot read prey file {str(path)!r}: {error.strerror}") from error

@@ -1,0 +1,192 @@
+"""Pursuit-evasion: Khepera predators capture prey that are faster than they are.
+
+=============  =========================================================================
+name           ``pursuit-v1``
+source         Nitschke 2009, chapter 4, appendix B
+environments   ``team-1..10`` (table 4.2): 2, 3, 4, 5, 6 predators and one prey, then two
+robots         2 to 6 predators; the prey are opponents with controllers of their own
+epoch          1000 iterations of 0.1 s
+sensors        8 infrared (everything), 8 light (prey only)
+actions        stop, forward, left, right, reverse: motor primitives, see below
+controller     22-6-2 simple recurrent network (16 sensors, 6 context units)
+performance    ``capture_time`` in iterations; ``first_capture``, its iteration (or the
+               epoch's length); ``captures``, how often; ``collisions`` of the predators
+=============  =========================================================================
+
+**Capture.** A prey is captured in an iteration if it is immobilized and at least two predators are
+within light range of it. It is immobilized if it moved less than a tenth of what its wheels
+commanded over the last ten iterations, or less than 0.2 cm. The fitness of every predator is the
+number of iterations in which a prey is captured (section 4.4).
+
+**One iteration.** Every body senses, thinks and sets its wheels where all were at the end of the
+iteration before; then all move along exact arcs. A move into a wall, an obstacle or another body is
+refused: the old pose is kept.
+
+Choices, all declared in ``PursuitParams``, ``ArenaParams`` or here:
+
+- Choice: with two prey, capture time counts iterations in which at least one is captured.
+- Choice: "moved" and "commanded" are lengths of way, not distances between places: a prey that runs
+  in a tight circle is not immobilized, one that is refused every move is. Nothing is captured
+  before a whole window has passed.
+- Choice: within light range means that the gap between the rims is at most the range, whichever way
+  the predator looks.
+- Choice: MO-0 is the left wheel, MO-1 the right.
+
+Version history:
+
+- v1: first version.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, ClassVar
+
+from annotated_types import Ge, Gt, Le
+
+from conevo.controllers import ControllerSpec
+from conevo.errors import UsageError, unknown_name
+from conevo.worlds import prey_sets
+from conevo.worlds.arena import ArenaParams, ArenaScenarios, draw_scenarios, simulate
+from conevo.worlds.protocol import Simulation
+from conevo.worlds.pursuit_dynamics import ACTIONS, PURSUIT_FUNCTIONS
+
+__all__ = ["PursuitParams", "PursuitWorld"]
+
+PREY_MODES = {"shaped": 0, "heuristic": 1, "random": 2}  # a file's prey are controlled as shaped
+
+
+@dataclass(frozen=True, kw_only=True)
+class PursuitParams(ArenaParams):
+    """Parameters of the world, beside those of the arena.
+
+    Attributes:
+        prey: "shaped" (the evolved prey that are shipped), "heuristic", "random", or a file that
+            ``conevo shape-prey`` made.
+        prey_digest: of the content of a prey file; filled in, and checked when it is given.
+        n_obstacles: cylinders in the arena. The thesis has them when prey are shaped only.
+        capture_window: iterations over which a prey must hardly have moved. Choice: 10, one second.
+        capture_share: less than this share of what its wheels commanded. Choice: a tenth.
+        capture_distance_cm: or less than this. Choice: 0.2.
+        capture_predators: how many predators must be in light range (section 4.1: two).
+        n_hidden: hidden units at the start (section 4.1).
+        max_hidden: hidden units at most. Choice: twice the initial number.
+    """
+
+    prey: str = "shaped"
+    prey_digest: str = ""
+    n_obstacles: Annotated[int, Ge(0), Le(6)] = 0
+    capture_window: Annotated[int, Ge(1), Le(1000)] = 10
+    capture_share: Annotated[float, Ge(0), Le(1)] = 0.1
+    capture_distance_cm: Annotated[float, Ge(0), Le(100)] = 0.2
+    capture_predators: Annotated[int, Ge(1), Le(6)] = 2
+    n_hidden: Annotated[int, Ge(2), Le(16)] = 6
+    max_hidden: Annotated[int, Gt(0), Le(32)] = 12
+
+    def __post_init__(self) -> None:
+        if self.max_hidden < self.n_hidden:
+            raise UsageError(
+                f"world.max_hidden ({self.max_hidden}) must not be below n_hidden ({self.n_hidden})"
+            )
+        if self.prey in PREY_MODES:
+            if self.prey_digest:
+                raise UsageError(f"world.prey_digest belongs to a prey file, not to {self.prey!r}")
+            return
+        path = Path(self.prey)
+        if not path.exists() and path.name == self.prey and not path.suffix:
+            raise unknown_name("prey", self.prey, PREY_MODES, "(and no such file)")
+        found = prey_sets.digest(path)
+        prey_sets.load(path)
+        if self.prey_digest not in ("", found):
+            raise UsageError(
+                f"prey file {self.prey!r} has changed: its digest is {found}, not "
+                f"{self.prey_digest}"
+            )
+        object.__setattr__(self, "prey", str(path.resolve()))
+        object.__setattr__(self, "prey_digest", found)
+
+
+@dataclass(frozen=True)
+class PursuitWorld:
+    """One team type of the pursuit-evasion task."""
+
+    environment: str
+    params: PursuitParams = field(default_factory=PursuitParams)
+
+    name: ClassVar[str] = "pursuit-v1"
+    actions: ClassVar[tuple[str, ...]] = ACTIONS
+    performance: ClassVar[tuple[str, ...]] = (
+        "capture_time",
+        "first_capture",
+        "captures",
+        "collisions",
+    )
+    heuristics: ClassVar[tuple[str, ...]] = ("heuristic",)
+
+    @property
+    def team_type(self) -> int:
+        """Number of the team type, from 1 (table 4.2)."""
+        return int(self.environment.rpartition("-")[2])
+
+    @property
+    def n_robots(self) -> int:
+        """Number of predators."""
+        return 2 + (self.team_type - 1) % 5
+
+    @property
+    def n_prey(self) -> int:
+        """Number of prey."""
+        return 1 + (self.team_type - 1) // 5
+
+    @property
+    def iterations(self) -> int:
+        """Iterations of one epoch."""
+        return self.params.iterations
+
+    @property
+    def controller(self) -> ControllerSpec:
+        """The predator's network (fig. 4.3)."""
+        return ControllerSpec(
+            n_sensors=16,
+            n_hidden=self.params.n_hidden,
+            n_outputs=2,
+            max_hidden=self.params.max_hidden,
+        )
+
+    def scenarios(self, keys: Sequence[int]) -> ArenaScenarios:
+        """Return one scenario per key: random places and headings."""
+        obstacles = self.params.n_obstacles
+        return draw_scenarios(
+            keys,
+            self.name,
+            self.params.arena_cm,
+            self.n_robots,
+            (self.n_prey, self.n_prey),
+            (obstacles, obstacles),
+            n_sensors=16,
+            prey=self._prey().weights(self.n_prey, self.controller.weight_scale)
+            if PREY_MODES.get(self.params.prey, 0) == 0
+            else None,
+        )
+
+    def simulation(self) -> Simulation:
+        """Return the Warp side of this world."""
+        p = self.params
+        mode = PREY_MODES.get(p.prey, 0)
+        return simulate(
+            p,
+            PURSUIT_FUNCTIONS,
+            robots=self.n_robots,
+            bodies=self.n_robots + self.n_prey,
+            team_is_prey=False,
+            performance=len(self.performance),
+            prey_mode=mode,
+            prey_hidden=self._prey().one.shape[1] if mode == 0 else 0,
+            window=p.capture_window,
+            moved_share=p.capture_share,
+            moved_least=p.capture_distance_cm,
+            n_captors=p.capture_predators,
+        )
+
+    def _prey(self) -> prey_sets.PreySet:
+        return prey_sets.load(None if self.params.prey == "shaped" else self.params.prey)
