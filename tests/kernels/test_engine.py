@@ -13,14 +13,14 @@ import warp as wp
 import conevo
 from conevo.errors import EnvironmentFailure
 from conevo.kernels import engine
-from conevo.worlds.registry import world
+from conevo.worlds.registry import WORLDS, world
 from conevo.worlds.rollout import Rollout, episode_kernel
 
 PACKAGE = Path(conevo.__file__).parent
 PLAY = """
 import json, sys
 import numpy as np
-from conevo.worlds.registry import world
+from conevo.worlds.registry import WORLDS, world
 from conevo.worlds.rollout import Rollout
 
 task = world("rover/complex-5", n_robots=6, iterations=30)
@@ -106,9 +106,14 @@ def test_edits_that_matter_change_what_is_computed(tmp_path):
     assert play(source, cache)["seen"]["energy"] > 900 * 6 * 30
 
 
-def test_the_cuda_form_compiles_for_sm_90_without_a_device(tmp_path):
+def first_environment(entry):
+    return world(f"{entry.name}/{entry.environments[0]}", iterations=200)
+
+
+@pytest.mark.parametrize("entry", WORLDS.values(), ids=WORLDS)
+def test_the_cuda_form_compiles_for_sm_90_without_a_device(entry, tmp_path):
     engine.start()
-    kernel = episode_kernel(world("rover/complex-1").simulation())
+    kernel = episode_kernel(first_environment(entry).simulation())
     files = wp.compile_aot_module(kernel.module, arch=90, module_dir=tmp_path)
     assert [f.suffixes[-2:] for f in files] == [[".sm90", ".cubin"]]
     assert files[0].read_bytes()[:4] == b"\x7fELF"
@@ -117,10 +122,11 @@ def test_the_cuda_form_compiles_for_sm_90_without_a_device(tmp_path):
 
 @pytest.mark.cuda
 @pytest.mark.skipif(not wp.is_cuda_available(), reason="no CUDA device on this machine")
-def test_a_cuda_device_gives_the_bits_of_the_cpu():
+@pytest.mark.parametrize("entry", WORLDS.values(), ids=WORLDS)
+def test_a_cuda_device_gives_the_bits_of_the_cpu(entry):
     from contracts.test_worlds import assert_same_bits, keys, random_teams
 
-    task = world("rover/complex-5", iterations=200)
+    task = first_environment(entry)
     genes, teams = random_teams(task, 8)
     scenarios = task.scenarios(keys(2))
     assert_same_bits(
@@ -138,5 +144,8 @@ def test_a_missing_cuda_device_is_one_clear_line():
 def test_kernel_hash_is_the_same_for_all_environments_and_sizes_of_a_world():
     one = Rollout(world("rover/complex-1")).kernel_hash
     assert Rollout(world("rover/simple-10", n_robots=3, n_hidden=4)).kernel_hash == one
+    two = Rollout(world("pursuit/team-1")).kernel_hash
+    assert Rollout(world("pursuit/team-10", prey="random", arena_cm=1000.0)).kernel_hash == two
+    assert one != two
     assert len(one) == 16
     assert int(one, 16) > 0

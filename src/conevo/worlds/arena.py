@@ -104,8 +104,8 @@ def draw_scenarios(
     drawn = [_draw(stream(key, name), arena_cm, robots, others, obstacles) for key in keys]
     stacked: dict[str, Any] = {k: np.stack([one[k] for one in drawn]) for k in drawn[0]}
     places, n_bodies = stacked["places"], stacked["n_bodies"]
-    empty = np.zeros((1, 8), dtype=np.float32), np.zeros((1, 2), dtype=np.float32)
-    prey_in, prey_out = prey or empty
+    nobody = np.zeros((0, 8), dtype=np.float32), np.zeros((0, 2), dtype=np.float32)
+    prey_in, prey_out = prey or nobody
     return ArenaScenarios(
         x=places[:, :most, 0],
         y=places[:, :most, 1],

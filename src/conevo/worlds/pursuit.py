@@ -42,6 +42,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, ClassVar
 
+import numpy as np
+import numpy.typing as npt
 from annotated_types import Ge, Gt, Le
 
 from conevo.controllers import ControllerSpec
@@ -164,15 +166,12 @@ class PursuitWorld:
             (self.n_prey, self.n_prey),
             (obstacles, obstacles),
             n_sensors=16,
-            prey=self._prey().weights(self.n_prey, self.controller.weight_scale)
-            if PREY_MODES.get(self.params.prey, 0) == 0
-            else None,
+            prey=self._prey_weights(),
         )
 
     def simulation(self) -> Simulation:
         """Return the Warp side of this world."""
         p = self.params
-        mode = PREY_MODES.get(p.prey, 0)
         return simulate(
             p,
             PURSUIT_FUNCTIONS,
@@ -180,13 +179,17 @@ class PursuitWorld:
             bodies=self.n_robots + self.n_prey,
             team_is_prey=False,
             performance=len(self.performance),
-            prey_mode=mode,
-            prey_hidden=self._prey().one.shape[1] if mode == 0 else 0,
+            prey_mode=PREY_MODES.get(p.prey, 0),
+            prey_hidden=len(self._prey_weights()[0]) // self.n_prey,
             window=p.capture_window,
             moved_share=p.capture_share,
             moved_least=p.capture_distance_cm,
             n_captors=p.capture_predators,
         )
 
-    def _prey(self) -> prey_sets.PreySet:
-        return prey_sets.load(None if self.params.prey == "shaped" else self.params.prey)
+    def _prey_weights(self) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]:
+        """Return the weights of the prey's networks, of no hidden units if they have none."""
+        if PREY_MODES.get(self.params.prey, 0) != 0:
+            return np.zeros((0, 8), dtype=np.float32), np.zeros((0, 2), dtype=np.float32)
+        found = prey_sets.load(None if self.params.prey == "shaped" else self.params.prey)
+        return found.weights(self.n_prey, self.controller.weight_scale)

@@ -13,7 +13,6 @@ from conevo.kernels.khepera import (
     RADIUS,
     drive,
     eight,
-    heading_to,
     see_disc,
     see_wall,
     steer,
@@ -132,7 +131,7 @@ def wheel_speed(p: Params, b: int) -> float:
 def reset(team: Team, scene: Scene, p: Params, i: int) -> None:
     """Put robot ``i`` and the bodies it looks after at their places and clear their records."""
     b = int(i)
-    while b < scene.n_bodies[0]:
+    while b < team.x.shape[0]:  # absent bodies too: nothing of another team is left in a record
         team.x[b] = scene.x[b]
         team.y[b] = scene.y[b]
         team.heading[b] = scene.heading[b]
@@ -273,7 +272,7 @@ def pursue(team: Team, scene: Scene, p: Params, b: int, t: int) -> wp.vec2f:
         team.known[b] = 0  # it is not here any more
     if team.known[b] == 0:
         return walk_randomly(team, scene, p, b, t)
-    return steer(wrap(heading_to(dx, dy) - team.heading[b]), p.speed)
+    return steer(wrap(wp.atan2(dy, dx) - team.heading[b]), p.speed)
 
 
 @wp.func
