@@ -1,5 +1,6 @@
 """The pages are true: tables are the package's own, examples run, links lead somewhere."""
 
+import csv
 import importlib.util
 import os
 import re
@@ -12,12 +13,14 @@ from pathlib import Path
 import pytest
 
 import conevo
-from conevo.worlds.rover import RoverParams
 
 ROOT = Path(__file__).resolve().parent.parent
 EXECUTED = ("README.md", "docs/quickstart.md", "docs/worlds.md")
 LINKED = (*EXECUTED, "CONTRIBUTING.md", "docs/index.md", "examples/README.md")
 MARKED = re.compile(r"<!-- ([a-z]+): (\S+) -->\n```\w+\n(.*?)```\n", re.DOTALL)
+
+
+sys.path.append(str(ROOT / "docs"))  # scripts import what they share
 
 
 def script(name):
@@ -52,8 +55,10 @@ def test_a_stale_table_is_noticed_and_mended():
     assert make_tables.updated(stale) == text
 
 
-def test_every_parameter_of_the_rover_world_is_explained():
-    assert list(make_tables.ROVER_MEANING) == [field.name for field in fields(RoverParams)]
+@pytest.mark.parametrize("entry", conevo.WORLDS.values(), ids=lambda entry: entry.name)
+def test_every_parameter_of_a_world_is_explained(entry):
+    params = entry.params_class
+    assert list(make_tables.MEANING[params]) == [field.name for field in fields(params)]
 
 
 @pytest.mark.parametrize("page", EXECUTED)
@@ -101,6 +106,45 @@ def test_a_run_can_be_drawn_and_shows_the_rocks_it_detected(tmp_path):
     with Image.open(tmp_path / "run.png") as picture:
         assert picture.width > picture.height > 500
         assert len(picture.convert("RGB").getcolors(2**20)) > 50
+
+
+def test_runs_become_a_results_page_beside_heuristic_predators(tmp_path):
+    pytest.importorskip("matplotlib")
+    make_results = script("make_results")
+    few = {"run.generations": 2, "run.n_tests": 3, "method.genotypes": 10, "world.prey": "random"}
+    runs = [
+        conevo.evolve(
+            "pursuit/team-1", "homcne", "smoke", seed, tmp_path / "runs" / f"homcne-s{seed}",
+            overrides=few, threads=1,
+        )
+        for seed in (1, 2)
+    ]  # fmt: skip
+    page = tmp_path / "page.md"
+    markers = ("results", "behaviours", "compositions", "lesions")
+    page.write_text("".join(f"<!-- {name} -->\n<!-- end -->\n" for name in markers))
+    make_results.main(str(tmp_path / "runs"), str(tmp_path / "page"))
+    with (tmp_path / "page.csv").open() as file:
+        rows = {row["run"]: row for row in csv.DictReader(file)}
+    compared = [f"{kind}-s{k}" for k in (1, 2) for kind in ("heuristic", "random")]
+    assert list(rows) == ["homcne-s1", "homcne-s2", *compared]
+    more = []
+    for seed, run in enumerate(runs, start=1):
+        test = run.test_result["champion"]["performance"]["capture_time"]
+        assert float(rows[f"homcne-s{seed}"]["capture_time"]) == pytest.approx(test["mean"], 1e-5)
+        more.append(test["mean"] - float(rows[f"heuristic-s{seed}"]["capture_time"]))
+    text = page.read_text()
+    assert f"| {sum(more) / 2:.1f} ± " in text
+    assert text.count("| HomCNE |") == 4
+    assert (tmp_path / "page.png").stat().st_size > 5000
+
+
+def test_a_page_without_markers_is_refused(tmp_path):
+    pages = script("pages")
+    page = tmp_path / "page.md"
+    page.write_text("<!-- results -->\nold\n<!-- end -->\n<!-- results -->\n<!-- end -->\n")
+    for name in ("results", "behaviours"):
+        with pytest.raises(SystemExit, match=f"<!-- {name} -->"):
+            pages.put("new", page, name)
 
 
 @pytest.mark.parametrize("page", LINKED)

@@ -133,7 +133,7 @@ def random_team(a_world, seed, scale=0.15):
     return genes, slots.reshape(a_world.n_robots, -1)
 
 
-def prey_file(path, seed):
+def random_prey_file(path, seed):
     """A prey set of random networks that go ahead and turn with what they see.
 
     The lone prey has fewer slots than the two, and one of these has an empty slot.

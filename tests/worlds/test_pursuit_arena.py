@@ -24,18 +24,26 @@ from worlds.situations import (
     STOP,
     drivers,
     placed,
+    random_prey_file,
     random_team,
 )
 
 # --- symmetries ---------------------------------------------------------------------------------
 
 
-SYMMETRIC = [("team-3", "heuristic", 3), ("team-10", "shaped", 4), ("team-8", "heuristic", 5)]
+SYMMETRIC = [("team-3", "heuristic", 3), ("team-10", "file", 4), ("team-8", "heuristic", 5)]
+
+
+@pytest.fixture(scope="module")
+def networks(tmp_path_factory):
+    """A file of prey that are random networks."""
+    return random_prey_file(tmp_path_factory.mktemp("prey") / "random.npz", 4)
 
 
 @pytest.mark.parametrize(("environment", "prey", "seed"), SYMMETRIC)
 @pytest.mark.parametrize("turns", [1, 2, 3])
-def test_a_turned_arena_is_a_turned_outcome(environment, prey, seed, turns):
+def test_a_turned_arena_is_a_turned_outcome(environment, prey, seed, turns, networks):
+    prey = networks if prey == "file" else prey
     a_world = world(
         f"pursuit/{environment}", prey=prey, iterations=40, n_obstacles=3, arena_cm=70.0
     )
@@ -71,8 +79,8 @@ MIRROR = [7, 6, 5, 4, 3, 2, 1, 0]  # a sensor's partner on the other side
 
 
 @pytest.mark.parametrize("seed", [3, 4, 5])
-def test_a_mirrored_arena_with_mirrored_networks_is_a_mirrored_outcome(seed):
-    a_world = world("pursuit/team-9", iterations=40, n_obstacles=3, arena_cm=70.0)
+def test_a_mirrored_arena_with_mirrored_networks_is_a_mirrored_outcome(seed, networks):
+    a_world = world("pursuit/team-9", prey=networks, iterations=40, n_obstacles=3, arena_cm=70.0)
     genes, slots = random_team(a_world, seed)
     scenarios = a_world.scenarios([fold(seed, "mirrored")])
     order = [*MIRROR, *(8 + k for k in MIRROR), *range(16, 22), 23, 22]
@@ -98,8 +106,8 @@ def test_a_mirrored_arena_with_mirrored_networks_is_a_mirrored_outcome(seed):
     assert (swapped == seen["action"]).mean() > 0.99
 
 
-def test_relabelling_predators_and_prey_relabels_the_outcome_exactly():
-    a_world = world("pursuit/team-10", iterations=150, arena_cm=60.0)
+def test_relabelling_predators_and_prey_relabels_the_outcome_exactly(networks):
+    a_world = world("pursuit/team-10", prey=networks, iterations=150, arena_cm=60.0)
     genes, slots = random_team(a_world, 6)
     scenarios = a_world.scenarios([fold(6, "relabel")])
     order = stream(6, "order").permutation(6)

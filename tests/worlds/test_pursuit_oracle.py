@@ -18,7 +18,7 @@ from conevo.worlds.registry import world
 from conevo.worlds.rollout import Rollout
 from oracles import pursuit_oracle as oracle
 from oracles.pursuit_oracle import Chaser, Dodger, Network, Params, Walker, World
-from worlds.situations import NAN, prey_file
+from worlds.situations import NAN, random_prey_file
 
 # --- the oracle by hand -------------------------------------------------------------------------
 
@@ -390,7 +390,7 @@ def random_team(a_world, seed, scale):
 
 @pytest.fixture(scope="module")
 def prey(tmp_path_factory):
-    return prey_file(tmp_path_factory.mktemp("prey") / "random.npz", 4)
+    return random_prey_file(tmp_path_factory.mktemp("prey") / "random.npz", 4)
 
 
 # Environment, prey, which robots are heuristic (every n-th, 0 for none), scale of genes,
@@ -467,7 +467,7 @@ def test_held_sensors_equal_the_oracles(prey):
 
 
 def test_the_comparisons_above_are_not_vacuous(prey):
-    tallies = [compare(*hunt(HUNTS[k], prey, 1)) for k in (1, 5, 8, 9, 11)]
+    tallies = [compare(*hunt(HUNTS[k], prey, 1)) for k in (1, 5, 9, 10, 11)]
     assert sum(t.captured for t in tallies) > 100
     assert sum(t.refused for t in tallies) > 1000
     assert sum(t.lights for t in tallies) > 2000
@@ -475,7 +475,7 @@ def test_the_comparisons_above_are_not_vacuous(prey):
     assert set().union(*(t.actions for t in tallies)) >= {1, 2, 3, 4}
 
 
-@pytest.mark.parametrize("case", [HUNTS[2], HUNTS[9], FLIGHTS[4], FLIGHTS[6]])
+@pytest.mark.parametrize("case", [HUNTS[0], HUNTS[9], FLIGHTS[4], FLIGHTS[6]])
 def test_an_epoch_without_correction_stays_with_the_oracle(case, prey):
     """As long as the smallest of differences has not grown into other decisions."""
     setup = hunt(case, prey, 3) if len(case) == 6 else flight(case, 4)

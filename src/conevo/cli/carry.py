@@ -1,4 +1,4 @@
-"""What ``run`` and ``resume`` share: carry a run on while someone watches, and end clearly."""
+"""What the verbs that evolve share: carry on while someone watches, and end clearly."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from conevo.errors import EnvironmentFailure, UsageError
 
 if TYPE_CHECKING:
     from conevo.runs.run import Run
+    from conevo.runs.shaping import Shaping
 
 __all__ = ["carry_on", "output_options", "style_of"]
 
@@ -38,23 +39,36 @@ def style_of(as_json: bool, quiet: bool, verbose: bool) -> str:
     return "live" if sys.stdout.isatty() else "plain"
 
 
-def carry_on(run: Run, threads: int | None, style: str) -> None:
-    """Carry a run on to its end, then print its summary and what can be done next."""
+def carry_on(found: Run | Shaping, threads: int | None, style: str) -> None:
+    """Carry a run or a shaping on to its end, then print a summary and what can be done next."""
     from conevo.cli.progress import watching
+    from conevo.cli.stages import print_shaping_end
     from conevo.cli.summary import print_end
+    from conevo.runs.run import Run
 
     def remark(text: str) -> None:
         click.echo(f"conevo: note: {text}", err=True)
 
-    run.refuse_finished()
-    advice = f"conevo resume {run.path}"
-    try:
-        with watching(run, style) as watch:
+    def carry(run: Run, stage: int = 0) -> None:
+        of = 0 if isinstance(found, Run) else len(found.configs)
+        with watching(run, style, stage, of) as watch:
             run.resume(threads=threads, watch=watch, remark=remark)
+
+    found.refuse_finished()
+    advice = f"conevo resume {found.path}"
+    try:
+        if isinstance(found, Run):
+            carry(found)
+        else:
+            found.carry_on(carry, threads)
     except KeyboardInterrupt:
-        count = len(run.generations())
+        runs = [found] if isinstance(found, Run) else found.stages
+        count = sum(len(run.generations()) for run in runs)
         click.echo(f"interrupted after {count} generations; continue with: {advice}", err=True)
         sys.exit(130)
     except EnvironmentFailure as error:
         raise EnvironmentFailure(f"{error}; when that is mended: {advice}") from error
-    print_end(run, style)
+    if isinstance(found, Run):
+        print_end(found, style)
+    else:
+        print_shaping_end(found, style)

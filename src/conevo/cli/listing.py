@@ -57,24 +57,24 @@ def _methods() -> Rows:
 
 
 def _runs(folder: str | None) -> Rows:
-    from conevo.cli.find import run_directories
+    from conevo.cli.find import directories, find
+    from conevo.cli.stages import span
     from conevo.runs.run import RUNS, Run
 
     place = Path(folder) if folder else RUNS
     if folder and not place.is_dir():
         raise UsageError(f"{place} is no directory")
     rows = []
-    for path in run_directories(place):
+    for path in directories(place):
         try:
-            run = Run(path)
-            count = f"{len(run.generations())}/{run.config.run.generations}"
-            status = run.status
-            about = (
-                run.config.task,
-                run.config.method,
-                run.config.preset,
-                str(run.config.run.seed),
-            )
+            found = find(str(path))
+            runs = [found] if isinstance(found, Run) else found.stages
+            configs = [found.config] if isinstance(found, Run) else found.configs
+            done = sum(len(run.generations()) for run in runs)
+            count = f"{done}/{sum(config.run.generations for config in configs)}"
+            status, config = found.status, configs[-1]
+            task = config.task if isinstance(found, Run) else span(found)
+            about = (task, config.method, config.preset, str(config.run.seed))
         except ConevoError as error:
             count, status, about = "", f"damaged: {error}", ("", "", "", "")
         names = ("run", "world", "method", "preset", "seed", "generations", "status")

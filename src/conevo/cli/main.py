@@ -17,12 +17,14 @@ __all__ = ["cli", "main"]
 
 VERBS = {
     "run": "Evolve a team and test it.",
+    "shape-prey": "Evolve prey for the pursuit world.",
     "resume": "Continue an interrupted run, to the bit.",
     "test": "Re-execute a run's fittest team in fresh scenarios.",
+    "behaviours": "Say who pursues, blocks, flanks, knocks and idles.",
     "show": "Print a finished or running run.",
     "list": "List worlds, methods or runs.",
 }
-MODULES = {"list": "listing"}
+MODULES = {"list": "listing", "shape-prey": "shape_prey"}
 
 
 class Verbs(click.Group):

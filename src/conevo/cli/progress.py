@@ -21,24 +21,30 @@ PAUSE = 2.0  # seconds between two plain lines
 
 
 @contextmanager
-def watching(run: Run, style: str) -> Iterator[Callable[[Run, Record], None]]:
+def watching(
+    run: Run, style: str, stage: int = 0, n_stages: int = 0
+) -> Iterator[Callable[[Run, Record], None]]:
     """Yield the function that is called after each generation.
 
     Args:
         run: the run to be watched.
         style: "live", "plain", "verbose", "json" or "quiet".
+        stage: the number of a shaping's stage, 0 if the run is none.
+        n_stages: the stages of that shaping.
     """
+    heading = (f"stage {stage} of {n_stages}: " if stage else "") + title(run.config)
     if style == "live":
         from rich.live import Live
 
-        display = Display(run)
+        display = Display(run, heading)
         with Live(get_renderable=display.render, refresh_per_second=4):
             yield display.add
     elif style in ("plain", "verbose"):
-        click.echo(f"{title(run.config)}\n{run.path}")
+        click.echo(f"{heading}\n{run.path}")
         yield Lines(run, pause=PAUSE if style == "plain" else 0.0).add
     else:
-        yield lambda _, record: click.echo(json.dumps(record)) if style == "json" else None
+        place = {"stage": stage} if stage else {}
+        yield lambda _, record: click.echo(json.dumps(place | record)) if style == "json" else None
 
 
 class Pace:
@@ -112,8 +118,8 @@ class Lines:
 class Display:
     """The live view on a terminal."""
 
-    def __init__(self, run: Run) -> None:
-        self.run, self.pace = run, Pace(run)
+    def __init__(self, run: Run, heading: str = "") -> None:
+        self.run, self.heading, self.pace = run, heading or title(run.config), Pace(run)
         self.records, self.started = run.generations(), time.monotonic()
 
     def add(self, run: Run, record: Record) -> None:
@@ -136,7 +142,7 @@ class Display:
         ):
             grid.add_row(f"[bold]{label}[/bold]", text)
         return Group(
-            f"[bold]{title(self.run.config)}[/bold]\n{self.run.path}",
+            f"[bold]{self.heading}[/bold]\n{self.run.path}",
             bar,
             f"{self.pace.place(done - 1)}, {duration(time.monotonic() - self.started)} so far, "
             f"{duration(self.pace.remaining(done - 1))} left",

@@ -20,6 +20,6 @@ def resume(run: str, threads: int | None, as_json: bool, quiet: bool, verbose: b
 
     The result is the same, to the bit, as that of a run that was never interrupted.
     """
-    from conevo.cli.find import find_run
+    from conevo.cli.find import find
 
-    carry_on(find_run(run), threads, style_of(as_json, quiet, verbose))
+    carry_on(find(run), threads, style_of(as_json, quiet, verbose))

@@ -2,69 +2,45 @@
 
 from __future__ import annotations
 
-import shlex
-import sys
-from pathlib import Path
+from typing import Any
 
 import click
 
-from conevo.cli.carry import carry_on, output_options, style_of
+from conevo.cli.carry import output_options
+from conevo.cli.options import Order, setting_options
+from conevo.errors import UsageError
 
 __all__ = ["run"]
 
 
 @click.command(short_help="Evolve a team and test it.")
 @click.argument("world", metavar="WORLD/ENVIRONMENT", required=False)
+@setting_options
 @click.option(
-    "--method", metavar="NAME", help="cone (default), mesp, ccga, hetcne, homcne, cone-1..3."
-)
-@click.option(
-    "--preset", metavar="NAME", help="smoke (seconds), desk (minutes, default), night, thesis."
-)
-@click.option("--seed", type=int, help="Root of all randomness (default 1).")
-@click.option(
-    "--set", "settings", metavar="KEY=VALUE", multiple=True,
-    help="One setting, for example run.generations=5; may be repeated.",
+    "--prey", metavar="NAME|FILE",
+    help="In the pursuit world: shaped (default), heuristic, random, or what shape-prey made.",
 )  # fmt: skip
 @click.option(
-    "--config", metavar="FILE", help="TOML file with settings, such as a run's config.toml."
-)
-@click.option("--budget-evaluations", type=int, help="Spend at most this many team evaluations.")
-@click.option(
-    "--threads", type=click.IntRange(1), help="CPU threads (default all); changes no result."
-)
-@click.option("--device", default="cpu", show_default=True, help="cpu or cuda.")
-@click.option("--out", metavar="DIR", help="The run's directory (default: a new one in runs/).")
+    "--shape", is_flag=True,
+    help="In stages: the environments of the same name from number 1 up to this one.",
+)  # fmt: skip
 @output_options
-def run(
-    world: str | None,
-    method: str | None,
-    preset: str | None,
-    seed: int | None,
-    settings: tuple[str, ...],
-    config: str | None,
-    budget_evaluations: int | None,
-    threads: int | None,
-    device: str,
-    out: str | None,
-    as_json: bool,
-    quiet: bool,
-    verbose: bool,
-) -> None:
+def run(world: str | None, prey: str | None, shape: bool, **options: Any) -> None:
     """Evolve a team for WORLD/ENVIRONMENT (see: conevo list worlds) and test it.
 
-    Everything is kept in one directory. Ctrl-C leaves a run that conevo resume continues.
+    Everything is kept in one directory. Ctrl-C leaves a run that conevo resume continues. With
+    --shape every stage is a run of its own, and all settings are those of each stage.
     """
-    from conevo.runs.config import parse_assignment, resolve
-    from conevo.runs.run import start
+    order = Order(**options)
+    config = order.resolve(world)
+    if prey is not None:
+        if not hasattr(config.world_params, "prey"):
+            raise UsageError(f"--prey {prey!r}: {config.world} has no prey to be chosen")
+        order.overrides["world.prey"] = prey
+        config = order.resolve(world)
+    if shape:
+        from conevo.runs.shaping import tasks_up_to
 
-    style = style_of(as_json, quiet, verbose)
-    overrides = dict(parse_assignment(text) for text in settings)
-    if budget_evaluations is not None:
-        overrides["run.budget_evaluations"] = budget_evaluations
-    resolved = resolve(
-        world, method, preset, seed, file=config, overrides=overrides, place="on the command line"
-    )
-    command = shlex.join(["conevo", *sys.argv[1:]])
-    path = Path(out) if out else None
-    carry_on(start(resolved, path, threads=threads, device=device, command=command), threads, style)
+        order.shape(tasks_up_to(config.task))
+    else:
+        order.run(config)

@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import json
+from typing import TYPE_CHECKING, Any
 
 import click
+
+if TYPE_CHECKING:
+    from conevo.runs.run import Run
 
 __all__ = ["show"]
 
@@ -14,21 +18,37 @@ __all__ = ["show"]
 @click.option("--rows", type=click.IntRange(2), default=12, show_default=True, help="Generations.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def show(run: str, rows: int, as_json: bool) -> None:
-    """Print RUN: state, generations, castes, thresholds and testing phase."""
-    from conevo.cli.find import find_run
-    from conevo.cli.summary import run_text
+    """Print RUN: state, generations, castes, thresholds and testing phase; of a shaping its stages.
 
-    found = find_run(run)
-    if not as_json:
-        click.echo(run_text(found, rows))
-        return
-    everything = {
-        "run": str(found.path),
-        "status": found.status,
-        "changed_files": found.changed_files,
-        "config": found.config.tables(),
-        "provenance": found.provenance,
-        "generations": found.generations(),
-        "test": found.test_result,
+    A stage is a run of its own: DIR/stage-1.
+    """
+    from conevo.cli.find import find
+    from conevo.cli.stages import shaping_text
+    from conevo.cli.summary import run_text
+    from conevo.runs.run import Run
+
+    found = find(run)
+    if isinstance(found, Run):
+        click.echo(json.dumps(_everything(found)) if as_json else run_text(found, rows))
+    elif as_json:
+        shaping = {
+            "shaping": str(found.path),
+            "status": found.status,
+            "tasks": found.tasks,
+            "stages": [_everything(stage) for stage in found.stages],
+        }
+        click.echo(json.dumps(shaping))
+    else:
+        click.echo(shaping_text(found))
+
+
+def _everything(run: Run) -> dict[str, Any]:
+    return {
+        "run": str(run.path),
+        "status": run.status,
+        "changed_files": run.changed_files,
+        "config": run.config.tables(),
+        "provenance": run.provenance,
+        "generations": run.generations(),
+        "test": run.test_result,
     }
-    click.echo(json.dumps(everything))

@@ -24,7 +24,10 @@ __all__ = ["test"]
 def test(
     run: str, scenarios: int | None, seed: int | None, threads: int | None, as_json: bool
 ) -> None:
-    """Re-execute the fittest team of RUN (finished or not) in fresh scenarios; writes nothing."""
+    """Re-execute the fittest team of RUN (finished or not) in fresh scenarios; writes nothing.
+
+    Of a shaping it is the team of the last stage that has one.
+    """
     from conevo.cli.find import find_run
     from conevo.cli.summary import test_text
 

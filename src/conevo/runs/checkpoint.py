@@ -20,7 +20,7 @@ import numpy as np
 from conevo.errors import EnvironmentFailure, UsageError
 from conevo.runs.durable import replace_file
 
-__all__ = ["UnusableFile", "load", "save"]
+__all__ = ["UnusableFile", "content_digest", "load", "save"]
 
 FORMAT = 1
 Record = TypeVar("Record")
@@ -76,13 +76,21 @@ def load(path: Path, record_class: type[Record], identity: Mapping[str, str]) ->
         raise UnusableFile(f"{path} is damaged or no file of conevo's ({reason})") from error
     if not is_whole:
         raise UnusableFile(f"{path} is damaged (its digest does not match)")
-    for key, value in identity.items():
-        if found.get(key) != value:
-            raise UnusableFile(f"{path} is foreign: {key} is {found.get(key)!r}, not {value!r}")
+    for key in {**identity, **found}:
+        if found.get(key) != identity.get(key):
+            raise UnusableFile(
+                f"{path} is foreign: {key} is {found.get(key)!r}, not {identity.get(key)!r}"
+            )
     expected = {field.name for field in dataclasses.fields(record_class)}  # type: ignore[arg-type]
     if version != FORMAT or expected != fields.keys() | arrays.keys():
         raise UnusableFile(f"{path} was written by another version of conevo")
     return record_class(**fields, **arrays)
+
+
+def content_digest(path: Path) -> str:
+    """Return the digest that a whole file holds of its content, whichever way the zip was laid."""
+    with np.load(path, allow_pickle=False) as archive:
+        return str(json.loads(archive["about"].tobytes())["digest"])
 
 
 def _digest(about: Mapping[str, Any], arrays: Mapping[str, Any]) -> str:

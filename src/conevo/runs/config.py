@@ -112,9 +112,16 @@ class RunConfig:
 
     @functools.cached_property
     def run_id(self) -> str:
-        """Twelve hex digits that change with any value but the preset's name."""
+        """Twelve hex digits that change with any value but the preset's name.
+
+        A file counts by its content: where a value has a digest beside it ("prey_digest"), the
+        path does not count.
+        """
         tables = self.tables()
         del tables["run"]["preset"]
+        for table in tables.values():
+            for key in [key for key in table if key.endswith("_digest") and table[key]]:
+                table.pop(key.removesuffix("_digest"), None)
         text = json.dumps(tables, sort_keys=True)
         return hashlib.blake2b(text.encode(), digest_size=6).hexdigest()
 

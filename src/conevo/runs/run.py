@@ -3,23 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from conevo.errors import UsageError
-from conevo.evolution.methods.registry import METHODS
-from conevo.evolution.protocol import Layout, Method, State
+from conevo.evolution.protocol import State
 from conevo.runs import provenance
 from conevo.runs.champions import Team, fittest_team, sampled_generations
 from conevo.runs.config import RunConfig, resolve
-from conevo.runs.evaluation import Evaluate, make_evaluator
-from conevo.runs.loop import check_budget, evolve_generations
-from conevo.runs.store import Store, create, refuse_existing
+from conevo.runs.directory import refuse_existing
+from conevo.runs.lab import Lab
+from conevo.runs.loop import evolve_generations
+from conevo.runs.store import Store, create
 from conevo.runs.testing import test_team
-from conevo.worlds.protocol import World
-from conevo.worlds.registry import WORLDS
-from conevo.worlds.rollout import Rollout
 
 __all__ = ["RUNS", "Run", "evolve", "start"]
 
@@ -70,17 +66,30 @@ def start(
     threads: int | None = None,
     device: str = "cpu",
     command: str = "conevo.evolve",
+    origin: Run | None = None,
 ) -> Run:
     """Create the directory of a run that is then carried on by ``Run.resume``.
 
+    Args:
+        config: what to run.
+        out: the run's directory; by default a new one under ``runs/``.
+        threads: CPU threads, all by default.
+        device: "cpu" or "cuda".
+        command: what the provenance says the run was started with.
+        origin: a finished run; the new one begins with the populations that it ended with, which
+            are copied into the new directory, and is otherwise as any other.
+
     Raises:
-        UsageError: the directory exists, or the budget does not pay for one generation.
+        UsageError: the directory exists, the budget does not pay for one generation, or the
+            origin is unfinished, was changed since, or its populations do not fit.
         EnvironmentFailure: no such device, full disk, no permission; nothing was written.
     """
-    path = Path(out) if out is not None else RUNS / config.label
+    ancestor, ancestry = (None, {}) if origin is None else origin.ancestry()
+    suffix = f"-from-{ancestry['origin']['checkpoint'][:6]}" if ancestry else ""
+    path = Path(out) if out is not None else RUNS / f"{config.label}{suffix}"
     refuse_existing(path)
-    lab = _Lab.equip(config, threads, device)
-    check_budget(lab.method, lab.first_state(), config.run.budget_evaluations)
+    lab = Lab.equip(config, threads, device)
+    first = lab.first_state(ancestor)
     about = {
         "run_id": config.run_id,
         "preset": config.preset,
@@ -89,9 +98,10 @@ def start(
         "kernel_hash": lab.rollout.kernel_hash,
         "created": provenance.now(),
         **provenance.describe_machine(),
+        **ancestry,
         "sessions": [],
     }
-    return Run(create(path, config, about).path, lab)
+    return Run(create(path, config, about, first if ancestry else None).path, lab)
 
 
 class Run:
@@ -104,7 +114,7 @@ class Run:
         UsageError: there is no run at ``path``.
     """
 
-    def __init__(self, path: str | Path, lab: _Lab | None = None) -> None:
+    def __init__(self, path: str | Path, lab: Lab | None = None) -> None:
         self._store = Store(Path(path))
         self._lab = lab
         self.path = self._store.path
@@ -147,6 +157,31 @@ class Run:
     def team(self, generation: int) -> Team | None:
         """Return the fittest team of a generation, None if it was not kept."""
         return self._store.load_team(generation)
+
+    def ancestry(self) -> tuple[State, Record]:
+        """Return the state this finished run ended with, and what its descendants say about it.
+
+        Raises:
+            UsageError: it is not finished, or not as it was when it was sealed.
+        """
+        if not self._store.is_finished:
+            raise UsageError(
+                f"{self.path} is not finished, so no run can begin with its populations; "
+                f"finish it with 'conevo resume {self.path}'"
+            )
+        if changed := self.changed_files:
+            raise UsageError(
+                f"{self.path} was changed since it was finished ({', '.join(changed)}): "
+                f"no run can begin with its populations"
+            )
+        state, digest = self._store.load_final(self.config.method)
+        about = {
+            "path": str(self.path),
+            "run_id": self.config.run_id,
+            "generation": state.generation,
+            "checkpoint": digest,
+        }
+        return state, {"origin": about}
 
     def resume(
         self,
@@ -198,7 +233,7 @@ class Run:
         return self._test(self._equip(threads), champion, scenarios, seed)
 
     def _test(
-        self, lab: _Lab, team: Team, scenarios: int | None = None, seed: int | None = None
+        self, lab: Lab, team: Team, scenarios: int | None = None, seed: int | None = None
     ) -> Record:
         return test_team(
             lab.rollout,
@@ -222,12 +257,12 @@ class Run:
                 f"run with another --seed or --out"
             )
 
-    def _equip(self, threads: int | None) -> _Lab:
+    def _equip(self, threads: int | None) -> Lab:
         """Return what the run needs, after checking that it is what it was started with."""
         lab, self._lab = self._lab, None
         about = self.provenance
         if lab is None:
-            lab = _Lab.equip(self.config, threads, about["device"])
+            lab = Lab.equip(self.config, threads, about["device"])
         if lab.rollout.kernel_hash != about["kernel_hash"]:
             raise UsageError(
                 f"{self.path} was made with other kernels ({about['kernel_hash']}, here "
@@ -236,11 +271,11 @@ class Run:
             )
         return lab
 
-    def _evolve(self, lab: _Lab, watch: Watch | None, remark: Callable[[str], None] | None) -> str:
+    def _evolve(self, lab: Lab, watch: Watch | None, remark: Callable[[str], None] | None) -> str:
         store, settings, method = self._store, self.config.run, self.config.method
         state, problem = store.load_checkpoint(method)
         if state is None:
-            state = lab.first_state()
+            state = store.load_origin(method) or lab.first_state()
         if problem and remark is not None:
             remark(f"{problem}; going on from generation {state.generation} instead")
         records = store.cut_generations(state.generation)
@@ -281,47 +316,6 @@ class Run:
         finally:
             if newest is not saved:
                 store.save_checkpoint(newest, method)
-
-
-@dataclass(frozen=True)
-class _Lab:
-    """The working parts of a run, made from its configuration."""
-
-    config: RunConfig
-    world: World
-    method: Method
-    rollout: Rollout
-    evaluate: Evaluate
-
-    @staticmethod
-    def equip(config: RunConfig, threads: int | None, device: str) -> _Lab:
-        """Build world, method and simulator.
-
-        Raises:
-            EnvironmentFailure: there is no such device.
-        """
-        world = WORLDS[config.world].build(config.environment, config.world_params)
-        rollout = Rollout(world, n_threads=threads, device=device)
-        return _Lab(
-            config=config,
-            world=world,
-            method=METHODS[config.method].build(config.method_config),
-            rollout=rollout,
-            evaluate=make_evaluator(
-                rollout,
-                world,
-                seed=config.run.seed,
-                epochs=config.run.epochs,
-                fittest_epochs=config.run.fittest_epochs,
-                credit=config.run.credit,
-            ),
-        )
-
-    def first_state(self) -> State:
-        """Return the method's state before generation 0."""
-        spec = self.world.controller
-        layout = Layout(self.world.n_robots, spec.n_hidden, spec.max_hidden, spec.n_genes)
-        return self.method.init(layout, self.config.run.seed)
 
 
 def _print_line(run: Run, record: Record) -> None:

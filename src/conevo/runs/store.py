@@ -4,6 +4,7 @@
 
     config.toml                 the resolved configuration; never changes
     provenance.json             versions, kernel hash, machine, sessions; replaced whole
+    origin.npz                  the first state, if the run begins with the populations of another
     generations.jsonl           one line per generation, on the disk before the next begins
     champion.npz                the fittest team so far
     teams/generation-0000.npz   the fittest team of some generations
@@ -14,91 +15,55 @@
 
 Within a generation teams are written first, then the log line, then the checkpoint. What is newer
 than the checkpoint is written again, to the bit, when the run is resumed. A directory appears under
-its name only when the first three files are in it; a kill before that leaves at most a hidden
-directory beside it, which nothing reads.
+its name only when the files down to ``generations.jsonl`` are in it.
 """
 
 from __future__ import annotations
 
-import fcntl
-import hashlib
 import json
-import os
-import shutil
-import tempfile
-import time
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from conevo.errors import EnvironmentFailure, UsageError
+from conevo.errors import UsageError
 from conevo.evolution.protocol import State
 from conevo.runs import checkpoint
 from conevo.runs.champions import Team
 from conevo.runs.config import RunConfig, resolve
-from conevo.runs.durable import append_line, replace_file, sync_directory, writing
+from conevo.runs.directory import CONFIG, Directory, appearing, as_json, read_json
+from conevo.runs.durable import append_line, replace_file, writing
 
 __all__ = ["Store", "create"]
 
 Record = dict[str, Any]
-CONFIG, PROVENANCE, GENERATIONS = "config.toml", "provenance.json", "generations.jsonl"
-TEST, SEAL, LOCK, CHAMPION = "test.json", "DONE", "lock", "champion.npz"
+PROVENANCE, GENERATIONS, TEST = "provenance.json", "generations.jsonl", "test.json"
+CHAMPION, ORIGIN = "champion.npz", "origin.npz"
 CHECKPOINTS = ("checkpoint-a.npz", "checkpoint-b.npz")
 
 
-def create(path: Path, config: RunConfig, provenance: Record) -> Store:
+def create(path: Path, config: RunConfig, provenance: Record, first: State | None = None) -> Store:
     """Make a run's directory appear at ``path``, all at once.
+
+    Args:
+        path: the directory.
+        config: the resolved configuration.
+        provenance: what the run is made with; says its ``origin`` if there is a first state.
+        first: the state to begin with, if it is not the method's own.
 
     Raises:
         UsageError: something is there already; it is left as it is.
         EnvironmentFailure: the directory cannot be written.
     """
-    refuse_existing(path)
-    with writing(path):
-        path.parent.mkdir(parents=True, exist_ok=True)
-        draft = Path(tempfile.mkdtemp(prefix=f".{path.name}.", dir=path.parent))
-    try:
+    with appearing(path) as draft:
         replace_file(draft / CONFIG, config.to_toml().encode())
-        replace_file(draft / PROVENANCE, _json(provenance))
+        replace_file(draft / PROVENANCE, as_json(provenance))
+        if first is not None:
+            identity = _identity(provenance) | {"method": config.method}
+            checkpoint.save(draft / ORIGIN, first, identity)
         replace_file(draft / GENERATIONS, b"")
-        with writing(path):
-            draft.chmod(0o777 & ~_umask())
-            _appear(draft, path)
-            sync_directory(path.parent)
-    except EnvironmentFailure as error:
-        raise EnvironmentFailure(str(error).replace(str(draft), str(path))) from error
-    finally:
-        shutil.rmtree(draft, ignore_errors=True)  # gone by now if all went well
     return Store(path)
 
 
-def _appear(draft: Path, path: Path) -> None:
-    """Give a finished draft its name, unless another process was faster."""
-    try:
-        draft.rename(path)
-    except OSError:
-        refuse_existing(path)
-        raise
-
-
-def refuse_existing(path: Path) -> None:
-    """Say what is at ``path`` and what can be done with it, if anything is."""
-    if not (path.is_symlink() or path.exists()) or (path.is_dir() and not any(path.iterdir())):
-        return
-    if not (path / CONFIG).is_file():
-        raise UsageError(f"{path} exists and is no run; choose another place with --out")
-    store = Store(path)
-    if store.is_finished:
-        advice = f"finished: see it with 'conevo show {path}', or choose another --seed or --out"
-    elif store.is_in_use:
-        advice = f"in use by {store.user}; watch it with 'conevo show {path}'"
-    else:
-        advice = f"unfinished: continue it with 'conevo resume {path}'"
-    raise UsageError(f"{path} already holds a run, {advice}")
-
-
-class Store:
+class Store(Directory):
     """The files of one run.
 
     Args:
@@ -109,50 +74,8 @@ class Store:
     """
 
     def __init__(self, path: Path) -> None:
-        if not (path / CONFIG).is_file():
-            raise UsageError(f"{path} is no run (it has no {CONFIG})")
-        self.path = path
+        super().__init__(path, "run")
         self._next_checkpoint = 0
-
-    # --- who is at work ---------------------------------------------------------------------------
-
-    @contextmanager
-    def locked(self) -> Iterator[None]:
-        """Keep every other process from writing here.
-
-        Raises:
-            UsageError: another process is at work in this directory.
-        """
-        path = self.path / LOCK
-        with writing(path):
-            handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
-        try:
-            if not _try_lock(handle, fcntl.LOCK_EX):
-                raise UsageError(f"{self.path} is in use by {self.user}; wait for it or end it")
-            with writing(path):
-                os.truncate(handle, 0)
-                os.pwrite(handle, f"process {os.getpid()}".encode(), 0)
-            yield
-        finally:
-            os.close(handle)
-
-    @property
-    def is_in_use(self) -> bool:
-        """Whether a process is at work here now."""
-        try:
-            handle = os.open(self.path / LOCK, os.O_RDONLY)
-        except OSError:
-            return False
-        try:
-            return not _try_lock(handle, fcntl.LOCK_SH)
-        finally:
-            os.close(handle)
-
-    @property
-    def user(self) -> str:
-        """The process that is or was last at work here."""
-        path = self.path / LOCK
-        return (path.read_text() if path.is_file() else "") or "another process"
 
     # --- what the run is --------------------------------------------------------------------------
 
@@ -172,11 +95,11 @@ class Store:
 
     def read_provenance(self) -> Record:
         """Return versions, machine and sessions."""
-        return _read_json(self.path / PROVENANCE)
+        return read_json(self.path / PROVENANCE)
 
     def write_provenance(self, provenance: Record) -> None:
         """Replace the provenance."""
-        replace_file(self.path / PROVENANCE, _json(provenance))
+        replace_file(self.path / PROVENANCE, as_json(provenance))
 
     # --- generations ------------------------------------------------------------------------------
 
@@ -287,73 +210,51 @@ class Store:
         self._next_checkpoint = 1 - newest
         return states[newest], "; ".join(problems)
 
+    def load_origin(self, method: str) -> State | None:
+        """Return the state the run began with, None if that is the method's own.
+
+        Raises:
+            UsageError: the file is damaged or foreign.
+            EnvironmentFailure: the file is lost.
+        """
+        if "origin" not in self.read_provenance():
+            return None
+        return checkpoint.load(self.path / ORIGIN, State, self._identity() | {"method": method})
+
+    def load_final(self, method: str) -> tuple[State, str]:
+        """Return the state a finished run ended with, and the digest of its checkpoint.
+
+        Raises:
+            UsageError: the checkpoint is lost or unusable.
+        """
+        state, _ = self.load_checkpoint(method)
+        if state is None:
+            raise UsageError(f"{self.path} has lost its last checkpoint")
+        file = self.path / CHECKPOINTS[1 - self._next_checkpoint]
+        return state, checkpoint.content_digest(file)
+
     def _identity(self) -> dict[str, str]:
-        return {"run_id": self.read_provenance()["run_id"]}
+        return _identity(self.read_provenance())
 
     # --- the end ----------------------------------------------------------------------------------
 
     def write_test(self, result: Record) -> None:
         """Write the testing phase."""
-        replace_file(self.path / TEST, _json(result))
+        replace_file(self.path / TEST, as_json(result))
 
     def read_test(self) -> Record | None:
         """Return the testing phase, None if the run has not come to it."""
-        return _read_json(self.path / TEST) if (self.path / TEST).is_file() else None
-
-    @property
-    def is_finished(self) -> bool:
-        """Whether the run is sealed."""
-        return (self.path / SEAL).is_file()
+        return read_json(self.path / TEST) if (self.path / TEST).is_file() else None
 
     def seal(self) -> None:
         """Close the run: drop the older checkpoint, write the digests of all files."""
         (self.path / CHECKPOINTS[self._next_checkpoint]).unlink(missing_ok=True)
-        replace_file(self.path / SEAL, _json({"files": self._digests()}))
-
-    def check_seal(self) -> list[str]:
-        """Return the names of files that are not as they were when the run was sealed."""
-        sealed: Mapping[str, str] = _read_json(self.path / SEAL)["files"]
-        found = self._digests()
-        return sorted(name for name in sealed if found.get(name) != sealed[name])
-
-    def _digests(self) -> dict[str, str]:
-        files = sorted(p for p in self.path.rglob("*") if p.is_file() and p.suffix != ".tmp")
-        return {
-            p.relative_to(self.path).as_posix(): hashlib.blake2b(
-                p.read_bytes(), digest_size=16
-            ).hexdigest()
-            for p in files
-            if p.name not in (SEAL, LOCK)
-        }
+        super().seal()
 
 
-def _try_lock(handle: int, kind: int) -> bool:
-    """Take a lock if it is free; the tries outlast another process that only looks."""
-    for _ in range(5):
-        try:
-            fcntl.flock(handle, kind | fcntl.LOCK_NB)
-        except OSError:
-            time.sleep(0.02)
-        else:
-            return True
-    return False
-
-
-def _json(value: Record) -> bytes:
-    return (json.dumps(value, indent=1, allow_nan=False) + "\n").encode()
-
-
-def _read_json(path: Path) -> Record:
-    try:
-        found: Record = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise EnvironmentFailure(f"cannot read {path}: {error.strerror}") from error
-    except ValueError as error:
-        raise UsageError(f"{path} is damaged: {error}") from error
-    return found
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
+def _identity(provenance: Record) -> dict[str, str]:
+    """Return what a run's files say they belong to."""
+    identity = {"run_id": provenance["run_id"]}
+    if "origin" in provenance:  # the same settings on other populations are another run
+        identity["origin"] = provenance["origin"]["checkpoint"]
+    return identity

@@ -1,0 +1,1 @@
+"""Analysis: what evolved teams do, read from recorded epochs of finished runs."""

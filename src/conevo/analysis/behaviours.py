@@ -1,0 +1,298 @@
+"""Individual behaviours of predators: pursuer, blocker, flanker, knocker, idle.
+
+Nitschke 2009, sections 4.5, 4.6 and appendix B, where an experimenter names what he sees. Here the
+same words are geometric rules over the last second of a recorded epoch:
+
+- **idle**: does not drive; it stands, or turns on the spot.
+- **knocker**: bumps into the prey again and again, its heading turning through an arc meanwhile.
+- **flanker**: bumps into the prey again and again, staying close to the left or right of its rear.
+- **blocker**: drives straight at a prey that faces it.
+- **pursuer**: drives straight at the prey from anywhere else.
+
+The first that holds is the behaviour; if none does, the predator performs none. Choice: in this
+order, because a knocker is told by how it moves wherever it is, a flanker by where it stays, and
+both are also driving at the prey most of the time.
+
+All but idle count only in an interaction: within infrared range of another predator and within
+light range of a prey (appendix B). Choice: idle counts anywhere, since its definition names neither
+prey nor other predators, and keeping out of the way is what it is good for (section 4.5.6).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from conevo.specialization import degree, label, shares
+from conevo.specialization.individual import NON_SPECIALIZED
+
+__all__ = [
+    "BEHAVIOURS",
+    "NONE",
+    "Conduct",
+    "Lifetime",
+    "Rules",
+    "Setting",
+    "conduct",
+    "lifetimes",
+    "spells",
+]
+
+BEHAVIOURS = ("pursuer", "blocker", "flanker", "knocker", "idle")
+NONE = -1  # no behaviour of these
+PURSUER, BLOCKER, FLANKER, KNOCKER, IDLE = range(len(BEHAVIOURS))
+
+Floats = npt.NDArray[np.float64]
+Bools = npt.NDArray[np.bool_]
+Ints = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Rules:
+    """Where one behaviour ends and another begins. The thesis gives no numbers; all are ours.
+
+    Attributes:
+        window: iterations that a behaviour is judged by, the last ones. Choice: 10, one second, as
+            long as a prey must hardly move to be captured.
+        idle_cm: idle below this way in a window, as commanded. Choice: 0.5, a sixteenth of what a
+            predator can drive. One that drives and is refused is not idle but in the way.
+        share: directions must hold in this share of a window's iterations. Choice: half.
+        aim_deg: driving at the prey: this far off its direction at most, or on a line that meets
+            it. Choice: 30, half of what a sensor sees; pressing on a prey is driving at it.
+        arc_deg: straight below this turn of the heading in a window, an arc from it on. Choice: 45,
+            a circle of 10 cm radius at full speed.
+        front_deg: a prey faces whoever is this far off its heading at most. Choice: 45.
+        rear_deg: the sides of a prey's rear begin here, counted from its heading. Choice: 90, the
+            axle.
+        behind_deg: and end here. Choice: 165; straight behind is neither left nor right.
+        near_cm: close: at most this gap between the rims, in all iterations of a window. Choice:
+            5.5, a robot's diameter.
+        touch_cm: a move refused within this gap, towards the prey, is a collision with the prey.
+            Choice: 1.8, just above what two robots can come nearer in one iteration.
+        bumps: "repeatedly": so many collisions begin in a window. Choice: 2; a predator that
+            presses on without moving collides once.
+        approach: iterations before a capture that belong to it. Choice: 30, what a predator needs
+            to cross its sensors' range.
+        pause: a capture resumed before so many iterations is still the same. Choice: 10.
+        role_share: a predator has the roles it plays for this share of a capture, approach
+            included. Choice: a fifth.
+        wall_cm: a prey is at a wall if no more than this is between them, in half of the captured
+            iterations or more. Choice: 5.5; no robot fits in between.
+    """
+
+    window: int = 10
+    idle_cm: float = 0.5
+    share: float = 0.5
+    aim_deg: float = 30.0
+    arc_deg: float = 45.0
+    front_deg: float = 45.0
+    rear_deg: float = 90.0
+    behind_deg: float = 165.0
+    near_cm: float = 5.5
+    touch_cm: float = 1.8
+    bumps: int = 2
+    approach: int = 30
+    pause: int = 10
+    role_share: float = 0.2
+    wall_cm: float = 5.5
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What the rules must know of the arena and the robots; lengths in cm.
+
+    Attributes:
+        n_predators: R, the first bodies of a record.
+        arena_cm: side of the arena.
+        range_cm: of infrared and light sensors, between rims.
+        speed_cm: a predator's way in one iteration at most.
+        radius_cm: of a body.
+        axle_cm: between its wheels.
+    """
+
+    n_predators: int
+    arena_cm: float
+    range_cm: float
+    speed_cm: float
+    radius_cm: float
+    axle_cm: float
+
+
+@dataclass(frozen=True)
+class Conduct:
+    """What the predators did in one epoch.
+
+    Attributes:
+        behaviour: [T, R] index into ``BEHAVIOURS``, or ``NONE``.
+        interacts: [T, R] whether within range of another predator and of a prey.
+        prey: [T, R] the closest prey, the one that the behaviour is about.
+        start: first iteration with a whole window; nothing is judged before.
+    """
+
+    behaviour: Ints
+    interacts: Bools
+    prey: Ints
+    start: int
+
+
+@dataclass(frozen=True)
+class Lifetime:
+    """One predator over all its epochs.
+
+    Attributes:
+        shares: of each behaviour, and of "none", in the windows that count.
+        windows: how many of them.
+        switches: how often the next one held another behaviour.
+        specialization: S = switches / possible ones.
+        label: the behaviour it is specialized to, or "non-specialized".
+    """
+
+    shares: dict[str, float]
+    windows: int
+    switches: int
+    specialization: float
+    label: str
+
+
+def conduct(
+    record: Mapping[str, npt.NDArray[Any]], setting: Setting, rules: Rules | None = None
+) -> Conduct:
+    """Return what every predator did in every iteration of a recorded epoch.
+
+    Args:
+        record: x, y, heading (after each iteration), left, right, collided, each [T, B].
+        setting: the arena and the robots.
+        rules: where behaviours begin and end.
+    """
+    rules = rules or Rules()
+    r, w = setting.n_predators, rules.window
+    place = np.stack([record["x"], record["y"]], axis=-1).astype(np.float64)
+    heading = record["heading"].astype(np.float64)
+    place_before, heading_before = _before(place), _before(heading)
+
+    chord, direction = _commanded(record, heading_before, setting)
+    way = place_before[:, None, r:] - place_before[:, :r, None]  # [T, R, Q, 2], to the prey
+    far = np.maximum(np.linalg.norm(way, axis=-1), 1e-9)
+    gap = far - 2 * setting.radius_cm
+    ahead = np.einsum("trk,trqk->trq", direction, way)
+    aside = np.sqrt(np.maximum(far**2 - ahead**2, 0.0))
+    aims = ahead >= far * math.cos(math.radians(rules.aim_deg))
+    aims |= (ahead > 0) & (aside < 2 * setting.radius_cm)
+    refused = record["collided"][:, :r, None].astype(bool)
+    touches = refused & (gap <= rules.touch_cm) & (ahead > 0)
+    begins = touches & ~_before(touches)
+    seen_at = np.arctan2(-way[..., 1], -way[..., 0]) - heading_before[:, None, r:]
+    bearing = np.degrees(np.abs(_wrap(seen_at)))  # where the prey has the predator
+
+    turned = np.degrees(np.abs(_last(_wrap(heading - heading_before)[:, :r], w)))
+    idle = _last(chord, w) < rules.idle_cm
+    is_prey, is_near = _near(place, setting)
+    prey = is_prey.argmin(axis=-1)
+
+    def towards(values: npt.NDArray[Any]) -> Floats:
+        """Return the window's sum of what concerns the closest prey."""
+        chosen = np.take_along_axis(_last(values, w), prey[..., None], axis=-1)
+        return np.asarray(chosen[..., 0], dtype=np.float64)
+
+    most = rules.share * w
+    at_prey = (towards(aims) >= most) & (turned < rules.arc_deg)
+    faces = towards(bearing <= rules.front_deg) >= most
+    at_rear = (bearing >= rules.rear_deg) & (bearing <= rules.behind_deg)
+    beside = (towards(at_rear) >= most) & (towards(gap <= rules.near_cm) == w)
+    bumps = towards(begins) >= rules.bumps
+
+    near_prey = is_prey.min(axis=-1) <= setting.range_cm
+    interacts = near_prey & is_near
+    found = np.select(
+        [idle, bumps & (turned >= rules.arc_deg), bumps & beside, at_prey & faces, at_prey],
+        [IDLE, KNOCKER, FLANKER, BLOCKER, PURSUER],
+        NONE,
+    )
+    found = np.where(interacts | idle, found, NONE)
+    found[:w] = NONE
+    return Conduct(found.astype(np.int64), interacts, prey.astype(np.int64), w)
+
+
+def lifetimes(conducts: Sequence[Conduct]) -> list[Lifetime]:
+    """Return each predator's shares, S and label over all epochs.
+
+    Nitschke 2009, sections 3.2.1 and 4.6.4: the specialization metric with behaviours for actions.
+    Choice: a behaviour holds for a window, so a switch is possible from one window to the next, not
+    in every iteration. Choice: windows of an interaction without a behaviour count as "none", which
+    is also switched to and from; whoever does nothing else most of the time is non-specialized
+    ("perhaps none of the identified behaviors", 4.6.4). Choice: epochs are joined to one life.
+    """
+    names = (*BEHAVIOURS, "none")
+    lives = []
+    for i in range(conducts[0].behaviour.shape[1]):
+        executed = np.concatenate([_windows(one, i) for one in conducts])
+        counts = np.bincount(np.where(executed == NONE, len(BEHAVIOURS), executed), minlength=6)
+        switches = int((executed[1:] != executed[:-1]).sum())
+        s = float(degree(switches, counts))
+        name = label(s, counts, names)
+        lives.append(
+            Lifetime(
+                shares=dict(zip(names, shares(counts).tolist(), strict=True)),
+                windows=len(executed),
+                switches=switches,
+                specialization=s,
+                label=NON_SPECIALIZED if name == "none" else name,
+            )
+        )
+    return lives
+
+
+def spells(holds: Bools) -> list[tuple[int, int]]:
+    """Return the maximal intervals [start, stop) of ``holds`` [T]."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], holds.astype(np.int8), [0]])))
+    return [(int(start), int(stop)) for start, stop in edges.reshape(-1, 2)]
+
+
+def _windows(one: Conduct, i: int) -> Ints:
+    """Return predator ``i``'s behaviour in each of the windows that count."""
+    at = slice(one.start, None, one.start)
+    behaviour: Ints = one.behaviour[at, i]
+    executed: Ints = behaviour[one.interacts[at, i] | (behaviour != NONE)]
+    return executed
+
+
+def _commanded(
+    record: Mapping[str, npt.NDArray[Any]], heading: Floats, setting: Setting
+) -> tuple[Floats, Floats]:
+    """Return the predators' steps as commanded, refused or not: length [T, R] and direction."""
+    r = setting.n_predators
+    left, right = (record[side][:, :r].astype(np.float64) for side in ("left", "right"))
+    half = setting.speed_cm * (right - left) / (2 * setting.axle_cm)
+    chord = setting.speed_cm * (left + right) / 2 * np.sinc(half / np.pi)
+    angle = heading[:, :r] + half + np.where(chord < 0, np.pi, 0.0)
+    return np.abs(chord), np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+
+
+def _near(place: Floats, setting: Setting) -> tuple[Floats, Bools]:
+    """Return the gaps to each prey [T, R, Q] and whether another predator is in range [T, R]."""
+    r, body = setting.n_predators, 2 * setting.radius_cm
+    gaps = np.linalg.norm(place[:, :r, None] - place[:, None], axis=-1) - body
+    others = gaps[:, :, :r] + np.where(np.eye(r, dtype=bool), np.inf, 0.0)
+    return gaps[:, :, r:], others.min(axis=-1) <= setting.range_cm
+
+
+def _before(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """Return each iteration's value of the iteration before; the first has its own."""
+    return np.concatenate([values[:1], values[:-1]])
+
+
+def _last(values: npt.NDArray[Any], w: int) -> Floats:
+    """Return sums over the last ``w`` iterations, of what there is of them."""
+    total = np.cumsum(values.astype(np.float64), axis=0)
+    total[w:] -= total[:-w].copy()
+    return np.asarray(total, dtype=np.float64)
+
+
+def _wrap(angle: Floats) -> Floats:
+    """Return angles as the same ones in [-pi, pi)."""
+    return (angle + np.pi) % (2 * np.pi) - np.pi

@@ -1,0 +1,181 @@
+"""Collective behaviours: how predators together capture a prey.
+
+Nitschke 2009, section 4.6.3. A capture is named by the roles of its predators:
+
+===============  =============================================================================
+entrapment       3 or 4 pursuers
+pursuer-blocker  1 to 3 pursuers, 1 to 3 blockers
+spiders-fly      1 to 3 pursuers, 1 or 2 blockers, the prey at a wall (figure 4.6)
+role-switcher    1 to 3 flankers, 1 to 3 knockers, up to 3 idle; they switch these roles
+===============  =============================================================================
+
+Choice: one blocker is enough for pursuer-blocker, as in figure 4.5 and 4.6.6; 4.6.3 asks for two.
+Choice: the most demanding is tried first: role-switcher, spiders-fly, pursuer-blocker, entrapment;
+else the capture is none of them. Choice: idle predators are tolerated in all (4.5.3, 4.5.5); any
+other role that is not listed excludes the name. In the first three a predator counts for its
+longest role; in the role-switcher for all of them.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from conevo.analysis.behaviours import (
+    BEHAVIOURS,
+    FLANKER,
+    IDLE,
+    KNOCKER,
+    Conduct,
+    Rules,
+    Setting,
+    spells,
+)
+
+__all__ = ["COLLECTIVES", "COMPOSITIONS", "Capture", "find_captures", "most_frequent", "name"]
+
+COLLECTIVES = ("entrapment", "pursuer-blocker", "spiders-fly", "role-switcher", "none")
+# How many predators of each role, least and most.
+COMPOSITIONS = {
+    "entrapment": {"pursuer": (3, 4)},
+    "pursuer-blocker": {"pursuer": (1, 3), "blocker": (1, 3)},
+    "spiders-fly": {"pursuer": (1, 3), "blocker": (1, 2)},
+    "role-switcher": {"flanker": (1, 3), "knocker": (1, 3), "idle": (0, 3)},
+}
+Roles = Sequence[Sequence[str]]
+
+
+@dataclass(frozen=True)
+class Capture:
+    """One capture of one prey.
+
+    Attributes:
+        prey: which one.
+        start: first iteration of the approach.
+        first: first iteration in which the prey is captured.
+        stop: first iteration in which it no longer is.
+        roles: of each predator, the longest first; none if it took no part.
+        at_wall: whether the prey was captured at a wall.
+        switches: how often a predator changed between flanker, knocker and idle.
+        collective: what it is called.
+    """
+
+    prey: int
+    start: int
+    first: int
+    stop: int
+    roles: tuple[tuple[str, ...], ...]
+    at_wall: bool
+    switches: int
+    collective: str
+
+
+def find_captures(
+    record: Mapping[str, npt.NDArray[Any]],
+    one: Conduct,
+    setting: Setting,
+    rules: Rules | None = None,
+) -> list[Capture]:
+    """Return the captures of a recorded epoch, in the order of their prey and time.
+
+    Args:
+        record: x, y [T, B] and captured [T, Q].
+        one: what the predators did in it.
+        setting: the arena and the robots.
+        rules: how long an approach is, and so on.
+    """
+    rules = rules or Rules()
+    found = []
+    for q in range(record["captured"].shape[1]):
+        body = setting.n_predators + q
+        walls = [record[axis][:, body] for axis in "xy"]
+        walls += [setting.arena_cm - values for values in walls]
+        at_wall = np.min(walls, axis=0) - setting.radius_cm <= rules.wall_cm
+        before = 0
+        for first, stop in _joined(spells(record["captured"][:, q] > 0), rules.pause):
+            start = max(first - rules.approach, before)
+            doing = np.where(
+                one.interacts[start:stop] & (one.prey[start:stop] == q),
+                one.behaviour[start:stop],
+                len(BEHAVIOURS),
+            )
+            roles = tuple(_roles(column, rules) for column in doing.T)
+            switches = sum(_switches(column) for column in doing.T)
+            held = bool(at_wall[first:stop].mean() >= rules.share)
+            collective = name(roles, at_wall=held, switches=switches)
+            found.append(Capture(q, start, first, stop, roles, held, switches, collective))
+            before = stop
+    return found
+
+
+def name(roles: Roles, *, at_wall: bool, switches: int) -> str:
+    """Return the collective behaviour that predators with these roles form, or "none".
+
+    Args:
+        roles: of each predator, the longest first.
+        at_wall: whether the prey is at a wall.
+        switches: how often predators changed between flanker, knocker and idle.
+    """
+    taking = [own for own in roles if own]
+    switchers = COMPOSITIONS["role-switcher"]
+    if (
+        switches > 0
+        and sum(bool({"flanker", "knocker"} & set(own)) for own in taking) >= 2
+        and all(set(own) & set(switchers) for own in taking)
+        and _fits(Counter(role for own in taking for role in own), switchers)
+    ):
+        return "role-switcher"
+    longest = Counter(own[0] for own in taking)
+    for collective in ("spiders-fly", "pursuer-blocker", "entrapment"):
+        listed = COMPOSITIONS[collective]
+        if collective == "spiders-fly" and not at_wall:
+            continue
+        if set(longest) <= {*listed, "idle"} and _fits(longest, listed):
+            return collective
+    return "none"
+
+
+def most_frequent(captures: Iterable[Capture]) -> tuple[str, dict[str, int]]:
+    """Return the most frequent collective behaviour (equals by the order of ``COLLECTIVES``).
+
+    Also returns how often each of them was seen; "none" if nothing was captured.
+    """
+    seen = Counter(one.collective for one in captures)
+    counts = {collective: seen[collective] for collective in COLLECTIVES}
+    if not seen:
+        return "none", counts
+    return max(COLLECTIVES, key=lambda collective: counts[collective]), counts
+
+
+def _fits(counts: Mapping[str, int], listed: Mapping[str, tuple[int, int]]) -> bool:
+    return all(low <= counts.get(role, 0) <= high for role, (low, high) in listed.items())
+
+
+def _joined(intervals: list[tuple[int, int]], pause: int) -> list[tuple[int, int]]:
+    """Join intervals that less than ``pause`` iterations separate."""
+    joined: list[tuple[int, int]] = []
+    for start, stop in intervals:
+        if joined and start - joined[-1][1] < pause:
+            joined[-1] = (joined[-1][0], stop)
+        else:
+            joined.append((start, stop))
+    return joined
+
+
+def _roles(doing: npt.NDArray[np.int64], rules: Rules) -> tuple[str, ...]:
+    """Return the roles that last long enough, the longest first."""
+    counts = [int((doing == k).sum()) for k in range(len(BEHAVIOURS))]
+    order = sorted(range(len(BEHAVIOURS)), key=lambda k: -counts[k])
+    least = rules.role_share * len(doing)
+    return tuple(BEHAVIOURS[k] for k in order if counts[k] >= max(least, 1))
+
+
+def _switches(doing: npt.NDArray[np.int64]) -> int:
+    """Return the changes between flanker, knocker and idle, whatever is between them."""
+    roles = doing[np.isin(doing, (FLANKER, KNOCKER, IDLE))]
+    return int((roles[1:] != roles[:-1]).sum())

@@ -1,0 +1,145 @@
+"""Tables 4.4 and 4.5: what the fittest teams are made of, and what they lose without it.
+
+Nitschke 2009, sections 4.6.4 and 4.6.6. Both are plain data for any set of runs; of each method's
+runs the one with the fittest team is taken.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+
+from conevo.analysis.behaviours import BEHAVIOURS, Rules
+from conevo.analysis.captures import COLLECTIVES, COMPOSITIONS, Capture, most_frequent
+from conevo.analysis.pursuit import lab_of, observe
+from conevo.errors import UsageError
+from conevo.rng import fold
+from conevo.runs.champions import Team
+from conevo.runs.run import Run
+from conevo.specialization.individual import NON_SPECIALIZED
+
+__all__ = ["composition", "composition_table", "fittest_runs", "lesion_table"]
+
+HEURISTIC = 0  # of pursuit-v1: straight at the prey, else to its last place, else a random walk
+
+
+def composition_table(
+    runs: Iterable[Run],
+    scenarios: int = 20,
+    *,
+    threads: int | None = None,
+    rules: Rules | None = None,
+) -> list[dict[str, Any]]:
+    """Return table 4.4: how many predators are specialized to which collective behaviour.
+
+    Plain data, a row per method: method, run, task, predators, a number for each of the four
+    collective behaviours (None, the thesis' NA, if the team never showed it), "non-specialized",
+    and labels, the individual behaviour of each predator.
+
+    Raises:
+        UsageError: no runs, a run of another world, or one without a team.
+    """
+    rows = []
+    for method, run in fittest_runs(runs).items():
+        seen = observe(run, scenarios, threads=threads, rules=rules)
+        labels = [life.label for life in seen.lifetimes]
+        about = {"method": method, "run": str(run.path), "task": run.config.task}
+        members = composition(labels, seen.all_captures)
+        rows.append(about | {"predators": len(labels)} | members | {"labels": labels})
+    return rows
+
+
+def composition(labels: Sequence[str], captures: Sequence[Capture]) -> dict[str, int | None]:
+    """Return how many predators belong to each collective behaviour, and to none.
+
+    Choice: a predator specialized to an individual behaviour belongs to the collective behaviour
+    that it took part in most often in that role (4.6.3); to none, and is counted as
+    non-specialized, if it never did.
+
+    Args:
+        labels: of each predator, an individual behaviour or "non-specialized".
+        captures: of its team.
+    """
+    occurs = most_frequent(captures)[1]
+    table: dict[str, int | None] = {
+        name: 0 if occurs[name] else None for name in COLLECTIVES if name != "none"
+    }
+    table[NON_SPECIALIZED] = 0
+    for predator, label in enumerate(labels):
+        parts = Counter(
+            one.collective
+            for one in captures
+            if label in one.roles[predator] and label in COMPOSITIONS.get(one.collective, ())
+        )
+        most = max(COMPOSITIONS, key=lambda name: parts[name])
+        belongs = most if parts else NON_SPECIALIZED
+        table[belongs] = (table[belongs] or 0) + 1
+    return table
+
+
+def lesion_table(
+    runs: Iterable[Run],
+    scenarios: int = 20,
+    *,
+    threads: int | None = None,
+    rules: Rules | None = None,
+) -> list[dict[str, Any]]:
+    """Return table 4.5: capture time after specialized predators were replaced by heuristic ones.
+
+    Plain data, a row per method: method, run, task, capture_time (unlesioned), and for each
+    individual behaviour the percentage of it that is left when all predators specialized to the
+    behaviour are replaced; None if there is no such predator, or nothing was ever captured. All
+    teams of a row meet the same fresh scenarios, others than those they were labelled in.
+
+    Raises:
+        UsageError: no runs, a run of another world, or one without a team.
+    """
+    rows = []
+    for method, run in fittest_runs(runs).items():
+        seen = observe(run, scenarios, threads=threads, rules=rules)
+        team, lab = lab_of(run, threads)
+        labels = np.array([life.label for life in seen.lifetimes])
+        lesioned = [behaviour for behaviour in BEHAVIOURS if behaviour in labels]
+        modes = np.full((1 + len(lesioned), len(labels)), -1, dtype=np.int32)
+        for k, behaviour in enumerate(lesioned, start=1):
+            modes[k, labels == behaviour] = HEURISTIC
+        genes, teams = team.as_trial()
+        keys = [fold(seen.seed, "lesion", k) for k in range(scenarios)]
+        outcome = lab.rollout.evaluate(
+            genes, np.repeat(teams, len(modes), axis=0), lab.world.scenarios(keys), modes
+        )
+        times = outcome.performance["capture_time"].astype(np.float64).mean(axis=1).tolist()
+        left = dict(zip(lesioned, times[1:], strict=True))
+        whole = times[0]
+        rows.append(
+            {"method": method, "run": str(run.path), "task": run.config.task}
+            | {"capture_time": whole}
+            | {
+                behaviour: 100 * left[behaviour] / whole if behaviour in left and whole else None
+                for behaviour in BEHAVIOURS
+            }
+        )
+    return rows
+
+
+def fittest_runs(runs: Iterable[Run]) -> dict[str, Run]:
+    """Return each method's run with the fittest champion, the earlier given one if equal.
+
+    Raises:
+        UsageError: no runs, or one without a team.
+    """
+    best: dict[str, Run] = {}
+    teams: dict[str, Team] = {}
+    for run in runs:
+        team = run.champion
+        if team is None:
+            raise UsageError(f"{run.path} has no finished generation yet, so no team to observe")
+        method = run.config.method
+        if team.is_fitter_than(teams.get(method)):
+            best[method], teams[method] = run, team
+    if not best:
+        raise UsageError("no runs were given, so there is no table")
+    return best

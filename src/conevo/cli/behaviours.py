@@ -1,0 +1,59 @@
+"""``conevo behaviours``: what the predators of a run's fittest team do."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import click
+
+__all__ = ["behaviours"]
+
+
+@click.command(short_help="Say who pursues, blocks, flanks, knocks and idles.")
+@click.argument("run")
+@click.option(
+    "--scenarios", type=click.IntRange(1), default=20, show_default=True, help="How many."
+)
+@click.option("--seed", type=click.IntRange(0), help="Draw other scenarios (default: the run's).")
+@click.option(
+    "--threads", type=click.IntRange(1), help="CPU threads (default all); changes no result."
+)
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+def behaviours(
+    run: str, scenarios: int, seed: int | None, threads: int | None, as_json: bool
+) -> None:
+    """Watch the fittest team of RUN, a run of pursuit, in fresh scenarios; writes nothing."""
+    from conevo.analysis.report import report
+    from conevo.cli.find import find_run
+
+    found = report(find_run(run), scenarios, seed, threads=threads)
+    click.echo(json.dumps(found) if as_json else _text(found))
+
+
+def _text(found: dict[str, Any]) -> str:
+    from conevo.cli.text import castes, number, table
+
+    def two(values: Any) -> list[str]:
+        return [f"{v:.2f}" if isinstance(v, float) else str(v) for v in values]
+
+    lives = found["predators"]
+    names, columns = list(lives[0]["shares"]), ("reproduced", "primitive", "left", "right")
+    seen = {name: n for name, n in found["captures"].items() if n}
+    return "\n".join([
+        f"{found['run']}: fittest team (generation {found['generation']}), {found['scenarios']} "
+        f"fresh scenarios, capture time {number(found['capture_time'])}",
+        "\nShares of the windows in which a predator interacts or idles",
+        table(["", *names, "S", "label"], [
+            [f"predator {k}", *two(one["shares"].values()), number(one["specialization"]),
+             one["label"]] for k, one in enumerate(lives)]),
+        f"\nCaptures: {castes(seen) or 'none'}; most frequent: {found['collective']}",
+        "\nAverages of the sensors, from the front counter-clockwise",
+        table(["", "", *map(str, range(8))], [
+            [row["behaviour"], kind, *two(row[kind])]
+            for row in found["sensors"] for kind in ("proximity", "light")]),
+        "\nWith the sensors held at a predator's own averages (portion of trials)",
+        table(["", "behaviour", *columns, "result"], [
+            [f"predator {row['predator']}", row["behaviour"], *two(row[c] for c in columns),
+             row["result"]] for row in found["reproduction"]]),
+    ])  # fmt: skip

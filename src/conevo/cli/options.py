@@ -1,0 +1,125 @@
+"""What the verbs that start something share: their options, and what these ask for."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+from conevo.cli.carry import carry_on, style_of
+
+if TYPE_CHECKING:
+    from conevo.runs.config import RunConfig
+
+__all__ = ["Order", "setting_options"]
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+PLACE = "on the command line"
+OPTIONS = (
+    click.option(
+        "--method", metavar="NAME", help="cone (default), mesp, ccga, hetcne, homcne, cone-1..3."
+    ),
+    click.option(
+        "--preset", metavar="NAME", help="smoke (seconds), desk (minutes, default), night, thesis."
+    ),
+    click.option("--seed", type=int, help="Root of all randomness (default 1)."),
+    click.option(
+        "--set", "settings", metavar="KEY=VALUE", multiple=True,
+        help="One setting, for example run.generations=5; may be repeated.",
+    ),
+    click.option(
+        "--config", metavar="FILE", help="TOML file with settings, such as a run's config.toml."
+    ),
+    click.option(
+        "--budget-evaluations", type=int, help="Spend at most this many team evaluations."
+    ),
+    click.option(
+        "--threads", type=click.IntRange(1), help="CPU threads (default all); changes no result."
+    ),
+    click.option("--device", default="cpu", show_default=True, help="cpu or cuda."),
+    click.option("--out", metavar="DIR", help="Its directory (default: a new one in runs/)."),
+)  # fmt: skip
+
+
+def setting_options(function: Function) -> Function:
+    """Add the options that say what to start, and where."""
+    for option in reversed(OPTIONS):
+        function = option(function)
+    return function
+
+
+@dataclass
+class Order:
+    """What a command line asks for; the fields are named as the options are.
+
+    Raises:
+        UsageError: options that exclude each other.
+    """
+
+    method: str | None
+    preset: str | None
+    seed: int | None
+    settings: tuple[str, ...]
+    config: str | None
+    budget_evaluations: int | None
+    threads: int | None
+    device: str
+    out: str | None
+    as_json: bool
+    quiet: bool
+    verbose: bool
+
+    def __post_init__(self) -> None:
+        from conevo.runs.config import parse_assignment
+
+        self.style = style_of(self.as_json, self.quiet, self.verbose)
+        self.overrides = dict(parse_assignment(text) for text in self.settings)
+        if self.budget_evaluations is not None:
+            self.overrides["run.budget_evaluations"] = self.budget_evaluations
+        self.command = shlex.join(["conevo", *sys.argv[1:]])
+
+    def resolve(self, world: str | None) -> RunConfig:
+        """Return the configuration for a world, or for the one that the file names."""
+        from conevo.runs.config import resolve
+
+        return resolve(
+            world,
+            self.method,
+            self.preset,
+            self.seed,
+            file=self.config,
+            overrides=self.overrides,
+            place=PLACE,
+        )
+
+    def run(self, config: RunConfig) -> None:
+        """Start a run and carry it on to its end."""
+        from conevo.runs.run import start
+
+        begun = start(
+            config, self.out, threads=self.threads, device=self.device, command=self.command
+        )
+        carry_on(begun, self.threads, self.style)
+
+    def shape(self, tasks: Sequence[str]) -> None:
+        """Start a shaping and carry it on to its end."""
+        from conevo.runs.shaping import start_shaping
+
+        begun = start_shaping(
+            tasks,
+            self.method,
+            self.preset,
+            self.seed,
+            self.out,
+            self.overrides,
+            config=self.config,
+            threads=self.threads,
+            device=self.device,
+            command=self.command,
+            place=PLACE,
+        )
+        carry_on(begun, self.threads, self.style)

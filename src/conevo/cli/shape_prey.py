@@ -1,0 +1,26 @@
+"""``conevo shape-prey``: evolve the prey of the pursuit world."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+
+from conevo.cli.carry import output_options
+from conevo.cli.options import Order, setting_options
+
+__all__ = ["shape_prey"]
+
+
+@click.command("shape-prey", short_help="Evolve prey for the pursuit world.")
+@setting_options
+@output_options
+def shape_prey(**options: Any) -> None:
+    """Run the six prey experiments in turn, each beginning with the populations of the one before.
+
+    Everything is kept in one directory, the evolved prey in its prey.npz. Ctrl-C leaves what
+    conevo resume continues.
+    """
+    from conevo.runs.evolved_prey import PREY_TASKS
+
+    Order(**options).shape(PREY_TASKS)

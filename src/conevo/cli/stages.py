@@ -1,0 +1,110 @@
+"""A shaping in words: its stages with what their champions achieved, and what can be done next."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import click
+
+from conevo.cli.summary import title
+from conevo.cli.text import count, duration, number, table
+from conevo.runs.run import Run
+from conevo.runs.shaping import Shaping
+
+__all__ = ["print_shaping_end", "shaping_text", "span", "stage_summary"]
+
+
+def span(shaping: Shaping) -> str:
+    """Return the tasks of a shaping in short: "rover-v1/complex-1 to complex-3"."""
+    first, last = shaping.configs[0], shaping.configs[-1]
+    return f"{first.task} to {last.environment}"
+
+
+def print_shaping_end(shaping: Shaping, style: str) -> None:
+    """Print how a shaping ended, in the style asked for."""
+    if style == "quiet":
+        click.echo(shaping.path)
+    elif style == "json":
+        end = {
+            "shaping": str(shaping.path),
+            "status": shaping.status,
+            "stages": [stage_summary(run) for run in shaping.stages],
+            "prey": None if shaping.prey is None else str(shaping.prey),
+        }
+        click.echo(json.dumps(end))
+    else:
+        commands = "\n".join(f"  {command}" for command in _next_commands(shaping))
+        click.echo(f"\n{shaping_text(shaping)}\n\nWhat next:\n{commands}")
+
+
+def shaping_text(shaping: Shaping) -> str:
+    """Return a finished or unfinished shaping as text."""
+    stages = shaping.stages
+    state, changed = shaping.status, shaping.changed_files
+    state += f"; CHANGED SINCE: {', '.join(changed)}" if changed else ""
+    records = [record for run in stages for record in run.generations()]
+    seconds = sum(record["seconds"] for record in records)
+    parts = [
+        title(shaping.configs[-1]).replace(shaping.configs[-1].task, span(shaping)),
+        f"{shaping.path}: {state}",
+        f"{len(stages)} of {len(shaping.configs)} stages begun, {len(records)} generations, "
+        f"{duration(seconds)}",
+    ]
+    if stages:
+        parts += ["", _table(stages)]
+    if shaping.status == "interrupted":
+        parts += ["", f"Continue it with: conevo resume {shaping.path}"]
+    return "\n".join(parts)
+
+
+def stage_summary(run: Run) -> dict[str, Any]:
+    """Return a stage in one object."""
+    return {
+        "run": str(run.path),
+        "task": run.config.task,
+        "status": run.status,
+        "generations": len(run.generations()),
+        "test": run.test_result,
+    }
+
+
+def _table(stages: list[Run]) -> str:
+    """Return one line per stage; a champion's performance is that of the testing phase."""
+    tested = [
+        run.test_result["champion"]["performance"] if run.test_result else {} for run in stages
+    ]
+    measures = list(dict.fromkeys(name for performance in tested for name in performance))
+    rows = []
+    for stage, (run, performance) in enumerate(zip(stages, tested, strict=True), start=1):
+        records, champion = run.generations(), run.champion
+        spreads = [performance.get(name) for name in measures]
+        rows.append(
+            [
+                str(stage),
+                run.config.task,
+                run.status,
+                f"{len(records)}/{run.config.run.generations}",
+                count(records[-1]["team_evaluations"] if records else 0),
+                "-" if champion is None else str(champion.generation),
+                *(
+                    "-" if s is None else f"{number(s['mean'])} +- {number(s['sd'])}"
+                    for s in spreads
+                ),
+            ]
+        )
+    head = ["stage", "task", "status", "generations", "evaluations", "champion of", *measures]
+    return table(head, rows)
+
+
+def _next_commands(shaping: Shaping) -> list[str]:
+    """Return the exact commands for what can be done now, each after a comment."""
+    last = shaping.stages[-1].path
+    commands = {
+        f"conevo show {last}": "the generations of its last stage",
+        f"conevo test {shaping.path} --scenarios 100": "test the team of its last stage longer",
+    }
+    if shaping.prey is not None:
+        pursuit = f"conevo run pursuit/team-3 --prey {shaping.prey}"
+        commands[pursuit] = "set predators on the evolved prey"
+    return [line for command, what in commands.items() for line in (f"# {what}", command)]

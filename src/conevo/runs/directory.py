@@ -1,0 +1,216 @@
+"""A directory of results: it appears all at once, has one writer and is never overwritten.
+
+::
+
+    config.toml or shaping.toml    says what it holds: a run, or a shaping with a run per stage
+    lock                           held (flock) by the process that is at work here
+    DONE                           the seal of what is finished: digests of all files
+"""
+
+from __future__ import annotations
+
+import fcntl
+import hashlib
+import json
+import os
+import shutil
+import tempfile
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from conevo.errors import EnvironmentFailure, UsageError
+from conevo.runs.durable import replace_file, sync_directory, writing
+
+__all__ = [
+    "CONFIG",
+    "SHAPING",
+    "Directory",
+    "appearing",
+    "as_json",
+    "kind_of",
+    "read_json",
+    "refuse_existing",
+]
+
+CONFIG, SHAPING, LOCK, SEAL = "config.toml", "shaping.toml", "lock", "DONE"
+KINDS = {CONFIG: "run", SHAPING: "shaping"}
+
+
+def kind_of(path: Path) -> str:
+    """Return what a directory holds: "run", "shaping" or nothing ("")."""
+    return next((kind for name, kind in KINDS.items() if (path / name).is_file()), "")
+
+
+@contextmanager
+def appearing(path: Path) -> Iterator[Path]:
+    """Yield a hidden directory to be filled; it then takes the name ``path``, all at once.
+
+    A kill before that leaves at most the hidden directory, which nothing reads.
+
+    Raises:
+        UsageError: something is there already; it is left as it is.
+        EnvironmentFailure: the directory cannot be written.
+    """
+    refuse_existing(path)
+    with writing(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        draft = Path(tempfile.mkdtemp(prefix=f".{path.name}.", dir=path.parent))
+    try:
+        yield draft
+        with writing(path):
+            draft.chmod(0o777 & ~_umask())
+            _appear(draft, path)
+            sync_directory(path.parent)
+    except EnvironmentFailure as error:
+        raise EnvironmentFailure(str(error).replace(str(draft), str(path))) from error
+    finally:
+        shutil.rmtree(draft, ignore_errors=True)  # gone by now if all went well
+
+
+def _appear(draft: Path, path: Path) -> None:
+    """Give a finished draft its name, unless another process was faster."""
+    try:
+        draft.rename(path)
+    except OSError:
+        refuse_existing(path)
+        raise
+
+
+def refuse_existing(path: Path) -> None:
+    """Say what is at ``path`` and what can be done with it, if anything is."""
+    if not (path.is_symlink() or path.exists()) or (path.is_dir() and not any(path.iterdir())):
+        return
+    kind = kind_of(path)
+    if not kind:
+        raise UsageError(f"{path} exists and is no run; choose another place with --out")
+    directory = Directory(path, kind)
+    if directory.is_finished:
+        advice = f"finished: see it with 'conevo show {path}', or choose another --seed or --out"
+    elif directory.is_in_use:
+        advice = f"in use by {directory.user}; watch it with 'conevo show {path}'"
+    else:
+        advice = f"unfinished: continue it with 'conevo resume {path}'"
+    raise UsageError(f"{path} already holds a {kind}, {advice}")
+
+
+class Directory:
+    """What all directories of results have: one writer at a time, and a seal in the end.
+
+    Args:
+        path: the directory.
+        kind: what it must hold, "run" or "shaping".
+
+    Raises:
+        UsageError: it does not.
+    """
+
+    def __init__(self, path: Path, kind: str) -> None:
+        name = next(name for name in KINDS if KINDS[name] == kind)
+        if not (path / name).is_file():
+            raise UsageError(f"{path} is no {kind} (it has no {name})")
+        self.path = path
+
+    @contextmanager
+    def locked(self) -> Iterator[None]:
+        """Keep every other process from writing here.
+
+        Raises:
+            UsageError: another process is at work in this directory.
+        """
+        path = self.path / LOCK
+        with writing(path):
+            handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
+        try:
+            if not _try_lock(handle, fcntl.LOCK_EX):
+                raise UsageError(f"{self.path} is in use by {self.user}; wait for it or end it")
+            with writing(path):
+                os.truncate(handle, 0)
+                os.pwrite(handle, f"process {os.getpid()}".encode(), 0)
+            yield
+        finally:
+            os.close(handle)
+
+    @property
+    def is_in_use(self) -> bool:
+        """Whether a process is at work here now."""
+        try:
+            handle = os.open(self.path / LOCK, os.O_RDONLY)
+        except OSError:
+            return False
+        try:
+            return not _try_lock(handle, fcntl.LOCK_SH)
+        finally:
+            os.close(handle)
+
+    @property
+    def user(self) -> str:
+        """The process that is or was last at work here."""
+        path = self.path / LOCK
+        return (path.read_text() if path.is_file() else "") or "another process"
+
+    @property
+    def is_finished(self) -> bool:
+        """Whether it is sealed."""
+        return (self.path / SEAL).is_file()
+
+    def seal(self) -> None:
+        """Close the directory: write the digests of all files."""
+        replace_file(self.path / SEAL, as_json({"files": self._digests()}))
+
+    def check_seal(self) -> list[str]:
+        """Return the names of files that are not as they were when the directory was sealed."""
+        sealed: Mapping[str, str] = read_json(self.path / SEAL)["files"]
+        found = self._digests()
+        return sorted(name for name in sealed if found.get(name) != sealed[name])
+
+    def _digests(self) -> dict[str, str]:
+        files = sorted(p for p in self.path.rglob("*") if p.is_file() and p.suffix != ".tmp")
+        return {
+            p.relative_to(self.path).as_posix(): hashlib.blake2b(
+                p.read_bytes(), digest_size=16
+            ).hexdigest()
+            for p in files
+            if p.name not in (SEAL, LOCK)
+        }
+
+
+def as_json(value: Mapping[str, Any]) -> bytes:
+    """Return the text of a JSON file."""
+    return (json.dumps(value, indent=1, allow_nan=False) + "\n").encode()
+
+
+def read_json(path: Path) -> dict[str, Any]:
+    """Return the content of a JSON file.
+
+    Raises:
+        UsageError: it is damaged.
+        EnvironmentFailure: it cannot be read.
+    """
+    try:
+        found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise EnvironmentFailure(f"cannot read {path}: {error.strerror}") from error
+    except ValueError as error:
+        raise UsageError(f"{path} is damaged: {error}") from error
+    return found
+
+
+def _try_lock(handle: int, kind: int) -> bool:
+    """Take a lock if it is free; the tries outlast another process that only looks."""
+    for _ in range(5):
+        try:
+            fcntl.flock(handle, kind | fcntl.LOCK_NB)
+        except OSError:
+            time.sleep(0.02)
+        else:
+            return True
+    return False
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask

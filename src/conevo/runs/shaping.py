@@ -1,0 +1,258 @@
+"""Shaping: a task learned in stages, each a run that begins with the last one's populations.
+
+Nitschke 2009, sections 4.3 (prey) and 6.4.2 (construction)::
+
+    shaping.toml    the resolved configuration of every stage; never changes
+    stage-1/ ...    the runs, each as any other; a stage appears when the one before is sealed
+    prey.npz        the evolved prey, if the stages are the six experiments that shape prey
+    DONE            the seal of a finished shaping: digests of all files
+    lock            held (flock) by the process that is at work here
+"""
+
+from __future__ import annotations
+
+import hashlib
+import shutil
+import tomllib
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+
+from conevo.errors import EnvironmentFailure, UsageError
+from conevo.evolution.protocol import State
+from conevo.runs.config import RunConfig, resolve
+from conevo.runs.directory import CONFIG, SHAPING, Directory, appearing, refuse_existing
+from conevo.runs.durable import replace_file
+from conevo.runs.evolved_prey import PREY, PREY_TASKS, save_prey
+from conevo.runs.lab import Lab
+from conevo.runs.run import RUNS, Run, Watch, start
+from conevo.worlds.registry import resolve as resolve_world
+
+__all__ = ["Shaping", "start_shaping", "tasks_up_to"]
+
+FORMAT = 1
+
+
+def tasks_up_to(task: str) -> list[str]:
+    """Return a task's family up to it: complex-1, complex-2, complex-3 for "rover/complex-3".
+
+    Raises:
+        UsageError: no such task, or none comes before it.
+    """
+    entry, environment = resolve_world(task)
+    family, _, number = environment.rpartition("-")
+    if not (family and number.isdecimal() and int(number) > 1):
+        raise UsageError(f"there is nothing to shape: no environment comes before {task}")
+    return [f"{entry.name}/{family}-{k}" for k in range(1, int(number) + 1)]
+
+
+def start_shaping(
+    tasks: Sequence[str],
+    method: str | None = None,
+    preset: str | None = None,
+    seed: int | None = None,
+    out: str | Path | None = None,
+    overrides: Mapping[str, Any] | None = None,
+    *,
+    config: str | Path | None = None,
+    threads: int | None = None,
+    device: str = "cpu",
+    command: str = "conevo.runs.shaping.start_shaping",
+    place: str = "in overrides",
+) -> Shaping:
+    """Create the directory of a shaping that is then carried on by ``Shaping.resume``.
+
+    Args:
+        tasks: worlds and environments in the order in which they are learned.
+        method: of all stages, as the settings that follow.
+        preset: "smoke", "desk" (default), "night", "thesis".
+        seed: the same seed gives the same stages, to the bit.
+        out: the directory; by default a new one under ``runs/``.
+        overrides: single settings, for example ``{"run.generations": 5}``.
+        config: a TOML file with settings; ``tasks`` win over the world it names.
+        threads: CPU threads, all by default; results do not depend on it.
+        device: "cpu" or "cuda".
+        command: what the provenance says the stages were started with.
+        place: where ``overrides`` came from, for error messages.
+
+    Raises:
+        UsageError: no task, a name or value that is not allowed in any stage, populations that do
+            not fit the next stage, or ``out`` exists; nothing was written.
+        EnvironmentFailure: no such device, full disk, no permission.
+    """
+    if not tasks:
+        raise UsageError("a shaping needs at least one task")
+    configs = [resolve(task, method, preset, seed, config, overrides, place) for task in tasks]
+    path = Path(out) if out is not None else RUNS / _label(configs)
+    refuse_existing(path)
+    state: State | None = None
+    for stage in configs:
+        state = Lab.equip(stage, threads, device).first_state(state)
+    about = {
+        "format": FORMAT,
+        "command": command,
+        "device": device,
+        "run_ids": [stage.run_id for stage in configs],
+        "stages": [stage.tables() for stage in configs],
+    }
+    with appearing(path) as draft:
+        replace_file(draft / SHAPING, tomli_w.dumps(about).encode())
+    return Shaping(path)
+
+
+class Shaping:
+    """A shaping on disk, finished or not.
+
+    Args:
+        path: its directory.
+
+    Raises:
+        UsageError: there is no shaping at ``path``, or it is not the one that was started.
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        self._directory = Directory(Path(path), "shaping")
+        self.path = self._directory.path
+        about = _read(self.path / SHAPING)
+        self._command, self._device = str(about["command"]), str(about["device"])
+        self.configs: list[RunConfig] = about["configs"]
+
+    def __repr__(self) -> str:
+        return f"Shaping({str(self.path)!r})"
+
+    @property
+    def status(self) -> str:
+        """Return "finished", "running" or "interrupted"."""
+        if self._directory.is_finished:
+            return "finished"
+        return "running" if self._directory.is_in_use else "interrupted"
+
+    @property
+    def tasks(self) -> list[str]:
+        """World and environment of every stage, in order."""
+        return [config.task for config in self.configs]
+
+    @property
+    def stages(self) -> list[Run]:
+        """The stages that have begun, in order.
+
+        Raises:
+            UsageError: a stage is not the one that was planned.
+        """
+        begun: list[Run] = []
+        for number, config in enumerate(self.configs, start=1):
+            if not (self._stage_path(number) / CONFIG).is_file():
+                break
+            run = Run(self._stage_path(number))
+            if run.config.run_id != config.run_id:
+                raise UsageError(f"{run.path} is not stage {number} of {self.path / SHAPING}")
+            begun.append(run)
+        return begun
+
+    @property
+    def prey(self) -> Path | None:
+        """The file with the evolved prey of a finished shaping, None if it makes none."""
+        has_prey = self._directory.is_finished and tuple(self.tasks) == PREY_TASKS
+        return self.path / PREY if has_prey else None
+
+    @property
+    def changed_files(self) -> list[str]:
+        """Files of a finished shaping that are not as they were when it was sealed."""
+        return self._directory.check_seal() if self._directory.is_finished else []
+
+    def refuse_finished(self) -> None:
+        """Raise UsageError if there is nothing left to do."""
+        if self._directory.is_finished:
+            raise UsageError(f"{self.path} is finished; see it with 'conevo show {self.path}'")
+
+    def resume(
+        self,
+        *,
+        threads: int | None = None,
+        watch: Watch | None = None,
+        remark: Callable[[str], None] | None = None,
+    ) -> Shaping:
+        """Carry the shaping on to the end of its last stage: the same bits as without a break.
+
+        Args:
+            threads: CPU threads, all by default.
+            watch: called with the stage and the record of each finished generation.
+            remark: told about a checkpoint that could not be used.
+
+        Raises:
+            UsageError: finished, in use, or a stage cannot be resumed.
+            EnvironmentFailure: the machine refused; resume when it no longer does.
+        """
+        return self.carry_on(
+            lambda run, _: run.resume(threads=threads, watch=watch, remark=remark), threads
+        )
+
+    def carry_on(self, carry: Callable[[Run, int], object], threads: int | None = None) -> Shaping:
+        """Begin one stage after the other; ``carry`` resumes each to its end.
+
+        Args:
+            carry: called with a stage that is not finished and its number, from 1.
+            threads: CPU threads, all by default.
+        """
+        self.refuse_finished()
+        with self._directory.locked():
+            self.refuse_finished()
+            for draft in self.path.glob(".stage-*"):  # of a process that was killed
+                shutil.rmtree(draft, ignore_errors=True)
+            for number in range(1, len(self.configs) + 1):
+                run = self._stage(number, threads)
+                if run.status != "finished":
+                    carry(run, number)
+            if tuple(self.tasks) == PREY_TASKS:
+                save_prey(self.stages, self.path / PREY)
+            self._directory.seal()
+        return self
+
+    def _stage(self, number: int, threads: int | None) -> Run:
+        """Return a stage, begun by now; the ones before are finished."""
+        begun = self.stages
+        if number <= len(begun):
+            return begun[number - 1]
+        return start(
+            self.configs[number - 1],
+            self._stage_path(number),
+            threads=threads,
+            device=self._device,
+            command=self._command,
+            origin=begun[-1] if begun else None,
+        )
+
+    def _stage_path(self, number: int) -> Path:
+        return self.path / f"stage-{number}"
+
+
+def _label(configs: Sequence[RunConfig]) -> str:
+    """Return a readable, unique directory name."""
+    first, last = configs[0], configs[-1]
+    tasks = f"{first.task}-to-{last.environment}".replace("/", "-")
+    ids = hashlib.blake2b("".join(config.run_id for config in configs).encode(), digest_size=3)
+    return f"{tasks}-{first.method}-{first.preset}-s{first.run.seed}-{ids.hexdigest()}"
+
+
+def _read(path: Path) -> dict[str, Any]:
+    """Return what a shaping file says, with the stages' configurations as ``configs``."""
+    try:
+        about = tomllib.loads(path.read_text(encoding="utf-8"))
+        if about["format"] != FORMAT:
+            raise UsageError(f"{path} was written by another version of conevo")
+        stages, run_ids = about["stages"], about["run_ids"]
+        settings = [
+            {f"{part}.{key}": stage[part][key] for part in stage for key in stage[part]}
+            for stage in stages
+        ]
+        command, device = about["command"], about["device"]
+    except OSError as error:
+        raise EnvironmentFailure(f"cannot read {path}: {error.strerror}") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, KeyError, TypeError) as error:
+        raise UsageError(f"{path} is damaged: {error}") from error
+    configs = [resolve(overrides=stage, place=f"in {path}") for stage in settings]
+    if [config.run_id for config in configs] != run_ids:
+        raise UsageError(f"{path} was changed after the shaping was started; start another one")
+    return {"configs": configs, "command": command, "device": device}

@@ -1,0 +1,459 @@
+"""A task learned in stages: each begins with the last one's populations, and no kill is noticed."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import conevo
+from conevo.errors import EnvironmentFailure, UsageError
+from conevo.evolution.methods.registry import METHODS
+from conevo.runs import durable
+from conevo.runs.config import resolve
+from conevo.runs.evolved_prey import PREY_TASKS
+from conevo.runs.run import start
+from conevo.runs.shaping import Shaping, start_shaping, tasks_up_to
+from conevo.worlds import prey_sets
+from runs.tiny import TASK, TINY, arrays, content, evolve_tiny, tiny_settings
+
+TASKS = tasks_up_to("rover/complex-3")
+BRIEF = {"run.generations": 3}
+PREY = {key: value for key, value in TINY.items() if key != "world.n_robots"} | BRIEF
+
+
+def begin(path: Path, method: str = "cone", tasks: list[str] = TASKS, **more: Any) -> Shaping:
+    """Start a tiny shaping in which everything a method has is at work."""
+    settings = tiny_settings(method) | BRIEF | more
+    return start_shaping(tasks, method, "smoke", out=path, overrides=settings, threads=1)
+
+
+def stages_content(path: Path) -> dict[str, Any]:
+    """Return everything that a shaping amounts to, without times."""
+    found: dict[str, Any] = {"run_ids": [config.run_id for config in Shaping(path).configs]}
+    for stage in sorted(path.glob("stage-*")):
+        found[stage.name] = content(stage)
+        if (stage / "origin.npz").exists():
+            found[f"{stage.name} origin"] = arrays(stage / "origin.npz")
+    if (path / "prey.npz").exists():
+        found["prey"] = (path / "prey.npz").read_bytes()
+    return found
+
+
+def genes(path: Path) -> np.ndarray:
+    """Return the genotypes in a checkpoint."""
+    with np.load(path) as archive:
+        return archive["field.genes"]
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_every_stage_begins_with_the_populations_of_the_one_before(
+    method: str, tmp_path: Path
+) -> None:
+    shaping = begin(tmp_path / "shaped", method).resume(threads=1)
+    assert shaping.status == "finished"
+    assert [run.config.task for run in shaping.stages] == TASKS
+    first, *others = shaping.stages
+    assert not (first.path / "origin.npz").exists()
+    assert "origin" not in first.provenance
+    alone = evolve_tiny(tmp_path / "alone", method, run__generations=3)
+    assert content(first.path) == content(alone.path)  # the first stage is a run as any other
+    for before, run in zip(shaping.stages, others, strict=False):
+        (last,) = before.path.glob("checkpoint-?.npz")
+        np.testing.assert_array_equal(genes(run.path / "origin.npz"), genes(last))
+        origin = run.provenance["origin"]
+        with np.load(last) as archive:
+            checkpoint = json.loads(archive["about"].tobytes())["digest"]
+        assert origin == {
+            "path": str(before.path),
+            "run_id": before.config.run_id,
+            "generation": 3,
+            "checkpoint": checkpoint,
+        }
+        assert [record["generation"] for record in run.generations()] == [0, 1, 2]
+
+
+def test_the_same_settings_give_the_same_stages(tmp_path: Path) -> None:
+    one = begin(tmp_path / "one").resume(threads=1)
+    two = begin(tmp_path / "two").resume(threads=2)
+    assert stages_content(one.path) == stages_content(two.path)
+
+
+class Crash(BaseException):
+    """The end of the process at this point."""
+
+
+def fail_at(monkeypatch: pytest.MonkeyPatch, call: int, problem: BaseException) -> list[int]:
+    """Let the ``call``-th fsync fail; return the list that counts them."""
+    calls: list[int] = []
+    sync = os.fsync
+
+    def fsync(handle: int) -> None:
+        calls.append(handle)
+        if len(calls) - 1 == call:
+            raise problem
+        sync(handle)
+
+    monkeypatch.setattr(durable.os, "fsync", fsync)
+    return calls
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("problem", [Crash(), OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))])
+def test_resume_after_a_failure_at_every_write(
+    problem: BaseException, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    two = {"tasks": TASKS[:2], "run.generations": 2}
+    with monkeypatch.context() as patch:
+        calls = fail_at(patch, -1, problem)
+        whole = stages_content(begin(tmp_path / "whole", **two).resume(threads=1).path)
+    assert len(calls) >= 50
+    path = tmp_path / "broken"
+    for call in range(len(calls)):
+        with monkeypatch.context() as patch:
+            fail_at(patch, call, problem)
+            with pytest.raises((Crash, EnvironmentFailure)) as caught:
+                begin(path, **two).resume(threads=1)
+        if isinstance(caught.value, EnvironmentFailure):
+            assert str(path) in str(caught.value)
+            assert "No space left on device" in str(caught.value)
+        if not path.exists():  # broken off in the first write: nothing is left
+            assert [p.name for p in tmp_path.iterdir()] == ["whole"]
+            continue
+        shaping = Shaping(path)
+        if shaping.status != "finished":
+            shaping.resume(threads=1)
+        assert stages_content(path) == whole, call
+        shutil.rmtree(path)
+
+
+KILLED = """
+import os, re, signal, sys
+from conevo.cli.main import main
+pattern, sync = re.compile(sys.argv.pop(1)), os.fsync
+
+def fsync(handle):
+    if pattern.search(os.readlink(f"/proc/self/fd/{handle}")):
+        os.kill(os.getpid(), signal.SIGKILL)
+    sync(handle)
+
+os.fsync = fsync
+main(sys.argv[1:])
+"""
+
+
+def killed_at(pattern: str, *arguments: str) -> None:
+    """Run a command in a process that is killed when it has written a certain file."""
+    done = subprocess.run(
+        [sys.executable, "-c", KILLED, pattern, *arguments, "--threads", "1", "--quiet"],
+        capture_output=True,
+        text=True,
+        env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)},
+        check=False,
+    )
+    assert done.returncode == -signal.SIGKILL, done
+
+
+def command(path: Path, settings: dict[str, Any]) -> list[str]:
+    sets = [word for key, value in settings.items() for word in ("--set", f"{key}={value}")]
+    return ["--preset", "smoke", "--out", str(path), *sets]
+
+
+def test_kills_between_and_within_the_stages_are_not_noticed(tmp_path: Path) -> None:
+    path, settings = tmp_path / "killed", tiny_settings("cone") | BRIEF
+    first = ["run", "rover/complex-3", "--shape", *command(path, settings)]
+    killed_at(r"/\.killed\.\w+/shaping\.toml", *first)
+    assert not path.exists()
+    killed_at(r"/\.stage-1\.\w+/config\.toml", *first)
+    assert Shaping(path).status == "interrupted"
+    assert Shaping(path).stages == []
+    for begun, pattern in (
+        (1, r"stage-1/generations\.jsonl$"),  # in the first generation of all
+        (1, r"stage-1/DONE"),
+        (1, r"/\.stage-2\.\w+/origin\.npz"),  # between two stages
+        (2, r"stage-2/provenance\.json"),
+        (2, r"stage-2/teams/generation-0000"),  # before a stage's first generation ends
+        (2, r"stage-2/checkpoint-b"),
+        (2, r"stage-2/test\.json"),
+        (2, r"/\.stage-3\.\w+/generations"),
+        (3, r"stage-3/checkpoint-a"),
+        (3, r"killed/DONE"),  # with all stages finished
+    ):
+        killed_at(pattern, "resume", str(path))
+        assert Shaping(path).status == "interrupted"
+        assert len(Shaping(path).stages) == begun, pattern
+    Shaping(path).resume(threads=2)
+    whole = begin(tmp_path / "whole").resume(threads=1)
+    assert stages_content(path) == stages_content(whole.path)
+    assert list(path.glob(".*")) == []
+
+
+def test_an_interrupted_stage_can_also_be_finished_by_itself(tmp_path: Path) -> None:
+    shaping = begin(tmp_path / "shaped")
+    interrupt(shaping, stage=2)
+    run = conevo.Run(shaping.path / "stage-2")
+    assert run.status == "interrupted"
+    run.resume(threads=1)
+    assert shaping.status == "interrupted"
+    shaping.resume(threads=1)
+    whole = begin(tmp_path / "whole").resume(threads=1)
+    assert stages_content(shaping.path) == stages_content(whole.path)
+
+
+def interrupt(shaping: Shaping, stage: int) -> None:
+    """Carry a shaping on to the second generation of a stage."""
+
+    def stop(run: conevo.Run, record: dict[str, Any]) -> None:
+        if run.path.name == f"stage-{stage}" and record["generation"] == 1:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        shaping.resume(threads=1, watch=stop)
+
+
+def test_a_stage_without_checkpoints_begins_again_with_what_it_was_given(tmp_path: Path) -> None:
+    shaping = begin(tmp_path / "shaped")
+    interrupt(shaping, stage=2)
+    for file in (shaping.path / "stage-2").glob("checkpoint-?.npz"):
+        file.unlink()
+    shaping.resume(threads=1)
+    whole = begin(tmp_path / "whole").resume(threads=1)
+    assert stages_content(shaping.path) == stages_content(whole.path)
+
+
+def test_a_lost_or_damaged_origin_is_not_silently_replaced(tmp_path: Path) -> None:
+    shaping = begin(tmp_path / "shaped")
+    interrupt(shaping, stage=2)
+    stage = shaping.path / "stage-2"
+    for file in stage.glob("checkpoint-?.npz"):
+        file.unlink()
+    whole = (stage / "origin.npz").read_bytes()
+    (stage / "origin.npz").write_bytes(whole[:-50])
+    with pytest.raises(UsageError, match=r"origin\.npz is damaged"):
+        shaping.resume(threads=1)
+    (stage / "origin.npz").unlink()
+    with pytest.raises(EnvironmentFailure, match=r"cannot read .*origin\.npz"):
+        shaping.resume(threads=1)
+
+
+def test_two_processes_do_not_work_in_one_shaping(tmp_path: Path) -> None:
+    shaping = begin(tmp_path / "shaped")
+    said: list[str] = []
+
+    def again(run: conevo.Run, record: dict[str, Any]) -> None:
+        if said:
+            return
+        for path, name in ((shaping.path, "shaping"), (run.path, "run")):
+            done = subprocess.run(
+                [sys.executable, "-m", "conevo", "resume", str(path)],
+                capture_output=True,
+                text=True,
+                env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)},
+                check=False,
+            )
+            assert done.returncode == 2
+            said.append(done.stderr)
+            with pytest.raises(UsageError, match=f"already holds a {name}, in use by process"):
+                begin(path)
+        assert shaping.status == "running"
+
+    shaping.resume(threads=1, watch=again)
+    assert len(said) == 2
+    for line in said:
+        assert re.fullmatch(rf"conevo: error: .* is in use by process {os.getpid()}; .*\n", line)
+
+
+# --- what cannot be done ------------------------------------------------------------------------
+
+
+SMALL = {"run.generations": 1, "world.n_hidden": 2, "world.max_hidden": 4}  # for both worlds
+
+
+@pytest.mark.parametrize(
+    ("tasks", "settings", "words"),
+    [
+        ([], TINY, "at least one task"),
+        ([*TASKS, "rover/complex-77"], TINY, "complex-77"),
+        ([*TASKS, "prey/shaping-1"], SMALL, "cannot be handed on: .* genes per neuron became 10"),
+        (TASKS, TINY | {"run.budget_evaluations": 3}, "does not pay for one generation"),
+        (TASKS, TINY | {"run.generatoins": 3}, "did you mean 'run.generations'"),
+    ],
+)
+def test_what_any_stage_cannot_do_is_refused_before_anything_is_written(
+    tasks: list[str], settings: dict[str, Any], words: str, tmp_path: Path
+) -> None:
+    with pytest.raises(UsageError, match=words):
+        start_shaping(tasks, "cone", "smoke", out=tmp_path / "shaped", overrides=settings)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_missing_device_is_noticed_before_anything_is_written(tmp_path: Path) -> None:
+    with pytest.raises(EnvironmentFailure, match="device 'cuda:77'"):
+        start_shaping(TASKS, preset="smoke", out=tmp_path / "shaped", device="cuda:77")
+    assert list(tmp_path.iterdir()) == []
+
+
+def edit(path: Path, old: str, new: str) -> None:
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new))
+
+
+def test_an_edited_or_damaged_plan_is_refused(tmp_path: Path) -> None:
+    file = begin(tmp_path / "shaped").path / "shaping.toml"
+    whole = file.read_text()
+    for old, new, words in (
+        ("iterations = 12", "iterations = 13", "was changed after the shaping was started"),
+        ("format = 1", "format = 9", "written by another version"),
+        ("format = 1", "format = ", "is damaged"),
+        ("run_ids", "run_idz", "is damaged"),
+        ("[[stages]]", "", "is damaged"),
+    ):
+        edit(file, old, new)
+        with pytest.raises(UsageError, match=words) as caught:
+            Shaping(file.parent)
+        assert "\n" not in str(caught.value)
+        file.write_text(whole)
+    assert Shaping(file.parent).tasks == TASKS
+
+
+def test_a_stage_that_was_exchanged_is_refused(tmp_path: Path) -> None:
+    shaping = begin(tmp_path / "shaped")
+    evolve_tiny(shaping.path / "stage-1", run__seed=5)
+    with pytest.raises(UsageError, match="is not stage 1 of"):
+        shaping.resume(threads=1)
+
+
+def test_a_finished_shaping_is_sealed(tmp_path: Path) -> None:
+    shaping = begin(tmp_path / "shaped").resume(threads=1)
+    before = {p: p.read_bytes() for p in shaping.path.rglob("*") if p.is_file()}
+    with pytest.raises(UsageError, match="is finished"):
+        shaping.resume()
+    with pytest.raises(UsageError, match="already holds a shaping, finished"):
+        begin(shaping.path)
+    assert {p: p.read_bytes() for p in shaping.path.rglob("*") if p.is_file()} == before
+    assert shaping.changed_files == []
+    (shaping.path / "stage-2" / "champion.npz").write_bytes(b"")
+    assert shaping.changed_files == ["stage-2/champion.npz"]
+
+
+def test_what_is_no_shaping_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="is no shaping"):
+        Shaping(evolve_tiny(tmp_path / "run").path)
+
+
+def test_the_family_of_a_task() -> None:
+    assert TASKS == ["rover-v1/complex-1", "rover-v1/complex-2", "rover-v1/complex-3"]
+    assert tasks_up_to("prey/shaping-6") == list(PREY_TASKS)
+    for task, words in (("rover/complex-1", "nothing to shape"), ("rover/complex-11", "unknown")):
+        with pytest.raises(UsageError, match=words):
+            tasks_up_to(task)
+
+
+# --- one run that begins with another's populations -----------------------------------------------
+
+
+def descend(origin: conevo.Run, path: Path | None, seed: int = 1) -> conevo.Run:
+    settings = tiny_settings("cone")
+    config = resolve(TASK, "cone", "smoke", seed, overrides=settings)
+    return start(config, path, threads=1, origin=origin)
+
+
+def test_a_run_may_begin_with_the_populations_of_another(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    origin = evolve_tiny(tmp_path / "origin")
+    run = descend(origin, None)
+    checkpoint = run.provenance["origin"]["checkpoint"]
+    assert run.path.name == f"{origin.config.label}-from-{checkpoint[:6]}"
+    shutil.rmtree(origin.path)  # nothing of it is needed any more
+    run.resume(threads=1)
+    again = evolve_tiny(tmp_path / "again")
+    assert run.config.run_id == again.config.run_id
+    assert content(run.path)["generations"] != content(again.path)["generations"]
+
+
+def test_the_same_settings_on_other_populations_are_another_run(tmp_path: Path) -> None:
+    """Their files are foreign to each other, although the settings are the same."""
+    runs = [
+        descend(evolve_tiny(tmp_path / f"origin-{seed}", run__seed=seed), tmp_path / f"run-{seed}")
+        for seed in (1, 2)
+    ]
+    assert runs[0].config.run_id == runs[1].config.run_id
+    (last,) = runs[0].resume(threads=1).path.glob("checkpoint-?.npz")
+    shutil.copy(last, runs[1].path)
+    with pytest.raises(UsageError, match="is foreign: origin is"):
+        runs[1].resume(threads=1)
+    plain = start(runs[1].config, tmp_path / "plain", threads=1)
+    shutil.copy(last, plain.path)
+    with pytest.raises(UsageError, match="is foreign: origin is"):
+        plain.resume(threads=1)
+
+
+def test_an_unfinished_or_changed_origin_is_refused(tmp_path: Path) -> None:
+    config = resolve(TASK, "cone", "smoke", overrides=tiny_settings("cone"))
+    unfinished = start(config, tmp_path / "unfinished", threads=1)
+    with pytest.raises(UsageError, match="is not finished, so no run can begin with"):
+        descend(unfinished, tmp_path / "run")
+    changed = evolve_tiny(tmp_path / "changed")
+    (changed.path / "test.json").write_text("{}")
+    with pytest.raises(UsageError, match=r"was changed since it was finished \(test\.json\)"):
+        descend(changed, tmp_path / "run")
+    assert not (tmp_path / "run").exists()
+
+
+# --- prey ---------------------------------------------------------------------------------------
+
+
+def shape_prey(path: Path) -> Shaping:
+    shaping = start_shaping(
+        PREY_TASKS, "cone", "smoke", out=path, overrides=PREY, threads=1, command="conevo test"
+    )
+    return shaping.resume(threads=1)
+
+
+def test_the_six_prey_experiments_leave_a_prey_file(tmp_path: Path) -> None:
+    shaping = shape_prey(tmp_path / "prey")
+    assert shaping.prey == shaping.path / "prey.npz"
+    found = prey_sets.load(shaping.prey)
+    third, sixth = shaping.stages[2].champion, shaping.stages[5].champion
+    assert third is not None
+    assert sixth is not None
+    np.testing.assert_array_equal(found.one, third.genes)
+    np.testing.assert_array_equal(found.one_active, third.active)
+    np.testing.assert_array_equal(found.two, sixth.genes)
+    np.testing.assert_array_equal(found.two_active, sixth.active)
+    assert found.about["command"] == "conevo test"
+    assert (found.about["method"], found.about["preset"], found.about["seed"]) == (
+        "cone", "smoke", 1,
+    )  # fmt: skip
+    assert found.about["run_ids"] == [run.config.run_id for run in shaping.stages]
+    assert found.about["numpy"] == np.__version__
+    again = shape_prey(tmp_path / "again")
+    assert (again.path / "prey.npz").read_bytes() == shaping.prey.read_bytes()
+    world = conevo.world("pursuit/team-6", prey=str(shaping.prey))
+    assert world.params.prey_digest == prey_sets.digest(shaping.prey)  # type: ignore[attr-defined]
+
+
+def test_a_kill_before_the_prey_file_is_written_is_not_noticed(tmp_path: Path) -> None:
+    path = tmp_path / "killed"
+    killed_at(r"stage-6/DONE", "shape-prey", *command(path, PREY))
+    shaping = Shaping(path)
+    assert (shaping.status, shaping.prey) == ("interrupted", None)
+    shaping.resume(threads=1)
+    assert shaping.prey is not None
+    whole = shape_prey(tmp_path / "whole")
+    one, two = (stages_content(p) for p in (path, whole.path))
+    assert [one.pop("prey")[:2], two.pop("prey")[:2]] == [b"PK", b"PK"]  # they name other commands
+    assert one == two
