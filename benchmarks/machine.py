@@ -9,8 +9,11 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from importlib import metadata
 from pathlib import Path
+from typing import TypeVar
 
 __all__ = ["alternate", "machine", "spread", "table"]
+
+Name = TypeVar("Name")
 
 
 def machine(*packages: str) -> str:
@@ -27,12 +30,12 @@ def machine(*packages: str) -> str:
     return f"{when} · {cpu} · {os.cpu_count()} cores · load {load:.1f} · {', '.join(versions)}"
 
 
-def alternate(work: Mapping[str, Callable[[], float]], repeats: int) -> dict[str, list[float]]:
+def alternate(work: Mapping[Name, Callable[[], float]], repeats: int) -> dict[Name, list[float]]:
     """Return ``repeats`` results of each piece of work, taken in turns.
 
     In turns, so that a slow minute of the machine falls on all of them alike.
     """
-    results: dict[str, list[float]] = {name: [] for name in work}
+    results: dict[Name, list[float]] = {name: [] for name in work}
     for _ in range(repeats):
         for name, measure in work.items():
             results[name].append(measure())

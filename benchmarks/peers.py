@@ -1,24 +1,33 @@
-"""Robot-steps per second of VMAS and MPE2, on this machine in the same hour.
+"""Robot-steps per second of VMAS and MPE2, on this machine in the same hour, ours beside them.
 
 Random actions, drawn before the clock starts; no network, no learning. Their worlds are simpler
 than ours (a few discs with momentum), so this shows an order of magnitude and not who is better.
-Robot-steps = environment steps x agents. Runs in an environment of its own, without conevo: see
-README.md beside this file.
+Robot-steps = environment steps x agents. Their ``simple_tag`` has the composition of our
+``pursuit/team-3``: four predators and one prey, all five counted; ours have random networks.
+Runs in an environment of its own (README.md beside this file); without conevo there, only the
+others are measured.
 """
 
 from __future__ import annotations
 
 import argparse
+import importlib
 import time
 from collections.abc import Callable
+from importlib.util import find_spec
 
 from machine import alternate, machine, spread, table
 
 SCENARIOS: tuple[tuple[str, dict[str, int]], ...] = (
-    ("simple_tag", {}),
+    ("simple_tag", {"num_adversaries": 4}),
     ("simple_spread", {}),
     ("discovery", {"n_agents": 20}),
 )
+SINGLE: tuple[tuple[str, dict[str, int]], ...] = (
+    ("simple_tag", {"num_adversaries": 4}),
+    ("simple_spread", {}),
+)
+OURS, N_PREY = "pursuit/team-3", 1
 
 
 def vmas(scenario: str, extra: dict[str, int], batch: int, threads: int, seconds: float) -> Work:
@@ -38,11 +47,10 @@ def vmas(scenario: str, extra: dict[str, int], batch: int, threads: int, seconds
     return measure, len(env.agents)
 
 
-def mpe2(scenario: str, seconds: float) -> Work:
+def mpe2(scenario: str, extra: dict[str, int], seconds: float) -> Work:
     """Return a measurement of one MPE2 environment (it has no batches and uses one core)."""
-    import importlib
-
-    env = importlib.import_module(f"mpe2.{scenario}_v3").parallel_env(max_cycles=100)
+    module = importlib.import_module(f"mpe2.{scenario}_v3")
+    env = module.parallel_env(max_cycles=100, **extra)
     env.reset(seed=1)
     agents = list(env.agents)
     actions = [{a: env.action_space(a).sample() for a in agents} for _ in range(32)]
@@ -53,6 +61,19 @@ def mpe2(scenario: str, seconds: float) -> Work:
         env.step(actions[k % 32])
 
     return (lambda: rate(step, seconds) * len(agents)), len(agents)
+
+
+def ours(batch: int, threads: int) -> Work:
+    """Return a measurement of our predators with random networks: whole epochs of a batch."""
+    from conevo.worlds.registry import world
+    from conevo.worlds.rollout import Rollout
+    from simulator import workload
+
+    pursuit = world(OURS)
+    team_steps = workload(pursuit, Rollout(pursuit, n_threads=threads), batch)
+    team_steps()  # compiles
+    n_agents = pursuit.n_robots + N_PREY
+    return (lambda: team_steps() * n_agents), n_agents
 
 
 def rate(step: Callable[[int], object], seconds: float) -> float:
@@ -78,25 +99,30 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=3.0)
     options = parser.parse_args()
 
-    work: dict[str, Callable[[], float]] = {}
-    n_agents: dict[str, int] = {}
+    work: dict[tuple[str, str, int, int], Callable[[], float]] = {}
+    n_agents: dict[tuple[str, str, int, int], int] = {}
+
+    def add(name: tuple[str, str, int, int], measurement: Work) -> None:
+        work[name], n_agents[name] = measurement
+
+    for batch in options.batch:
+        for threads in options.threads if find_spec("conevo") else ():
+            add(("conevo", OURS, batch, threads), ours(batch, threads))
     for scenario, extra in SCENARIOS:
         for batch in options.batch:
             for threads in options.threads:
-                name = f"VMAS {scenario} {batch} {threads}"
-                work[name], n_agents[name] = vmas(scenario, extra, batch, threads, options.seconds)
-    for scenario in ("simple_tag", "simple_spread"):
-        name = f"MPE2 {scenario} 1 1"
-        work[name], n_agents[name] = mpe2(scenario, options.seconds)
-    print(machine("vmas", "mpe2", "torch", "numpy"), "\n")
+                measured = vmas(scenario, extra, batch, threads, options.seconds)
+                add(("VMAS", scenario, batch, threads), measured)
+    for scenario, extra in SINGLE:
+        add(("MPE2", scenario, 1, 1), mpe2(scenario, extra, options.seconds))
+    print(machine("conevo", "warp-lang", "vmas", "mpe2", "torch", "numpy"), "\n")
     results = alternate(work, options.repeats)
 
     print(f"random actions, {options.repeats} repeats in turns; thousands per second\n")
     rows = []
     for name, values in results.items():
-        library, scenario, batch, threads = name.split()
-        n = n_agents[name]
-        rows.append([library, scenario, n, batch, threads, *spread(values, digits=1)])
+        library, scenario, batch, threads = name
+        rows.append([library, scenario, n_agents[name], batch, threads, *spread(values, digits=1)])
     head = ["simulator", "world", "agents", "batch", "threads", "robot-steps/s", "lowest - highest"]
     print(table(head, rows))
     print("\n" + machine())

@@ -2,7 +2,8 @@
 
 A team-step is one iteration of one world with all its robots. Teams of random genotypes (uniform in
 [-1, 1], every robot different); scenarios are drawn before the clock starts; decoding the
-genotypes, resetting the world and scoring are inside it.
+genotypes, resetting the world and scoring are inside it. Robot-steps count the team's robots only:
+in pursuit-evasion the prey is simulated too and not counted.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from collections.abc import Callable
 import numpy as np
 
 from conevo.rng import fold, stream
+from conevo.worlds.protocol import World
 from conevo.worlds.registry import world as build_world
 from conevo.worlds.rollout import Rollout
 from machine import alternate, machine, spread, table
@@ -21,7 +23,7 @@ from machine import alternate, machine, spread, table
 SEED = 2009
 
 
-def workload(world: object, rollout: Rollout, batch: int) -> Callable[[], float]:
+def workload(world: World, rollout: Rollout, batch: int) -> Callable[[], float]:
     """Return a function that evaluates ``batch`` teams once and gives team-steps per second."""
     spec, n_robots = world.controller, world.n_robots
     rng = stream(SEED, "genes", batch)
@@ -44,41 +46,51 @@ def workload(world: object, rollout: Rollout, batch: int) -> Callable[[], float]
     return measure
 
 
+def label(world: World) -> str:
+    """Return what was simulated: world, robots, their networks, iterations."""
+    spec = world.controller
+    name = f"{world.name.rpartition('-v')[0]}/{world.environment}"
+    return (
+        f"{name}, {world.n_robots} robots, {spec.n_inputs}-{spec.n_hidden}-{spec.n_outputs} "
+        f"recurrent networks, {world.iterations} iterations"
+    )
+
+
 def main() -> None:
-    """Measure every batch with every number of threads, in turns, and print a markdown table."""
+    """Measure every world with every batch and number of threads, in turns; print the tables."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--world", default="rover/complex-5")
-    parser.add_argument("--iterations", type=int, default=2500)
+    parser.add_argument("--world", nargs="+", default=["rover/complex-5", "pursuit/team-3"])
+    parser.add_argument("--iterations", type=int, help="of an epoch; by default the world's own")
     parser.add_argument("--batch", type=int, nargs="+", default=[64, 512])
     parser.add_argument("--threads", type=int, nargs="+", default=[1, 2])
     parser.add_argument("--repeats", type=int, default=5)
     parser.add_argument("--device", default="cpu")
     options = parser.parse_args()
 
-    world = build_world(options.world, iterations=options.iterations)
-    brief = build_world(options.world, iterations=2)
-    work: dict[str, Callable[[], float]] = {}
-    for threads in options.threads:
-        workload(brief, Rollout(brief, n_threads=threads, device=options.device), 2)()  # compiles
-        rollout = Rollout(world, n_threads=threads, device=options.device)
-        for batch in options.batch:
-            work[f"{batch} {threads}"] = workload(world, rollout, batch)
-    print(machine("conevo", "numpy", "warp-lang"), "\n")
+    length = {} if options.iterations is None else {"iterations": options.iterations}
+    worlds = {path: build_world(path, **length) for path in options.world}
+    work: dict[tuple[str, int, int], Callable[[], float]] = {}
+    for path, world in worlds.items():
+        brief = build_world(path, iterations=2)
+        for threads in options.threads:
+            compile_first = Rollout(brief, n_threads=threads, device=options.device)
+            workload(brief, compile_first, 2)()
+            rollout = Rollout(world, n_threads=threads, device=options.device)
+            for batch in options.batch:
+                work[path, batch, threads] = workload(world, rollout, batch)
+    print(machine("conevo", "numpy", "warp-lang"))
     results = alternate(work, options.repeats)
 
-    spec, n_robots = world.controller, world.n_robots
-    print(
-        f"{options.world}, {n_robots} robots, {spec.n_inputs}-{spec.n_hidden}-{spec.n_outputs} "
-        f"recurrent networks, {options.iterations} iterations, {options.device}, "
-        f"{options.repeats} repeats in turns; thousands per second\n"
-    )
-    rows = []
-    for name, values in results.items():
-        batch, threads = name.split()
-        robots = [value * n_robots for value in values]
-        rows.append([batch, threads, *spread(values), spread(robots)[0]])
     head = ["batch", "threads", "team-steps/s, median", "lowest - highest", "robot-steps/s"]
-    print(table(head, rows))
+    for path, world in worlds.items():
+        print(f"\n{label(world)}, {options.device}, {options.repeats} repeats in turns; ", end="")
+        print("thousands per second\n")
+        rows = []
+        for (measured, batch, threads), values in results.items():
+            if measured == path:
+                robots = [value * world.n_robots for value in values]
+                rows.append([batch, threads, *spread(values), spread(robots)[0]])
+        print(table(head, rows))
     print("\n" + machine())
 
 

@@ -14,12 +14,13 @@ from typing import Annotated, Literal, get_args, get_origin, get_type_hints
 from conevo import METHODS, WORLDS
 from conevo.runs.config import PRESETS, resolve
 from conevo.worlds import rocks
+from conevo.worlds.prey import PreyParams, PreyWorld
+from conevo.worlds.pursuit import PursuitParams, PursuitWorld
 from conevo.worlds.rover import RoverParams
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = ("README.md", "docs/quickstart.md", "docs/worlds.md")
 MARKED = re.compile(r"(<!-- table: ([^>]+?) -->\n).*?(<!-- end -->)", re.DOTALL)
-ARTICLE = "rover/complex-1"  # the task of which the presets table speaks
 
 # What a parameter of the multi-rover world means, and its unit. "side": side of the square.
 ROVER_MEANING = {
@@ -45,6 +46,45 @@ ROVER_MEANING = {
     "fitness": ("", "what a rover is credited with: eq. 5.4, or value times area"),
     "n_hidden": ("neurons", "hidden neurons of a controller at the start"),
     "max_hidden": ("neurons", "hidden neurons a controller can grow to"),
+}
+# The same of the arena that predators and prey share, and of each of their two worlds.
+ARENA_MEANING = {
+    "iterations": ("0.1 s", "length of an epoch"),
+    "arena_cm": ("cm", "side of the arena; the thesis prints 1000"),
+    "sensor_range_cm": ("cm", "how far a sensor sees, from its place on the rim"),
+    "sensor_angle_deg": ("degrees", "half angle of the cone that a sensor sees"),
+    "max_speed_cm": ("cm per iteration", "speed of a predator at full command"),
+    "prey_speed": ("predators' speed", "speed of a prey at full command"),
+}
+HIDDEN_MEANING = {
+    "n_hidden": ("neurons", "hidden neurons of a controller at the start"),
+    "max_hidden": ("neurons", "hidden neurons a controller can grow to"),
+}
+PURSUIT_MEANING = {
+    **ARENA_MEANING,
+    "prey": ("", "who is pursued: the shipped evolved prey, one of two simple ones, or a file's"),
+    "prey_digest": ("", "digest of a prey file; a run fills it in and checks it"),
+    "n_obstacles": ("obstacles", "cylinders in the arena"),
+    "capture_window": ("iterations", "over which a captured prey has hardly moved"),
+    "capture_share": ("", "less than this share of what its wheels commanded"),
+    "capture_distance_cm": ("cm", "or less than this"),
+    "capture_predators": ("predators", "that must be within light range of it"),
+    **HIDDEN_MEANING,
+}
+PREY_MEANING = {
+    **ARENA_MEANING,
+    "least": ("", "fewest obstacles, and fewest predators, of an epoch"),
+    "most": ("", "most obstacles, and most predators"),
+    **HIDDEN_MEANING,
+}
+MEANING = {
+    RoverParams: ROVER_MEANING,
+    PursuitParams: PURSUIT_MEANING,
+    PreyParams: PREY_MEANING,
+}
+TEXTS = {
+    "prey": "`shaped`, `heuristic`, `random`, or the path of a file",
+    "prey_digest": "twelve hex digits, or empty",
 }
 BOUNDS = {"ge": ">=", "gt": ">", "le": "<=", "lt": "<"}
 
@@ -78,16 +118,16 @@ def _preset_text(preset):
     return (resources.files("conevo.runs") / "presets" / f"{preset}.toml").read_text()
 
 
-def presets():
-    """Return what each preset means for CONE in the multi-rover world."""
+def presets(task, has_purpose=True):
+    """Return what each preset means for CONE in a task."""
     rows = []
     for preset in PRESETS:
-        config = resolve(ARTICLE, "cone", preset)
+        config = resolve(task, "cone", preset)
         run, method = config.run, config.method_config
         rows.append(
             [
                 f"`{preset}`",
-                _purpose(preset),
+                *([_purpose(preset)] if has_purpose else []),
                 f"{run.generations:,}",
                 f"{run.budget_evaluations:,}" if run.budget_evaluations else "none",
                 f"{run.epochs} x {config.world_params.iterations:,}",
@@ -100,7 +140,8 @@ def presets():
         "preset | what for | generations at most | budget of team evaluations | epochs x iterations"
     )
     head += " | evaluation | genotypes per sub-population | test scenarios"
-    return table(head.split(" | "), rows)
+    heads = head.split(" | ")
+    return table(heads if has_purpose else [heads[0], *heads[2:]], rows)
 
 
 def _purpose(preset):
@@ -115,7 +156,13 @@ def card(module):
     """Return the table on the card of a world, the docstring of its module, in Markdown."""
     lines = import_module(module).__doc__.splitlines()
     first, last = (k for k, line in enumerate(lines) if re.fullmatch(r"=+ +=+", line))
-    rows = [re.split(r" {2,}", line, maxsplit=1) for line in lines[first + 1 : last]]
+    rows = []
+    for line in lines[first + 1 : last]:
+        name, text = re.split(r" {2,}", line, maxsplit=1)
+        if name:
+            rows.append([name, text])
+        else:
+            rows[-1][1] += f" {text}"
     return table(["", ""], [[name, text.replace("``", "`")] for name, text in rows])
 
 
@@ -142,13 +189,14 @@ def rover_settings():
     return table(["setting", "range (sides)", "accuracy", "cost (energy)"], rows)
 
 
-def rover_parameters():
-    """Return every parameter of the multi-rover world with unit, default and bounds."""
-    hints = get_type_hints(RoverParams, include_extras=True)
+def parameters(params):
+    """Return every parameter of a world with unit, default and bounds."""
+    hints = get_type_hints(params, include_extras=True)
     rows = []
-    for field in dataclasses.fields(RoverParams):
-        unit, meaning = ROVER_MEANING[field.name]
-        default, allowed = f"`{field.default}`", _allowed(hints[field.name])
+    for field in dataclasses.fields(params):
+        unit, meaning = MEANING[params][field.name]
+        default = f"`{field.default}`" if field.default != "" else ""
+        allowed = TEXTS.get(field.name) or _allowed(hints[field.name])
         rows.append([f"`{field.name}`", default, unit, allowed, meaning])
     return table(["parameter", "default", "unit", "allowed", "what it is"], rows)
 
@@ -162,13 +210,43 @@ def _allowed(hint):
     return ", ".join(f"{BOUNDS[name]} {limit:,}" for name, limit in bounds)
 
 
+def team_types():
+    """Return the predators and prey of every environment of pursuit-evasion (table 4.2)."""
+    rows = []
+    for name in WORLDS["pursuit-v1"].environments:
+        world = PursuitWorld(name)
+        rows.append([f"`{name}`", world.n_robots, world.n_prey])
+    return table(["environment", "predators", "prey"], rows)
+
+
+def shaping_experiments():
+    """Return what is in the arena of every shaping experiment (section 4.3)."""
+    rows = []
+    for name in WORLDS["prey-v1"].environments:
+        scenarios = PreyWorld(name).scenarios(range(200))
+        others = scenarios.n_bodies - PreyWorld(name).n_robots
+        spans = [
+            f"{some.min()} to {some.max()}" if some.max() else "none"
+            for some in (scenarios.n_obstacles, others)
+        ]
+        rows.append([f"`{name}`", PreyWorld(name).n_robots, *spans])
+    return table(["environment", "prey", "obstacles", "heuristic predators"], rows)
+
+
 TABLES = {
     "worlds x methods": worlds_by_methods,
-    "presets": presets,
+    "presets": lambda: presets("rover/complex-1"),
+    "presets pursuit": lambda: presets("pursuit/team-3", has_purpose=False),
     "rover card": lambda: card("conevo.worlds.rover"),
     "rover environments": rover_environments,
     "rover settings": rover_settings,
-    "rover parameters": rover_parameters,
+    "rover parameters": lambda: parameters(RoverParams),
+    "pursuit card": lambda: card("conevo.worlds.pursuit"),
+    "pursuit environments": team_types,
+    "pursuit parameters": lambda: parameters(PursuitParams),
+    "prey card": lambda: card("conevo.worlds.prey"),
+    "prey environments": shaping_experiments,
+    "prey parameters": lambda: parameters(PreyParams),
 }
 
 

@@ -11,10 +11,7 @@ runs give the same numbers. About five minutes of one core.
 from __future__ import annotations
 
 import argparse
-import csv
-import re
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, get_type_hints
 
@@ -23,15 +20,25 @@ import numpy.typing as npt
 from annotated_types import Le
 
 import conevo
-from conevo.evolution.population import random_genes
-from conevo.rng import fold, stream
 from conevo.worlds.protocol import Outcome
 from conevo.worlds.rover import RoverParams
+from pages import Row, put, write
+from teams import (
+    Numbers,
+    Teams,
+    champion,
+    controlled,
+    error,
+    keys_of,
+    play,
+    random_networks,
+    ratio,
+    sample,
+)
 
 ENVIRONMENT = "rover/complex-5"
 N_RANDOM = 20
 PAGE = Path(__file__).parent / "results" / "sensitivity.md"
-MARKERS = re.compile(r"(<!-- results -->\n).*?(<!-- end -->)", re.DOTALL)
 DEFAULTS = RoverParams()
 RANGES = ("low_range", "med_range", "hi_range")
 GROUPS = {
@@ -48,9 +55,7 @@ GROUPS = {
     },
 }
 SCALES = ((0.07, 0.05, 0.03), (0.10, 0.08, 0.06), (0.20, 0.15, 0.10))
-Numbers = npt.NDArray[np.float64]
 Params = dict[str, Any]
-Row = dict[str, Any]
 
 
 # --- what is varied -------------------------------------------------------------------------------
@@ -91,89 +96,23 @@ def long_settings() -> Iterator[tuple[str, Params]]:
 # --- who plays ------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class Teams:
-    """Teams of several kinds: genes [K, G], slots [N, R, U], heuristic [N, R], kind of each."""
-
-    genes: npt.NDArray[np.float32]
-    slots: npt.NDArray[np.int32]
-    heuristic: npt.NDArray[np.int32]
-    kinds: tuple[str, ...]
-
-    def of(self, kind: str) -> list[int]:
-        """Return the numbers of the teams of a kind."""
-        return [n for n, k in enumerate(self.kinds) if k == kind]
-
-
 def make_teams(runs: list[str], seed: int) -> Teams:
     """Return clones of each heuristic, the mixed castes, random networks and the champions."""
     world = conevo.world(ENVIRONMENT)
-    spec, r = world.controller, world.n_robots
-    slots: list[npt.NDArray[np.int32]] = []
-    pools: list[npt.NDArray[np.float32]] = []
-    heuristic: list[npt.NDArray[np.int32]] = []
-    kinds = []
-
-    def add(kind: str, pool: Any, team: Any, who: Any) -> None:
-        shift = sum(len(one) for one in pools)
-        pools.append(pool)
-        slots.append(np.where(team >= 0, team + shift, -1).astype(np.int32))
-        heuristic.append(np.broadcast_to(np.asarray(who, dtype=np.int32), r))
-        kinds.append(kind)
-
-    no_genes = np.zeros((1, spec.n_genes), dtype=np.float32)
-    empty = np.full((r, spec.max_hidden), -1)
     n = len(world.heuristics)
-    for k, name in enumerate(world.heuristics):
-        add(name, no_genes, empty, k)
-    add("mixed", no_genes, empty, np.repeat(np.arange(n), r // n))
-    for k in range(N_RANDOM):
-        genes = random_genes(
-            stream(seed, "sensitivity", "team", k), (r * spec.n_hidden, spec.n_genes)
-        )
-        team = empty.copy()
-        team[:, : spec.n_hidden] = np.arange(len(genes)).reshape(r, spec.n_hidden)
-        add("random", genes, team, -1)
+    made = [controlled(world, name, k) for k, name in enumerate(world.heuristics)]
+    made.append(controlled(world, "mixed", np.repeat(np.arange(n), world.n_robots // n)))
+    made.append(random_networks(world, N_RANDOM, seed, "sensitivity"))
     for path in runs:
         run = conevo.Run(path)
-        champion = run.champion
-        if champion is None:
-            raise SystemExit(f"{path} has no champion yet")
-        pool, team = champion.as_trial()
-        add(f"{run.config.method} seed {run.config.run.seed}", pool, team[0], -1)
-    return Teams(np.concatenate(pools), np.stack(slots), np.stack(heuristic), tuple(kinds))
-
-
-def play(teams: Teams, params: Params, *, n_scenarios: int, seed: int) -> Outcome:
-    """Run all teams in the scenarios of ``seed``."""
-    world = conevo.world(ENVIRONMENT, **params)
-    scenarios = world.scenarios(
-        [fold(seed, "sensitivity", "scenario", k) for k in range(n_scenarios)]
-    )
-    rollout = conevo.Rollout(world, n_threads=1)
-    return rollout.evaluate(teams.genes, teams.slots, scenarios, teams.heuristic)
+        made.append(champion(run, f"{run.config.method} seed {run.config.run.seed}"))
+    teams = made[0]
+    for more in made[1:]:
+        teams += more
+    return teams
 
 
 # --- statistics -----------------------------------------------------------------------------------
-
-
-def sample(values: npt.NDArray[Any], rows: list[int]) -> Numbers:
-    """Return what a standard error is taken over: scenarios of one team, or means of the teams."""
-    some = values[rows].astype(np.float64)
-    return some.mean(axis=1) if len(some) > 1 else some[0]
-
-
-def error(values: Numbers) -> float:
-    """Return the standard error of the mean."""
-    return float(values.std(ddof=1) / len(values) ** 0.5)
-
-
-def ratio(changed: Numbers, default: Numbers) -> tuple[float, float]:
-    """Return the ratio of two means of pairs and its standard error (delta method)."""
-    if default.mean() == 0:
-        return float("nan"), float("nan")
-    quotient = float(changed.mean() / default.mean())
-    return quotient, error(changed - quotient * default) / float(default.mean())
 
 
 def ranks(values: Numbers) -> Numbers:
@@ -324,16 +263,6 @@ def tables(rows: list[Row]) -> str:
     return text
 
 
-def write(rows: list[Row], path: Path) -> None:
-    """Write rows of numbers as CSV."""
-    with path.open("w", newline="") as file:
-        writer = csv.DictWriter(file, fieldnames=list(rows[0]), lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(
-            {k: f"{v:.6g}" if isinstance(v, float) else v for k, v in row.items()} for row in rows
-        )
-
-
 def main() -> None:
     """Measure and write everything."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
@@ -346,16 +275,13 @@ def main() -> None:
         base: Outcome | None = None
         for name, changed in some:
             params = {"iterations": iterations, **changed}
-            outcome = play(teams, params, n_scenarios=n_scenarios, seed=args.seed)
+            world = conevo.world(ENVIRONMENT, **params)
+            outcome = play(world, teams, keys_of(args.seed, n_scenarios, "sensitivity"))
             base = base or outcome
             rows += measure(teams, name, params, outcome, base)
             print(f"{iterations} iterations, {name}", flush=True)
     write(rows, PAGE.with_suffix(".csv"))
-    if PAGE.exists():
-        text, n = MARKERS.subn(lambda m: m[1] + tables(rows) + m[2], PAGE.read_text())
-        if n != 1:
-            raise SystemExit(f"{PAGE}: expected the markers <!-- results --> and <!-- end --> once")
-        PAGE.write_text(text)
+    put(tables(rows), PAGE)
     print(tables(rows))
     world = conevo.world(ENVIRONMENT)
     print(f"kernel {conevo.Rollout(world, n_threads=1).kernel_hash}")

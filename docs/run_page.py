@@ -26,7 +26,8 @@ FENCE = re.compile(
     r"(?:\n```text\n(?P<output>.*?)```\n)?",
     re.DOTALL,
 )
-CASTES = re.compile(r"(?:\b(?:low|med|hi|move|rest|non-specialized) \d+(?:, )?)+")
+WORDS = "low|med|hi|move|rest|stop|forward|left|right|reverse|non-specialized"
+CASTES = re.compile(rf"(?:\b(?:{WORDS}) \d+(?:, )?)+")
 CASTES_JSON = re.compile(r"\{(?:['\"][a-z-]+['\"]: \d+,? ?)+\}")
 NUMBER = re.compile(r"-?\d[\d,.]*(?:e[-+]?\d+)?")
 SPAN = re.compile(r"# h # min|# min # s|# s\b")
