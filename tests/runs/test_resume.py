@@ -19,14 +19,21 @@ from conevo.evolution.methods.registry import METHODS
 from conevo.runs import durable
 from conevo.runs.config import resolve
 from conevo.runs.run import start
-from runs.tiny import TASK, command, content, evolve_tiny, spawn, tiny_settings, wait_for
+from conevo.worlds.registry import WORLDS
+from conevo.worlds.registry import resolve as resolve_world
+from runs.tiny import TASK, TASKS, command, content, evolve_tiny, spawn, tiny_settings, wait_for
 
 
+def test_there_is_a_tiny_task_of_every_world() -> None:
+    assert [resolve_world(task)[0].name for task in TASKS] == list(WORLDS)
+
+
+@pytest.mark.parametrize("task", TASKS)
 @pytest.mark.parametrize("method", METHODS)
-def test_resume_after_kills_at_random_moments(method: str, tmp_path: Path) -> None:
-    whole = evolve_tiny(tmp_path / "whole", method, run__generations=60)
+def test_resume_after_kills_at_random_moments(method: str, task: str, tmp_path: Path) -> None:
+    whole = evolve_tiny(tmp_path / "whole", method, task, run__generations=60)
     path, kills = tmp_path / "killed", sorted(random.choices(range(45), k=2))
-    arguments = [*command(path, method, run__generations=60), "--quiet"]
+    arguments = [*command(path, method, task, run__generations=60), "--quiet"]
     for generation in kills:
         process = spawn(*arguments)
         wait_for(lambda: is_past(path, process, generation))  # noqa: B023 (called at once)

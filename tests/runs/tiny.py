@@ -1,4 +1,4 @@
-"""A rover world so small that a whole run takes a tenth of a second, and what a run amounts to."""
+"""Worlds so small that a whole run takes a tenth of a second, and what a run amounts to."""
 
 from __future__ import annotations
 
@@ -15,8 +15,10 @@ from typing import Any
 import numpy as np
 
 import conevo
+from conevo.worlds.registry import resolve as resolve_world
 
 TASK = "rover/complex-1"
+TASKS = (TASK, "pursuit/team-1", "prey/shaping-6")  # one of each world
 TINY: dict[str, Any] = {
     "run.generations": 5,
     "run.epochs": 2,
@@ -32,24 +34,26 @@ TINY: dict[str, Any] = {
 RESTLESS = {"stagnation_v": 1, "stagnation_w": 1, "stagnation_y": 1, "gst": 1.0, "sst": 1.0}
 
 
-def tiny_settings(method: str, **changes: Any) -> dict[str, Any]:
+def tiny_settings(method: str, task: str = TASK, **changes: Any) -> dict[str, Any]:
     """Return the settings of a tiny run in which everything a method has is at work."""
     known = conevo.METHODS[method].config_class.__dataclass_fields__
     restless = {f"method.{key}": value for key, value in RESTLESS.items() if key in known}
-    return TINY | restless | {key.replace("__", "."): value for key, value in changes.items()}
+    world = resolve_world(task)[0].params_class.__dataclass_fields__
+    tiny = {k: v for k, v in TINY.items() if k[:6] != "world." or k[6:] in world}
+    return tiny | restless | {key.replace("__", "."): value for key, value in changes.items()}
 
 
-def evolve_tiny(path: Path, method: str = "cone", **changes: Any) -> conevo.Run:
+def evolve_tiny(path: Path, method: str = "cone", task: str = TASK, **changes: Any) -> conevo.Run:
     """Make a finished tiny run; run__epochs=3 and the like change its settings."""
-    settings = tiny_settings(method, **changes)
-    return conevo.evolve(TASK, method, "smoke", out=path, overrides=settings, threads=1)
+    settings = tiny_settings(method, task, **changes)
+    return conevo.evolve(task, method, "smoke", out=path, overrides=settings, threads=1)
 
 
-def command(path: Path, method: str, **changes: Any) -> list[str]:
+def command(path: Path, method: str, task: str = TASK, **changes: Any) -> list[str]:
     """Return the command line that makes the same run as ``evolve_tiny``."""
-    settings = tiny_settings(method, **changes)
+    settings = tiny_settings(method, task, **changes)
     sets = [word for key, value in settings.items() for word in ("--set", f"{key}={value}")]
-    return ["run", TASK, "--method", method, "--preset", "smoke", "--out", str(path), *sets]
+    return ["run", task, "--method", method, "--preset", "smoke", "--out", str(path), *sets]
 
 
 def spawn(*arguments: str) -> subprocess.Popen[str]:

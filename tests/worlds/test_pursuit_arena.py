@@ -410,3 +410,10 @@ def test_a_digest_belongs_to_a_file(prey_file):
 )
 def test_bad_parameters_are_refused_in_one_line(name, value):
     assert name in refused(**{name: value})
+
+
+def test_what_could_never_be_played_is_refused_in_one_line():
+    with pytest.raises(UsageError, match="arena of 10 cm has no room for"):
+        world("pursuit/team-3", arena_cm=10.0).scenarios([1])
+    with pytest.raises(UsageError, match=r"capture_predators \(3\) must not be above the 2 pred"):
+        world("pursuit/team-1", capture_predators=3)

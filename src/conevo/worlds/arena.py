@@ -13,10 +13,12 @@ import numpy.typing as npt
 import warp as wp
 from annotated_types import Ge, Gt, Le
 
+from conevo.errors import UsageError
 from conevo.kernels.khepera import RADIUS
 from conevo.rng import stream
 from conevo.worlds.protocol import Simulation
-from conevo.worlds.pursuit_dynamics import N_ACTIONS, N_OBSTACLES, Params, Scene, Team
+from conevo.worlds.pursuit_bodies import N_OBSTACLES, Params, Scene, Team
+from conevo.worlds.pursuit_dynamics import N_ACTIONS
 
 __all__ = ["ArenaParams", "ArenaScenarios", "draw_scenarios", "simulate"]
 
@@ -152,10 +154,11 @@ def _free_place(
     """Draw a place for a body, a little away from walls and from all places taken."""
     margin = 0.01  # more than float32 rounds in the largest arena
     edge = float(RADIUS) + margin
-    while True:
-        place = rng.uniform(edge, arena_cm - edge, 2)
+    for _ in range(10_000):
+        place = rng.uniform(edge, max(edge, arena_cm - edge), 2)
         if all(math.dist(place, other) >= 2 * float(RADIUS) + margin for other in taken):
             return place
+    raise UsageError(f"an arena of {arena_cm:g} cm has no room for {len(taken) + 1} robots")
 
 
 def simulate(

@@ -125,6 +125,13 @@ class PursuitWorld:
     )
     heuristics: ClassVar[tuple[str, ...]] = ("heuristic",)
 
+    def __post_init__(self) -> None:
+        if self.params.capture_predators > self.n_robots:
+            raise UsageError(
+                f"world.capture_predators ({self.params.capture_predators}) must not be above the "
+                f"{self.n_robots} predators of {self.environment}"
+            )
+
     @property
     def team_type(self) -> int:
         """Number of the team type, from 1 (table 4.2)."""

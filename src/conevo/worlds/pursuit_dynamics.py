@@ -9,26 +9,23 @@ rules and the choices stand on the cards of the two worlds.
 
 import warp as wp
 
-from conevo.kernels.khepera import (
-    RADIUS,
-    drive,
-    eight,
-    see_disc,
-    see_wall,
-    steer,
-    wrap,
+from conevo.kernels.khepera import RADIUS, drive
+from conevo.worlds.pursuit_bodies import (
+    NONE,
+    Params,
+    Scene,
+    Team,
+    command,
+    is_prey,
+    look,
+    wheel_speed,
 )
-from conevo.kernels.network import Networks, sigmoid
-from conevo.kernels.random import uniform
 
-__all__ = ["ACTIONS", "PREY_FUNCTIONS", "PURSUIT_FUNCTIONS", "Params", "Scene", "Team"]
+__all__ = ["ACTIONS", "N_ACTIONS", "PREY_FUNCTIONS", "PURSUIT_FUNCTIONS"]
 
 # Choice: motor outputs name no actions; for S a predator's wheel pair is one of five primitives.
 ACTIONS = ("stop", "forward", "left", "right", "reverse")
 
-# --- state ----------------------------------------------------------------------------------------
-
-NONE = wp.constant(-1)
 STOP = wp.constant(0)
 FORWARD = wp.constant(1)
 LEFT = wp.constant(2)
@@ -36,92 +33,6 @@ RIGHT = wp.constant(3)
 REVERSE = wp.constant(4)
 N_ACTIONS = wp.constant(5)
 STOP_BELOW = wp.constant(0.1)  # Choice: both wheels below a tenth of full speed
-TURN_OFTEN = wp.constant(0.05)  # Choice: chance per iteration that a random walk turns
-NETWORK = wp.constant(0)
-HEURISTIC = wp.constant(1)
-N_OBSTACLES = wp.constant(6)  # most obstacles of a scenario
-
-
-@wp.struct
-class Params:
-    """Parameters of both worlds for the kernels; ``cone`` is the cosine and sine of its angle."""
-
-    n_robots: int
-    team_is_prey: int
-    arena: float
-    reach: float
-    cone: wp.vec2f
-    speed: float  # of a predator's wheel at command 1, cm per iteration
-    prey_speed: float
-    prey_mode: int  # how prey that are not the team are controlled
-    prey_hidden: int
-    window: int
-    moved_share: float
-    moved_least: float
-    n_captors: int
-
-
-@wp.struct
-class Scene:
-    """A scenario: places, and the networks of the prey. Flat over the scenarios of a batch."""
-
-    x: wp.array[float]
-    y: wp.array[float]
-    heading: wp.array[float]
-    n_bodies: wp.array[int]
-    obstacle_x: wp.array[float]
-    obstacle_y: wp.array[float]
-    n_obstacles: wp.array[int]
-    prey_in: wp.array2d[float]  # [Q * H, 8], the same in all scenarios, as the next two
-    prey_out: wp.array2d[float]  # [Q * H, 2]
-    clamp: wp.array2d[float]  # [R, S], sensor inputs held at a value, NaN where free
-    seed: wp.array[wp.uint64]
-
-
-@wp.struct
-class Team:
-    """State of a team and its opponents, flat over a batch. B bodies, R robots, Q prey."""
-
-    nets: Networks
-    heuristic: wp.array[int]
-    x: wp.array[float]
-    y: wp.array[float]
-    heading: wp.array[float]
-    to_x: wp.array[float]
-    to_y: wp.array[float]
-    to_heading: wp.array[float]
-    left: wp.array[float]  # wheel commands in [-1, 1]
-    right: wp.array[float]
-    refused: wp.array[int]  # by walls, obstacles and where others are
-    collided: wp.array[int]  # refused for any reason
-    collisions: wp.array[int]
-    infrared: wp.array[float]  # [B, 8]
-    wander: wp.array[float]  # direction of a random walk
-    known: wp.array[int]  # whether there is a last known place of a prey
-    known_x: wp.array[float]
-    known_y: wp.array[float]
-    moved: wp.array[float]  # [Q, window], a ring
-    commanded: wp.array[float]
-    captured: wp.array[int]
-    captures: wp.array[int]
-    first: wp.array[int]  # iteration of the first capture, NONE before
-    action: wp.array[int]
-    fitness: wp.array[float]
-    counts: wp.array[int]  # [R, A]
-    switches: wp.array[int]
-    performance: wp.array[float]
-
-
-@wp.func
-def is_prey(p: Params, b: int) -> bool:
-    """Return whether body ``b`` is a prey."""
-    return (b < p.n_robots) == (p.team_is_prey != 0)
-
-
-@wp.func
-def wheel_speed(p: Params, b: int) -> float:
-    """Return how far body ``b``'s wheel rolls in an iteration at command 1."""
-    return wp.where(is_prey(p, b), p.prey_speed, p.speed)
 
 
 # --- reset ----------------------------------------------------------------------------------------
@@ -161,47 +72,6 @@ def reset(team: Team, scene: Scene, p: Params, i: int) -> None:
 
 
 @wp.func
-def look(team: Team, scene: Scene, p: Params, b: int, is_light: bool) -> eight:
-    """Return the activations of body ``b``'s infrared or light sensors.
-
-    Infrared sees walls, obstacles and bodies; light sees prey, over the heads of others.
-    """
-    x = team.x[b]
-    y = team.y[b]
-    c = wp.cos(team.heading[b])
-    s = wp.sin(team.heading[b])
-    seen = eight()
-    limit = p.reach + 2.0 * RADIUS
-    j = int(0)
-    while j < scene.n_bodies[0]:
-        if j != b and (not is_light or is_prey(p, j)):
-            dx = team.x[j] - x
-            dy = team.y[j] - y
-            if dx * dx + dy * dy < limit * limit:
-                seen = see_disc(seen, c * dx + s * dy, c * dy - s * dx, RADIUS, p.cone, p.reach)
-        j += 1
-    if is_light:
-        return seen
-    j = int(0)
-    while j < scene.n_obstacles[0]:
-        dx = scene.obstacle_x[j] - x
-        dy = scene.obstacle_y[j] - y
-        if dx * dx + dy * dy < limit * limit:
-            seen = see_disc(seen, c * dx + s * dy, c * dy - s * dx, RADIUS, p.cone, p.reach)
-        j += 1
-    near = p.reach + RADIUS
-    if x < near:
-        seen = see_wall(seen, x, -c, s, p.cone, p.reach)
-    if p.arena - x < near:
-        seen = see_wall(seen, p.arena - x, c, -s, p.cone, p.reach)
-    if y < near:
-        seen = see_wall(seen, y, -s, -c, p.cone, p.reach)
-    if p.arena - y < near:
-        seen = see_wall(seen, p.arena - y, s, c, p.cone, p.reach)
-    return seen
-
-
-@wp.func
 def sense(team: Team, scene: Scene, p: Params, i: int, t: int) -> None:
     """Fill robot ``i``'s sensor inputs, and those of prey that are not the team."""
     n_sensors = scene.clamp.shape[1]
@@ -230,107 +100,6 @@ def sense(team: Team, scene: Scene, p: Params, i: int, t: int) -> None:
 
 
 # --- act ------------------------------------------------------------------------------------------
-
-
-@wp.func
-def walk_randomly(team: Team, scene: Scene, p: Params, b: int, t: int) -> wp.vec2f:
-    """Return wheel commands of a random walk: straight on, now and then another way.
-
-    Choice: it turns with chance 0.05 in an iteration, and whenever its last move was refused.
-    """
-    if team.collided[b] != 0 or uniform(scene.seed[0], t, 1, b) < TURN_OFTEN:
-        team.wander[b] = 6.2831853 * uniform(scene.seed[0], t, 2, b) - 3.1415927
-    return steer(wrap(team.wander[b] - team.heading[b]), wheel_speed(p, b))
-
-
-@wp.func
-def pursue(team: Team, scene: Scene, p: Params, b: int, t: int) -> wp.vec2f:
-    """Return wheel commands of the heuristic predator (sections 4.3, 4.6.6).
-
-    Straight at the closest prey in light range; else to where it was seen last; else a random walk.
-    Choice: it turns on the spot as fast as needed, knows prey all around it, and gives up a place
-    once it is within a robot's diameter of it.
-    """
-    x = team.x[b]
-    y = team.y[b]
-    limit = p.reach + 2.0 * RADIUS
-    closest = limit * limit
-    j = int(0)
-    while j < scene.n_bodies[0]:
-        if is_prey(p, j):
-            dx = team.x[j] - x
-            dy = team.y[j] - y
-            if dx * dx + dy * dy <= closest:
-                closest = dx * dx + dy * dy
-                team.known[b] = 1
-                team.known_x[b] = team.x[j]
-                team.known_y[b] = team.y[j]
-        j += 1
-    dx = team.known_x[b] - x
-    dy = team.known_y[b] - y
-    if closest == limit * limit and dx * dx + dy * dy < 4.0 * RADIUS * RADIUS:
-        team.known[b] = 0  # it is not here any more
-    if team.known[b] == 0:
-        return walk_randomly(team, scene, p, b, t)
-    return steer(wrap(wp.atan2(dy, dx) - team.heading[b]), p.speed)
-
-
-@wp.func
-def avoid(team: Team, p: Params, b: int) -> wp.vec2f:
-    """Return wheel commands of the heuristic prey: ahead, and away from the nearer side.
-
-    Choice: the thesis has no heuristic prey; this one turns by the difference between its three
-    sensors on either side, and on the spot where both sides are as near.
-    """
-    k = b * 8
-    left = wp.max(wp.max(team.infrared[k], team.infrared[k + 1]), team.infrared[k + 2])
-    right = wp.max(wp.max(team.infrared[k + 7], team.infrared[k + 6]), team.infrared[k + 5])
-    w = right - left
-    if wp.max(team.infrared[k], team.infrared[k + 7]) > 0.7 and wp.abs(w) < 0.05:
-        w = 1.0
-    w = wp.clamp(w, -1.0, 1.0)
-    f = 1.0 - wp.abs(w)
-    return wp.vec2f(f - w, f + w)
-
-
-@wp.func
-def think_as_prey(team: Team, scene: Scene, p: Params, b: int) -> wp.vec2f:
-    """Return wheel commands of a prey that is not the team: its feed-forward network (fig. 4.2)."""
-    left = float(0.0)
-    right = float(0.0)
-    row = int((b - p.n_robots) * p.prey_hidden)
-    end = row + p.prey_hidden
-    while row < end:
-        h = float(0.0)
-        for k in range(8):
-            h += scene.prey_in[row, k] * team.infrared[b * 8 + k]
-        h = sigmoid(h)
-        left += scene.prey_out[row, 0] * h
-        right += scene.prey_out[row, 1] * h
-        row += 1
-    return wp.vec2f(2.0 * sigmoid(left) - 1.0, 2.0 * sigmoid(right) - 1.0)
-
-
-@wp.func
-def command(team: Team, scene: Scene, p: Params, b: int, t: int) -> wp.vec2f:
-    """Return the wheel commands, left and right, that body ``b``'s controller gives."""
-    h = int(NONE)
-    if b < p.n_robots:
-        h = team.heuristic[b]
-        if h == NONE:
-            sums = team.nets.sums[b]
-            return wp.vec2f(2.0 * sigmoid(sums[0]) - 1.0, 2.0 * sigmoid(sums[1]) - 1.0)
-        if p.team_is_prey != 0:
-            h += 1
-    elif is_prey(p, b):
-        h = p.prey_mode
-    if is_prey(p, b):
-        if h == NETWORK:
-            return think_as_prey(team, scene, p, b)
-        if h == HEURISTIC:
-            return avoid(team, p, b)
-        return walk_randomly(team, scene, p, b, t)
-    return pursue(team, scene, p, b, t)
 
 
 @wp.func
