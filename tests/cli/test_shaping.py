@@ -165,7 +165,7 @@ def test_shape_prey_leaves_prey_for_the_pursuit_world(say) -> None:
     said = say(*shlex.split(use)[1:], *sets(PURSUIT), "--out", "hunt", "--quiet")
     assert said.code == 0, said.err
     params = conevo.Run("hunt").config.world_params
-    assert params.prey_digest == prey_sets.digest("prey/prey.npz")
+    assert params.prey_digest == prey_sets.load("prey/prey.npz").digest
     listed = json.loads(say("list", "runs", ".", "--json").out)
     assert [row["world"] for row in listed] == [
         "pursuit-v1/team-3",

@@ -443,7 +443,7 @@ def test_the_six_prey_experiments_leave_a_prey_file(tmp_path: Path) -> None:
     again = shape_prey(tmp_path / "again")
     assert (again.path / "prey.npz").read_bytes() == shaping.prey.read_bytes()
     world = conevo.world("pursuit/team-6", prey=str(shaping.prey))
-    assert world.params.prey_digest == prey_sets.digest(shaping.prey)  # type: ignore[attr-defined]
+    assert world.params.prey_digest == prey_sets.load(shaping.prey).digest  # type: ignore[attr-defined]
 
 
 def test_a_kill_before_the_prey_file_is_written_is_not_noticed(tmp_path: Path) -> None:

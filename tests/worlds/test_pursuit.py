@@ -153,7 +153,9 @@ def test_two_prey_captured_at_once_count_once_in_time_and_twice_as_captures():
 
 def test_the_number_of_predators_needed_and_the_range_are_parameters():
     robots, prey = [(50, 70, 0, IDLE), (50, 30, 0, IDLE)], [(50, 50, 0, IDLE)]
-    assert situation(robots, prey, capture_predators=3)[0]["capture_time"] == 0
+    far = [*robots, (10, 10, 0, IDLE)]
+    assert situation(far, prey)[0]["capture_time"] == T - 9
+    assert situation(far, prey, capture_predators=3)[0]["capture_time"] == 0
     assert situation(robots, prey, sensor_range_cm=14.4)[0]["capture_time"] == 0
     assert situation(robots, prey, sensor_range_cm=14.6)[0]["capture_time"] == T - 9
     assert situation(robots, prey, capture_window=20)[0]["first_capture"] == 19

@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 from conevo.errors import EnvironmentFailure, UsageError
 
-__all__ = ["PreySet", "digest", "load", "save"]
+__all__ = ["PreySet", "load", "save"]
 
 FORMAT = "conevo prey set 1"
 SHIPPED = "prey-v1.npz"
@@ -43,6 +43,15 @@ class PreySet:
     two: npt.NDArray[np.float32]
     two_active: npt.NDArray[np.bool_]
     about: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def digest(self) -> str:
+        """Twelve hex digits of the networks, whatever the file says about their making."""
+        found = hashlib.blake2b(digest_size=6)
+        for array in (self.one, self.one_active, self.two, self.two_active):
+            found.update(f"{array.dtype.str} {array.shape}".encode())
+            found.update(np.ascontiguousarray(array).tobytes())
+        return found.hexdigest()
 
     def weights(
         self, n_prey: int, scale: float
@@ -106,15 +115,6 @@ def load(path: str | Path | None = None) -> PreySet:
     except Exception as error:  # whatever a damaged file makes its readers say
         raise UsageError(f"{path} is damaged or no prey set ({error})") from error
     return prey
-
-
-def digest(path: str | Path) -> str:
-    """Return twelve hex digits of a file's content.
-
-    Raises:
-        UsageError: the file cannot be read.
-    """
-    return hashlib.blake2b(_read(path), digest_size=6).hexdigest()
 
 
 def _read(path: str | Path | None) -> bytes:

@@ -65,7 +65,7 @@ class PursuitParams(ArenaParams):
     Attributes:
         prey: "shaped" (the evolved prey that are shipped), "heuristic", "random", or a file that
             ``conevo shape-prey`` made.
-        prey_digest: of the content of a prey file; filled in, and checked when it is given.
+        prey_digest: of the networks in a prey file; filled in, and checked when it is given.
         n_obstacles: cylinders in the arena. The thesis has them when prey are shaped only.
         capture_window: iterations over which a prey must hardly have moved. Choice: 10, one second.
         capture_share: less than this share of what its wheels commanded. Choice: a tenth.
@@ -97,8 +97,7 @@ class PursuitParams(ArenaParams):
         path = Path(self.prey)
         if not path.exists() and path.name == self.prey and not path.suffix:
             raise unknown_name("prey", self.prey, PREY_MODES, "(and no such file)")
-        found = prey_sets.digest(path)
-        prey_sets.load(path)
+        found = prey_sets.load(path).digest
         if self.prey_digest not in ("", found):
             raise UsageError(
                 f"prey file {self.prey!r} has changed: its digest is {found}, not "
