@@ -417,3 +417,12 @@ def test_what_could_never_be_played_is_refused_in_one_line():
         world("pursuit/team-3", arena_cm=10.0).scenarios([1])
     with pytest.raises(UsageError, match=r"capture_predators \(3\) must not be above the 2 pred"):
         world("pursuit/team-1", capture_predators=3)
+
+
+def test_a_file_that_is_no_prey_set_is_refused_without_advice_to_unpickle_it(tmp_path):
+    path = tmp_path / "prey.toml"
+    path.write_text("format = 1")
+    with pytest.raises(UsageError) as caught:
+        world("pursuit/team-1", prey=str(path))
+    assert "no prey set (not an npz file)" in str(caught.value)
+    assert "pickle" not in str(caught.value)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import io
 import json
+import zipfile
 from dataclasses import dataclass, field
 from importlib import resources
 from pathlib import Path
@@ -99,6 +100,8 @@ def load(path: str | Path | None = None) -> PreySet:
     """
     data = _read(path)
     try:
+        if not zipfile.is_zipfile(io.BytesIO(data)):  # else numpy advises to unpickle it
+            raise ValueError("not an npz file")
         with np.load(io.BytesIO(data), allow_pickle=False) as archive:
             arrays = {name: archive[name] for name in archive.files}
         about = json.loads(arrays.pop("about").tobytes())
