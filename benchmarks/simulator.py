@@ -41,7 +41,7 @@ def workload(world: World, rollout: Rollout, batch: int) -> Callable[[], float]:
         outcome = rollout.evaluate(genes, teams, scenarios)
         seconds = time.perf_counter() - began
         assert outcome.fitness.shape[0] == batch
-        return batch * world.iterations / seconds
+        return batch * world.params.iterations / seconds
 
     return measure
 
@@ -52,7 +52,7 @@ def label(world: World) -> str:
     name = f"{world.name.rpartition('-v')[0]}/{world.environment}"
     return (
         f"{name}, {world.n_robots} robots, {spec.n_inputs}-{spec.n_hidden}-{spec.n_outputs} "
-        f"recurrent networks, {world.iterations} iterations"
+        f"recurrent networks, {world.params.iterations} iterations"
     )
 
 

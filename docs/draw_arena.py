@@ -63,7 +63,7 @@ def draw_epoch(ax, world, seed):
     rollout = conevo.Rollout(world, n_threads=1)
     seen = rollout.record(teams.genes, teams.slots[0], scene, teams.heuristic[0])
     caught = np.flatnonzero(seen["captured"].any(axis=1))
-    end = min(world.iterations, int(caught[0]) + 20) if len(caught) else 300
+    end = min(world.params.iterations, int(caught[0]) + 20) if len(caught) else 300
     x = np.concatenate([scene.x, seen["x"][:end]])
     y = np.concatenate([scene.y, seen["y"][:end]])
     for b in range(x.shape[1]):

@@ -17,7 +17,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 from matplotlib.ticker import MaxNLocator
 
-from conevo import WORLDS, Rollout, Run
+from conevo import Rollout, Run
 from conevo.rng import fold
 from conevo.specialization.individual import NON_SPECIALIZED, degree, label
 
@@ -34,15 +34,14 @@ STYLES = (
 )
 
 
-def styles(actions):
-    """Return the style of each caste: one per action, then the non-specialized."""
-    return dict(zip((*actions, NON_SPECIALIZED), STYLES, strict=True))
+def styles(castes):
+    """Return the style of each caste, the non-specialized last."""
+    return dict(zip((*castes, NON_SPECIALIZED), STYLES, strict=True))
 
 
 def world_of(run):
     """Return the world a run was made in."""
-    config = run.config
-    return WORLDS[config.world].build(config.environment, config.world_params)
+    return run.config.build_world()
 
 
 def replay(run, scenario):
@@ -61,7 +60,7 @@ def replay(run, scenario):
     outcome = rollout.evaluate(genes, teams, scene)
     s = degree(outcome.switches[0, 0], outcome.counts[0, 0])
     castes = [
-        label(float(one), counts, world.actions)
+        label(float(one), counts, world.castes)
         for one, counts in zip(s, outcome.counts[0, 0], strict=True)
     ]
     return scene, seen["x"], seen["y"], castes, detected, float(outcome.performance["value"][0, 0])
@@ -146,7 +145,7 @@ def title(run):
 
 def draw(run, picture):
     """Write the picture of a finished run of the multi-rover world."""
-    looks = styles(world_of(run).actions)
+    looks = styles(world_of(run).castes)
     figure, axes = plt.subplot_mosaic(
         [["learning", "world"], ["castes", "world"]],
         figsize=(12.5, 5.6),

@@ -177,7 +177,7 @@ def compare(run: conevo.Run, sheet: Sheet, seeds: list[int]) -> tuple[list[Row],
         first kind in each scenario.
     """
     config = run.config
-    world = conevo.WORLDS[config.world].build(config.environment, config.world_params)
+    world = config.build_world()
     rows, first = [], {}
     for seed in seeds:
         keys = [fold(seed, "test", k) for k in range(config.run.n_tests)]
@@ -189,7 +189,7 @@ def compare(run: conevo.Run, sheet: Sheet, seeds: list[int]) -> tuple[list[Row],
             outcome = play(world, teams, keys)
             if kind == sheet.others[0][0]:
                 first[seed] = outcome.performance[sheet.main][0].astype(np.float64)
-            portraits = [describe(outcome, world.actions, team=n) for n in range(len(teams.kinds))]
+            portraits = [describe(outcome, world.castes, team=n) for n in range(len(teams.kinds))]
             castes = sum((Counter(p.castes) for p in portraits), Counter())
             rows.append(
                 {

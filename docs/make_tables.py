@@ -14,6 +14,8 @@ from typing import Annotated, Literal, get_args, get_origin, get_type_hints
 from conevo import METHODS, WORLDS
 from conevo.runs.config import PRESETS, resolve
 from conevo.worlds import rocks
+from conevo.worlds.gacc import GaccParams, GaccWorld
+from conevo.worlds.gacc_plans import TYPES
 from conevo.worlds.prey import PreyParams, PreyWorld
 from conevo.worlds.pursuit import PursuitParams, PursuitWorld
 from conevo.worlds.rover import RoverParams
@@ -77,10 +79,40 @@ PREY_MEANING = {
     "most": ("", "most obstacles, and most predators"),
     **HIDDEN_MEANING,
 }
+GACC_MEANING = {
+    "n_robots": ("robots", "robots in a team"),
+    "iterations": ("iterations", "length of an epoch"),
+    "energy": ("energy", "of a robot at the start of an epoch"),
+    "home_side": ("side", "side of the home area, in the middle of the square"),
+    "zone_side": ("side", "side of the construction zone, in the middle of the home area"),
+    "home_range": ("side", "how far from its centre the home area is sensed"),
+    "home_sight": (
+        "side",
+        "how far a robot in the home area sees who needs help there, and objects",
+    ),
+    "object_range": ("side", "how far the object and obstacle sensors see"),
+    "object_accuracy": ("probability", "that an object or an obstacle in range is sensed"),
+    "object_cost": ("energy", "of an activation of these sensors"),
+    "robot_range": ("side", "how far the robot sensors see"),
+    "robot_cost": ("energy", "of the robot sensors, in every iteration"),
+    "grip_distance": ("side", "how far from a robot an object may be that it grips"),
+    "grip_cost": ("energy", "of an activation of the gripper, waiting with an object included"),
+    "move_range": ("side", "the largest step"),
+    "move_cost": ("energy", "of a move, refused or not"),
+    "wait": ("iterations", "how long a robot waits with an object for help"),
+    "needs_detection": ("", "whether an object must have been detected before it can be gripped"),
+    "min_distance": ("side", "lower bound of distances in eqs 6.1 to 6.3"),
+    "separation": ("side", "a robot may not come closer than this to another"),
+    "obstacle_least": ("side", "shortest side of an obstacle"),
+    "obstacle_most": ("side", "longest side of an obstacle"),
+    "obstacle_gap": ("side", "least distance of an obstacle from walls, home area and the others"),
+    **HIDDEN_MEANING,
+}
 MEANING = {
     RoverParams: ROVER_MEANING,
     PursuitParams: PURSUIT_MEANING,
     PreyParams: PREY_MEANING,
+    GaccParams: GACC_MEANING,
 }
 TEXTS = {
     "prey": "`shaped`, `heuristic`, `random`, or the path of a file",
@@ -109,8 +141,9 @@ def worlds_by_methods():
 
 
 def _has_sizes(preset, world, method):
-    """Whether a preset says anything about a method, or its family, in a world."""
-    methods = tomllib.loads(_preset_text(preset)).get(world, {}).get("method", {})
+    """Whether a preset says anything about a method, or its family, in a world or in any."""
+    tables = tomllib.loads(_preset_text(preset))
+    methods = {name for part in (world, "any") for name in tables.get(part, {}).get("method", {})}
     return method in methods or method.split("-")[0] in methods
 
 
@@ -166,6 +199,20 @@ def card(module):
     return table(["", ""], [[name, text.replace("``", "`")] for name, text in rows])
 
 
+def construction_environments():
+    """Return the objects, the obstacles and what is built in every environment of gathering."""
+    rows = []
+    for name in WORLDS["gacc-v1"].environments:
+        plan = GaccWorld(name).plan
+        counts = [int((plan.object_types == kind).sum()) for kind in range(len(TYPES))]
+        built = [
+            "".join(TYPES[kind] for kind in parts) + ("" if ordered else " in any order")
+            for parts, ordered in zip(plan.parts.tolist(), plan.is_ordered, strict=True)
+        ]
+        rows.append([f"`{name}`", *counts, plan.n_obstacles, ", ".join(built)])
+    return table(["environment", *TYPES, "obstacles", "complex objects"], rows)
+
+
 def rover_environments():
     """Return canal layout and rocks of every multi-rover environment."""
     rows = []
@@ -195,7 +242,8 @@ def parameters(params):
     rows = []
     for field in dataclasses.fields(params):
         unit, meaning = MEANING[params][field.name]
-        default = f"`{field.default}`" if field.default != "" else ""
+        value = str(field.default).lower() if hints[field.name] is bool else field.default
+        default = f"`{value}`" if value != "" else ""
         allowed = TEXTS.get(field.name) or _allowed(hints[field.name])
         rows.append([f"`{field.name}`", default, unit, allowed, meaning])
     return table(["parameter", "default", "unit", "allowed", "what it is"], rows)
@@ -205,6 +253,8 @@ def _allowed(hint):
     """Return the values that a type annotation allows."""
     if get_origin(hint) is Literal:
         return ", ".join(f"`{value}`" for value in get_args(hint))
+    if hint is bool:
+        return "`true`, `false`"
     assert get_origin(hint) is Annotated, hint
     bounds = [(f, getattr(b, f)) for b in get_args(hint)[1:] for f in BOUNDS if hasattr(b, f)]
     return ", ".join(f"{BOUNDS[name]} {limit:,}" for name, limit in bounds)
@@ -237,6 +287,7 @@ TABLES = {
     "worlds x methods": worlds_by_methods,
     "presets": lambda: presets("rover/complex-1"),
     "presets pursuit": lambda: presets("pursuit/team-3", has_purpose=False),
+    "presets gacc": lambda: presets("gacc/complex-1", has_purpose=False),
     "rover card": lambda: card("conevo.worlds.rover"),
     "rover environments": rover_environments,
     "rover settings": rover_settings,
@@ -247,6 +298,9 @@ TABLES = {
     "prey card": lambda: card("conevo.worlds.prey"),
     "prey environments": shaping_experiments,
     "prey parameters": lambda: parameters(PreyParams),
+    "gacc card": lambda: card("conevo.worlds.gacc"),
+    "gacc environments": construction_environments,
+    "gacc parameters": lambda: parameters(GaccParams),
 }
 
 

@@ -35,6 +35,11 @@ class Teams:
         some = slice(n, n + 1)
         return Teams(self.genes, self.slots[some], self.heuristic[some], self.kinds[some])
 
+    def only(self, kind: str) -> Teams:
+        """Return the teams of a kind."""
+        some = self.of(kind)
+        return Teams(self.genes, self.slots[some], self.heuristic[some], (kind,) * len(some))
+
     def __add__(self, other: Teams) -> Teams:
         """Return the teams of both."""
         moved = np.where(other.slots >= 0, other.slots + len(self.genes), -1).astype(np.int32)
@@ -66,6 +71,15 @@ def random_networks(world: World, n: int, seed: int, *where: str) -> Teams:
     slots[:, :, : spec.n_hidden] = np.arange(n * rows[0]).reshape(n, r, spec.n_hidden)
     modes = np.full((n, r), -1, dtype=np.int32)
     return Teams(np.concatenate(genes), slots, modes, ("random",) * n)
+
+
+def random_clones(world: World, n: int, seed: int, *where: str) -> Teams:
+    """Return teams of which all robots have the same random network of the initial size."""
+    spec, r = world.controller, world.n_robots
+    genes = random_genes(stream(seed, *where, "clones"), (n * spec.n_hidden, spec.n_genes))
+    slots = np.full((n, r, spec.max_hidden), -1, dtype=np.int32)
+    slots[:, :, : spec.n_hidden] = np.arange(len(genes)).reshape(n, 1, spec.n_hidden)
+    return Teams(genes, slots, np.full((n, r), -1, dtype=np.int32), ("clones",) * n)
 
 
 def champion(run: conevo.Run, kind: str) -> Teams:

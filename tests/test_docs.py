@@ -175,8 +175,8 @@ def test_following_the_recipes_adds_a_world_and_a_method(tmp_path):
     package = tmp_path / "src" / "conevo"
     for example, place in (("light", "worlds"), ("random_search", "evolution/methods")):
         text = (ROOT / "examples" / f"{example}.py").read_text()
-        text = re.sub(r"\n\ndef main\(\).*", "", text, flags=re.DOTALL)
-        text = re.sub(r"^from conevo import .*\n", "", text, flags=re.MULTILINE)
+        text = re.sub(r"\n\n(def main\(\)|ENTRY = ).*", "", text, flags=re.DOTALL)
+        text = text.replace("from conevo.worlds.registry import WorldEntry\n", "")
         (package / place / f"{example}.py").write_text(text)
     for mark, name, text in recipes():
         if mark == "entry":
@@ -188,13 +188,13 @@ def test_following_the_recipes_adds_a_world_and_a_method(tmp_path):
                 file.write(f"\n{text}")
     environment = os.environ | {"PYTHONPATH": str(tmp_path / "src")}
 
-    def run(*arguments):
+    def run(*arguments, code=0):
         done = subprocess.run(
             [sys.executable, "-m", *arguments],
             cwd=tmp_path, env=environment, text=True, check=False,
             stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
         )  # fmt: skip
-        assert done.returncode == 0, done.stdout
+        assert done.returncode == code, done.stdout
         return done.stdout
 
     assert "light-v1" in run("conevo", "list", "worlds")
@@ -202,10 +202,15 @@ def test_following_the_recipes_adds_a_world_and_a_method(tmp_path):
     options = ("--preset", "smoke", "--method", "random-search")
     assert "stopped by: generations" in run("conevo", "run", "light/dark-1", *options[:2],
                                             "--method", "homcne")  # fmt: skip
+    assert "is that of a world of the package" in run("conevo", "run", "examples/light.py:dark-1",
+                                                      code=2)  # fmt: skip
     assert "stopped by: generations" in run("conevo", "run", "rover/complex-1", *options,
                                             "--set", "run.generations=2")  # fmt: skip
-    contracts = run("pytest", "-q", "-p", "no:cacheprovider", "tests/contracts",
-                    "-k", "light or random")  # fmt: skip
-    found = re.search(r"(\d+) passed", contracts)
-    assert found, contracts
-    assert int(found[1]) >= 16  # seven for the world, nine for the method
+    for folder, words, least in (
+        ("tests/contracts", "light-v1 or random", 17),  # eight for the world, nine for the method
+        ("tests/runs", "kills and (light and homcne or random and rover)", 2),
+    ):
+        said = run("pytest", "-q", "-p", "no:cacheprovider", folder, "-k", words)
+        found = re.search(r"(\d+) passed", said)
+        assert found, said
+        assert int(found[1]) >= least

@@ -59,7 +59,7 @@ def test_a_shaping_from_run_to_the_commands_it_recommends(say, tmp_path: Path) -
         assert f"stage {stage} of 3: rover-v1/complex-{stage}, CONE, preset smoke" in said.out
     assert said.out.count("generation 5/5  value") == 3
     recommended = re.findall(r"^  (conevo .*)$", said.out, flags=re.MULTILINE)
-    assert [line.split()[1] for line in recommended] == ["show", "test"]
+    assert [line.split()[1] for line in recommended] == ["show", "test", "test"]
     for line in recommended:
         again = say(*shlex.split(line)[1:])
         assert again.code == 0, again.err
@@ -87,7 +87,18 @@ def test_show_prints_the_stages_with_what_their_champions_achieved(say, tmp_path
         assert row[1:4] == [run.config.task, "finished", "5/5"]
         assert row[5] == str(run.champion.generation)
         assert row[-3:] == [f"{area['mean']:.4g}", "+-", f"{area['sd']:.4g}"]
+    table = shown[shown.index("number  stage  task") :].splitlines()
+    seen = [line.split()[:4] for line in table[1:]]
+    assert seen == [
+        [str(5 * k + g), str(k + 1), f"rover-v1/complex-{k + 1}", str(g)]
+        for k in range(3)
+        for g in (0, 1, 3, 4)
+    ]
+    few = say("show", "here", "--rows", "2").out
+    assert few[few.index("number  stage  task") :].count("\n") == 1 + 2 * 3
     everything = json.loads(say("show", "here", "--json").out)
+    assert everything["generations"] == Shaping("here").generations()
+    assert everything["changed_files"] == []
     assert everything["tasks"] == [f"rover-v1/complex-{k}" for k in (1, 2, 3)]
     assert [len(stage["generations"]) for stage in everything["stages"]] == [5, 5, 5]
     (tmp_path / "here" / "stage-1" / "test.json").write_bytes(b"{}")
@@ -102,16 +113,44 @@ def test_test_takes_the_team_of_the_last_stage(say) -> None:
     assert json.loads(say("test", "here", "--json").out) == last.test_result["champion"]
 
 
+def test_test_takes_that_team_to_the_environment_of_every_stage(say) -> None:
+    say(*shape("--out", "here", "--quiet"))
+    tested = json.loads(say("test", "here", "--stages", "--json").out)
+    assert [one["task"] for one in tested] == Shaping("here").tasks
+    said = say("test", "here", "--stages", "--scenarios", "2")
+    assert "The fittest team of stage 3" in said.out
+    assert "2 fresh scenarios of each stage" in said.out
+    rows = [line.split() for line in said.out.splitlines() if re.match(r" +\d  rover", line)]
+    assert [row[:2] for row in rows] == [[str(k), f"rover-v1/complex-{k}"] for k in (1, 2, 3)]
+    said = say("test", "here/stage-1", "--stages")
+    assert (said.code, said.err) == (
+        2, "conevo: error: here/stage-1 is a run, and only a shaping has stages\n",
+    )  # fmt: skip
+
+
 def test_json_names_the_stage_of_every_generation(say) -> None:
     lines = [json.loads(line) for line in say(*shape("--json")).out.splitlines()]
-    places = [(line["stage"], line["generation"]) for line in lines[:-1]]
-    assert places == [(stage, generation) for stage in (1, 2, 3) for generation in range(5)]
     assert lines[-1]["status"] == "finished"
     shaping = Shaping(lines[-1]["shaping"])
+    assert lines[:-1] == shaping.generations()
     assert [stage["test"] for stage in lines[-1]["stages"]] == [
         run.test_result for run in shaping.stages
     ]
     assert lines[-1]["prey"] is None
+
+
+def test_json_of_a_resumed_shaping_goes_on_with_its_numbers(say, tmp_path: Path) -> None:
+    def stop(run: conevo.Run, record: dict[str, Any]) -> None:
+        if (run.path.name, record["generation"]) == ("stage-2", 1):
+            raise KeyboardInterrupt
+
+    tasks = ["rover/complex-1", "rover/complex-2"]
+    begun = start_shaping(tasks, preset="smoke", out=tmp_path / "here", overrides=TINY, threads=1)
+    with pytest.raises(KeyboardInterrupt):
+        begun.resume(threads=1, watch=stop)
+    lines = [json.loads(line) for line in say("resume", "here", "--json").out.splitlines()]
+    assert [line["number"] for line in lines[:-1]] == [7, 8, 9]
+    assert lines[:-1] == begun.generations()[7:]
 
 
 def test_quiet_prints_the_directory_only(say) -> None:

@@ -1,12 +1,15 @@
 """What every world promises, for each environment family of the registry."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from conevo.rng import fold, stream
-from conevo.worlds.registry import WORLDS, world
+from conevo.worlds.registry import WORLDS, resolve, world
 from conevo.worlds.rollout import Rollout
 
+EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "light.py"
 ITERATIONS = 25
 CASES = [
     f"{entry.name}/{environment}"
@@ -19,9 +22,14 @@ def keys(n, root=7):
     return [fold(root, "epoch", 0, e) for e in range(n)]
 
 
-@pytest.fixture(params=CASES, scope="module")
-def some_world(request):
-    return world(request.param, iterations=ITERATIONS)
+@pytest.fixture(params=[*CASES, f"{EXAMPLE}:dark-1"], ids=[*CASES, "outside"], scope="module")
+def path(request):
+    return request.param
+
+
+@pytest.fixture(scope="module")
+def some_world(path):
+    return world(path, iterations=ITERATIONS)
 
 
 def random_teams(some_world, n, seed=0):
@@ -46,12 +54,23 @@ def assert_same_bits(a, b):
         assert values.tobytes() == outcome_arrays(b)[name].tobytes(), name
 
 
+def test_a_world_is_what_its_entry_says(path, some_world):
+    entry, environment = resolve(path)
+    assert (some_world.name, some_world.environment) == (entry.name, environment)
+    assert some_world.params == entry.params_class(iterations=ITERATIONS)
+    for names in (some_world.actions, some_world.performance, some_world.heuristics):
+        assert isinstance(names, tuple)
+        assert len(set(names)) == len(names) > 0
+    assert len(some_world.castes) >= len(some_world.actions)
+    assert resolve(entry.address(environment)) == (entry, environment)
+
+
 def test_outcome_has_the_shapes_and_ranges_it_promises(some_world):
     genes, teams = random_teams(some_world, 3)
     out = Rollout(some_world).evaluate(genes, teams, some_world.scenarios(keys(2)))
-    r, a = some_world.n_robots, len(some_world.actions)
+    r, c = some_world.n_robots, len(some_world.castes)
     assert out.fitness.shape == (3, 2, r)
-    assert out.counts.shape == (3, 2, r, a)
+    assert out.counts.shape == (3, 2, r, c)
     assert out.switches.shape == (3, 2, r)
     assert set(out.performance) == set(some_world.performance)
     assert all(values.shape == (3, 2) for values in out.performance.values())
@@ -100,9 +119,14 @@ def test_record_equals_evaluate_bit_for_bit(some_world):
         assert seen["inputs"].shape == (ITERATIONS, some_world.n_robots, n_inputs)
         assert seen["fitness"][-1].tobytes() == out.fitness[n, 0].tobytes()
         for name in some_world.simulation().recorded_at_end:
-            assert seen[name].shape == (some_world.simulation().sizes[name],)
-        for a in range(len(some_world.actions)):
-            assert np.array_equal((seen["action"] == a).sum(axis=0), out.counts[n, 0, :, a])
+            size = some_world.simulation().sizes.get(name, some_world.n_robots)
+            assert seen[name].shape == (size,)
+        action, counts = seen["action"], out.counts[n, 0]
+        assert action.max() < len(some_world.actions)
+        assert np.array_equal((action >= 0).sum(axis=0), counts.sum(axis=-1))
+        if some_world.castes == some_world.actions:
+            for a in range(len(some_world.actions)):
+                assert np.array_equal((action == a).sum(axis=0), counts[:, a])
 
 
 def test_every_heuristic_controller_plays(some_world):

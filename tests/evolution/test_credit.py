@@ -31,14 +31,6 @@ def test_mean_of_trials_is_spoiled_by_a_score_that_is_not_finite():
     np.testing.assert_array_equal(mean, [np.nan, 2.0])
 
 
-def test_utility_sums_type_a_over_the_neurons_of_a_controller():
-    # Eq. 3.8: population 0 uses slots 0 and 1: 2 + 30; population 1 slot 0 only: 5.
-    fitness = np.array([[[1.0, 2.0], [30.0, 10.0]], [[5.0, 7.0], [np.nan, np.nan]]])
-    active = np.array([[True, True], [True, False]])
-    chosen = np.array([[1, 0], [0, 0]])
-    assert credit.utility(fitness, active, chosen).tolist() == [32, 5]
-
-
 def test_controllers_of_equal_rank_come_in_the_order_of_their_utility():
     generator = np.random.default_rng(2)
     fitness = generator.random((2, 3, 8))
@@ -46,8 +38,10 @@ def test_controllers_of_equal_rank_come_in_the_order_of_their_utility():
     elite = np.argsort(-fitness, axis=-1)[..., :4]
     teams = elite_teams(active, elite, 8, generator).reshape(2, 4, 2, 3) % 8
     for population in range(2):
+        # Type B fitness, eq. 3.8: the sum of type A over a controller's neurons.
         utilities = [
-            credit.utility(fitness, active, team)[population] for team in teams[population]
+            sum(fitness[population, slot, team[population, slot]] for slot in range(3))
+            for team in teams[population]
         ]
         assert utilities == sorted(utilities, reverse=True)
         assert len(set(utilities)) == 4

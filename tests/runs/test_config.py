@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from importlib import resources
 from pathlib import Path
 
 import pytest
@@ -23,6 +24,38 @@ def test_every_preset_resolves_for_every_world_and_method(
 ) -> None:
     config = resolve(f"{world}/{WORLDS[world].environments[0]}", method, preset)
     assert (config.world, config.method, config.preset) == (world, method, preset)
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_tables_of_a_preset_are_those_of_known_worlds_and_methods(preset: str) -> None:
+    """A misspelt table would leave its world with the sizes of any."""
+    text = (resources.files("conevo.runs") / "presets" / f"{preset}.toml").read_text()
+    tables = tomllib.loads(text)
+    assert set(tables) <= {"any", *(entry.short_name for entry in WORLDS.values())}
+    assert set(tables["any"]) == {"run", "method"}
+    for table in tables.values():
+        assert set(table) <= {"run", "world", "method"}
+        assert set(table.get("method", {})) <= set(METHODS)
+
+
+def test_a_worlds_own_table_replaces_that_of_any_world(monkeypatch: pytest.MonkeyPatch) -> None:
+    tables = {
+        "any": {
+            "run": {"generations": 3, "epochs": 4},
+            "method": {"cone": {"genotypes": 8}, "mesp": {"genotypes": 9}},
+        },
+        "pursuit": {"run": {"generations": 5}, "method": {"cone": {"rounds": 6}}},
+    }
+    monkeypatch.setattr(tomllib, "loads", lambda _: tables)
+    rover, pursuit = (resolve(task, "cone") for task in (TASK, "pursuit/team-3"))
+    assert (rover.run.generations, rover.run.epochs) == (3, 4)
+    assert (pursuit.run.generations, pursuit.run.epochs) == (5, RunSettings().epochs)
+    assert (rover.method_config.genotypes, rover.method_config.rounds) == (8, 10)
+    assert (pursuit.method_config.genotypes, pursuit.method_config.rounds) == (50, 6)
+    assert resolve("pursuit/team-3", "mesp").method_config.genotypes == 9
+    assert resolve("pursuit/team-3", "cone-1").method_config.rounds == 6
+    with pytest.raises(UsageError, match="no settings for method 'ccga' in 'pursuit-v1'"):
+        resolve("pursuit/team-3", "ccga")
 
 
 def test_thesis_preset_has_the_sizes_of_the_thesis() -> None:

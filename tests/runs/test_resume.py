@@ -4,11 +4,8 @@ from __future__ import annotations
 
 import errno
 import os
-import random
 import shutil
 import signal
-import subprocess
-import time
 from pathlib import Path
 
 import pytest
@@ -19,40 +16,27 @@ from conevo.evolution.methods.registry import METHODS
 from conevo.runs import durable
 from conevo.runs.config import resolve
 from conevo.runs.run import start
-from conevo.worlds.registry import WORLDS
-from conevo.worlds.registry import resolve as resolve_world
-from runs.tiny import TASK, TASKS, command, content, evolve_tiny, spawn, tiny_settings, wait_for
-
-
-def test_there_is_a_tiny_task_of_every_world() -> None:
-    assert [resolve_world(task)[0].name for task in TASKS] == list(WORLDS)
+from runs.tiny import (
+    TASK,
+    TASKS,
+    command,
+    content,
+    evolve_tiny,
+    kill_twice,
+    spawn,
+    tiny_settings,
+    wait_for,
+)
 
 
 @pytest.mark.parametrize("task", TASKS)
 @pytest.mark.parametrize("method", METHODS)
 def test_resume_after_kills_at_random_moments(method: str, task: str, tmp_path: Path) -> None:
     whole = evolve_tiny(tmp_path / "whole", method, task, run__generations=60)
-    path, kills = tmp_path / "killed", sorted(random.choices(range(45), k=2))
-    arguments = [*command(path, method, task, run__generations=60), "--quiet"]
-    for generation in kills:
-        process = spawn(*arguments)
-        wait_for(lambda: is_past(path, process, generation))  # noqa: B023 (called at once)
-        time.sleep(random.uniform(0, 0.02))
-        process.kill()
-        assert process.wait() == -signal.SIGKILL, process.communicate()
-        assert conevo.Run(path).status == "interrupted"
-        arguments = ["resume", str(path), "--quiet"]
+    path = tmp_path / "killed"
+    kills = kill_twice(path, command(path, method, task, run__generations=60))
     conevo.Run(path).resume(threads=2)
     assert content(path) == content(whole.path), kills
-
-
-def is_past(path: Path, process: subprocess.Popen[str], generation: int) -> bool:
-    """Whether a process is at work in a run that has finished so many generations, or has ended."""
-    lock, log = path / "lock", path / "generations.jsonl"
-    is_at_work = lock.exists() and lock.read_text() == f"process {process.pid}"
-    return process.poll() is not None or (
-        is_at_work and log.read_bytes().count(b"\n") >= generation
-    )
 
 
 class Crash(BaseException):

@@ -19,6 +19,7 @@ import pytest
 import conevo
 from conevo.errors import EnvironmentFailure, UsageError
 from conevo.evolution.methods.registry import METHODS
+from conevo.rng import fold
 from conevo.runs import durable
 from conevo.runs.config import resolve
 from conevo.runs.evolved_prey import PREY_TASKS
@@ -41,6 +42,8 @@ def begin(path: Path, method: str = "cone", tasks: list[str] = TASKS, **more: An
 def stages_content(path: Path) -> dict[str, Any]:
     """Return everything that a shaping amounts to, without times."""
     found: dict[str, Any] = {"run_ids": [config.run_id for config in Shaping(path).configs]}
+    lines = (path / "generations.jsonl").read_text().splitlines()
+    found["generations"] = [json.loads(line) | {"seconds": 0} for line in lines]
     for stage in sorted(path.glob("stage-*")):
         found[stage.name] = content(stage)
         if (stage / "origin.npz").exists():
@@ -87,6 +90,54 @@ def test_the_same_settings_give_the_same_stages(tmp_path: Path) -> None:
     one = begin(tmp_path / "one").resume(threads=1)
     two = begin(tmp_path / "two").resume(threads=2)
     assert stages_content(one.path) == stages_content(two.path)
+
+
+def test_every_generation_is_numbered_through_and_says_what_it_saw(tmp_path: Path) -> None:
+    shaping = begin(tmp_path / "shaped")
+    assert shaping.generations() == []
+    interrupt(shaping, stage=2)
+    file = shaping.path / "generations.jsonl"
+    assert len(file.read_text().splitlines()) == 3  # of the stage that is sealed
+    assert len(shaping.generations()) == 5  # of what is under way too
+    shaping.resume(threads=1)
+    seen = shaping.generations()
+    assert [json.loads(line) for line in file.read_text().splitlines()] == seen
+    assert [(one["number"], one["stage"], one["task"], one["generation"]) for one in seen] == [
+        (3 * k + g, k + 1, task, g) for k, task in enumerate(TASKS) for g in range(3)
+    ]
+    for stage, run in enumerate(shaping.stages):
+        for own, one in zip(run.generations(), seen[3 * stage : 3 * stage + 3], strict=True):
+            assert own.items() <= one.items()
+    file.write_bytes(file.read_bytes()[:-2])
+    assert shaping.changed_files == ["generations.jsonl"]
+
+
+def test_the_last_team_is_tested_in_the_environment_of_every_stage(tmp_path: Path) -> None:
+    shaping = begin(tmp_path / "shaped")
+    with pytest.raises(UsageError, match="has no finished generation yet"):
+        shaping.test()
+    interrupt(shaping, stage=2)
+    team = shaping.stages[1].champion
+    assert team is not None
+    tested = shaping.test(2, seed=7, threads=1)
+    assert [(one["stage"], one["task"], one["team_of"]) for one in tested] == [
+        (1, TASKS[0], 2), (2, TASKS[1], 2),
+    ]  # fmt: skip
+    assert {one["generation"] for one in tested} == {team.generation}
+    shaping.resume(threads=1)
+    *others, last = shaping.test(threads=1)
+    assert {one["team_of"] for one in (*others, last)} == {3}
+    own = shaping.stages[2].test_result
+    assert own is not None
+    assert own["champion"].items() <= last.items()
+    world = conevo.world(TASKS[0], n_robots=3, iterations=12, n_hidden=2, max_hidden=4)
+    champion = shaping.stages[2].champion
+    assert champion is not None
+    outcome = conevo.Rollout(world, n_threads=1).evaluate(
+        *champion.as_trial(), world.scenarios([fold(1, "test", k) for k in range(3)])
+    )
+    values = others[0]["performance"]["value"]["values"]
+    assert values == outcome.performance["value"][0].tolist()
 
 
 class Crash(BaseException):
@@ -180,7 +231,8 @@ def test_kills_between_and_within_the_stages_are_not_noticed(tmp_path: Path) -> 
     for begun, pattern in (
         (1, r"stage-1/generations\.jsonl$"),  # in the first generation of all
         (1, r"stage-1/DONE"),
-        (1, r"/\.stage-2\.\w+/origin\.npz"),  # between two stages
+        (1, r"killed/generations\.jsonl"),  # between two stages
+        (1, r"/\.stage-2\.\w+/origin\.npz"),
         (2, r"stage-2/provenance\.json"),
         (2, r"stage-2/teams/generation-0000"),  # before a stage's first generation ends
         (2, r"stage-2/checkpoint-b"),
@@ -444,6 +496,10 @@ def test_the_six_prey_experiments_leave_a_prey_file(tmp_path: Path) -> None:
     assert (again.path / "prey.npz").read_bytes() == shaping.prey.read_bytes()
     world = conevo.world("pursuit/team-6", prey=str(shaping.prey))
     assert world.params.prey_digest == prey_sets.load(shaping.prey).digest  # type: ignore[attr-defined]
+    with pytest.raises(
+        UsageError, match=r"stage-1: a team of \(2, .* cannot play prey-v1/shaping-1"
+    ):
+        shaping.test(threads=1)
 
 
 def test_a_kill_before_the_prey_file_is_written_is_not_noticed(tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import random
 import signal
 import subprocess
 import sys
@@ -18,7 +19,7 @@ import conevo
 from conevo.worlds.registry import resolve as resolve_world
 
 TASK = "rover/complex-1"
-TASKS = (TASK, "pursuit/team-1", "prey/shaping-6")  # one of each world
+TASKS = [f"{entry.short_name}/{entry.environments[-1]}" for entry in conevo.WORLDS.values()]
 TINY: dict[str, Any] = {
     "run.generations": 5,
     "run.epochs": 2,
@@ -40,6 +41,8 @@ def tiny_settings(method: str, task: str = TASK, **changes: Any) -> dict[str, An
     restless = {f"method.{key}": value for key, value in RESTLESS.items() if key in known}
     world = resolve_world(task)[0].params_class.__dataclass_fields__
     tiny = {k: v for k, v in TINY.items() if k[:6] != "world." or k[6:] in world}
+    small = conevo.world(task, **{k[6:]: v for k, v in tiny.items() if k[:6] == "world."})
+    tiny["method.genotypes"] = max(tiny["method.genotypes"], small.n_robots)  # HetCNE's least
     return tiny | restless | {key.replace("__", "."): value for key, value in changes.items()}
 
 
@@ -74,6 +77,29 @@ def wait_for(condition: Callable[[], bool], seconds: float = 60) -> None:
     while not condition():
         assert time.monotonic() < end, "waited too long"
         time.sleep(0.002)
+
+
+def kill_twice(path: Path, arguments: list[str]) -> list[int]:
+    """Make a run of 60 generations, killed in two of the first 45; return which."""
+    kills = sorted(random.choices(range(45), k=2))
+    for generation in kills:
+        process = spawn(*arguments, "--quiet")
+        wait_for(lambda: is_past(path, process, generation))  # noqa: B023 (called at once)
+        time.sleep(random.uniform(0, 0.02))
+        process.kill()
+        assert process.wait() == -signal.SIGKILL, process.communicate()
+        assert conevo.Run(path).status == "interrupted"
+        arguments = ["resume", str(path)]
+    return kills
+
+
+def is_past(path: Path, process: subprocess.Popen[str], generation: int) -> bool:
+    """Whether a process is at work in a run that has finished so many generations, or has ended."""
+    lock, log = path / "lock", path / "generations.jsonl"
+    is_at_work = lock.exists() and lock.read_text() == f"process {process.pid}"
+    return process.poll() is not None or (
+        is_at_work and log.read_bytes().count(b"\n") >= generation
+    )
 
 
 def content(path: Path) -> dict[str, Any]:

@@ -297,9 +297,9 @@ def compare(a_world, genes, slots, scenarios, heuristic):
     grain = 2e-5 + 2e-7 * a_world.params.arena_cm
     moved = {q: [] for q in prey}
     commanded = {q: [] for q in prey}
-    captured = np.zeros((a_world.iterations, len(prey)), bool)
-    refused = np.zeros((a_world.iterations, len(w.bodies)), bool)
-    for t in range(a_world.iterations):
+    captured = np.zeros((a_world.params.iterations, len(prey)), bool)
+    refused = np.zeros((a_world.params.iterations, len(w.bodies)), bool)
+    for t in range(a_world.params.iterations):
         tally.steps += 1
         inputs = seen["inputs"][t].astype(float)
         left, right = seen["left"][t].astype(float), seen["right"][t].astype(float)

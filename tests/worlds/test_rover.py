@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from conevo.errors import UsageError
 from conevo.rng import fold, stream
 from conevo.worlds.registry import world
 from conevo.worlds.rollout import Rollout
@@ -106,8 +107,8 @@ def test_kernel_equals_the_oracle(environment, seed):
     expected = run_oracle(a_world, genes, slots, scenarios, heuristic)
 
     differs = (seen["action"] != expected["action"]).any(axis=1)
-    until = int(differs.argmax()) if differs.any() else a_world.iterations
-    if until < a_world.iterations:  # only a near-tie may part them
+    until = int(differs.argmax()) if differs.any() else a_world.params.iterations
+    if until < a_world.params.iterations:  # only a near-tie may part them
         robots = seen["action"][until] != expected["action"][until]
         top = np.sort(expected["outputs"][until][robots], axis=1)
         assert (top[:, -1] - top[:, -2] < 1e-3).all()
@@ -120,7 +121,7 @@ def test_kernel_equals_the_oracle(environment, seed):
     assert sensors.max() < 1e-3
     assert np.allclose(seen["energy"][same], expected["energy"][same], rtol=1e-5, atol=1e-4)
     assert np.abs(seen["covered"][same] / 1e4 - expected["covered"][same]).max() < 2e-4
-    if until == a_world.iterations:
+    if until == a_world.params.iterations:
         out = Rollout(a_world).evaluate(genes, slots[None], scenarios, heuristic[None])
         assert np.array_equal(out.counts[0, 0], expected["counts"])
         assert np.array_equal(out.switches[0, 0], expected["switches"])
@@ -407,5 +408,5 @@ def test_scenarios_are_addressed_by_key():
 
 
 def test_max_hidden_below_n_hidden_is_refused():
-    with pytest.raises(ValueError, match="max_hidden"):
+    with pytest.raises(UsageError, match="max_hidden"):
         world("rover/complex-5", n_hidden=10, max_hidden=9)

@@ -50,8 +50,10 @@ def carry_on(found: Run | Shaping, threads: int | None, style: str) -> None:
         click.echo(f"conevo: note: {text}", err=True)
 
     def carry(run: Run, stage: int = 0) -> None:
-        of = 0 if isinstance(found, Run) else len(found.configs)
-        with watching(run, style, stage, of) as watch:
+        of = before = 0
+        if not isinstance(found, Run):
+            of, before = len(found.configs), len(found.generations()) - len(run.generations())
+        with watching(run, style, stage, of, before) as watch:
             run.resume(threads=threads, watch=watch, remark=remark)
 
     found.refuse_finished()

@@ -9,7 +9,7 @@ from conevo.runs.directory import kind_of
 from conevo.runs.run import RUNS, Run
 from conevo.runs.shaping import Shaping
 
-__all__ = ["directories", "find", "find_run"]
+__all__ = ["directories", "find", "find_run", "find_shaping"]
 
 
 def find(text: str) -> Run | Shaping:
@@ -42,6 +42,18 @@ def find_run(text: str) -> Run:
     if not stages:
         raise UsageError(f"{found.path} has no finished generation yet")
     return stages[-1]
+
+
+def find_shaping(text: str) -> Shaping:
+    """Return the shaping that is meant.
+
+    Raises:
+        UsageError: there is no such shaping, more than one, or it is a run.
+    """
+    found = find(text)
+    if isinstance(found, Run):
+        raise UsageError(f"{found.path} is a run, and only a shaping has stages")
+    return found
 
 
 def directories(folder: Path) -> list[Path]:

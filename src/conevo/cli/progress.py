@@ -22,7 +22,7 @@ PAUSE = 2.0  # seconds between two plain lines
 
 @contextmanager
 def watching(
-    run: Run, style: str, stage: int = 0, n_stages: int = 0
+    run: Run, style: str, stage: int = 0, n_stages: int = 0, before: int = 0
 ) -> Iterator[Callable[[Run, Record], None]]:
     """Yield the function that is called after each generation.
 
@@ -31,6 +31,7 @@ def watching(
         style: "live", "plain", "verbose", "json" or "quiet".
         stage: the number of a shaping's stage, 0 if the run is none.
         n_stages: the stages of that shaping.
+        before: generations of its stages before this one.
     """
     heading = (f"stage {stage} of {n_stages}: " if stage else "") + title(run.config)
     if style == "live":
@@ -43,8 +44,13 @@ def watching(
         click.echo(f"{heading}\n{run.path}")
         yield Lines(run, pause=PAUSE if style == "plain" else 0.0).add
     else:
-        place = {"stage": stage} if stage else {}
-        yield lambda _, record: click.echo(json.dumps(place | record)) if style == "json" else None
+
+        def add(run: Run, record: Record) -> None:
+            place = {"number": before + record["generation"], "stage": stage}
+            place["task"] = run.config.task
+            click.echo(json.dumps((place if stage else {}) | record))
+
+        yield add if style == "json" else lambda run, record: None
 
 
 class Pace:

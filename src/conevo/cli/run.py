@@ -41,6 +41,6 @@ def run(world: str | None, prey: str | None, shape: bool, **options: Any) -> Non
     if shape:
         from conevo.runs.shaping import tasks_up_to
 
-        order.shape(tasks_up_to(config.task))
+        order.shape(tasks_up_to(config.address))
     else:
         order.run(config)

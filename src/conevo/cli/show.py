@@ -18,9 +18,10 @@ __all__ = ["show"]
 @click.option("--rows", type=click.IntRange(2), default=12, show_default=True, help="Generations.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def show(run: str, rows: int, as_json: bool) -> None:
-    """Print RUN: state, generations, castes, thresholds and testing phase; of a shaping its stages.
+    """Print RUN: state, generations, castes, thresholds and testing phase.
 
-    A stage is a run of its own: DIR/stage-1.
+    Of a shaping: its stages, and its generations with the environment each has seen. A stage is a
+    run of its own: DIR/stage-1.
     """
     from conevo.cli.find import find
     from conevo.cli.stages import shaping_text
@@ -35,11 +36,13 @@ def show(run: str, rows: int, as_json: bool) -> None:
             "shaping": str(found.path),
             "status": found.status,
             "tasks": found.tasks,
+            "changed_files": found.changed_files,
+            "generations": found.generations(),
             "stages": [_everything(stage) for stage in found.stages],
         }
         click.echo(json.dumps(shaping))
     else:
-        click.echo(shaping_text(found))
+        click.echo(shaping_text(found, rows))
 
 
 def _everything(run: Run) -> dict[str, Any]:

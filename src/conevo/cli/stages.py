@@ -7,12 +7,12 @@ from typing import Any
 
 import click
 
-from conevo.cli.summary import title
-from conevo.cli.text import count, duration, number, table
+from conevo.cli.summary import generations_table, spaced, title
+from conevo.cli.text import castes, count, duration, number, table
 from conevo.runs.run import Run
 from conevo.runs.shaping import Shaping
 
-__all__ = ["print_shaping_end", "shaping_text", "span", "stage_summary"]
+__all__ = ["print_shaping_end", "shaping_text", "span", "stage_summary", "stages_test_text"]
 
 
 def span(shaping: Shaping) -> str:
@@ -38,12 +38,17 @@ def print_shaping_end(shaping: Shaping, style: str) -> None:
         click.echo(f"\n{shaping_text(shaping)}\n\nWhat next:\n{commands}")
 
 
-def shaping_text(shaping: Shaping) -> str:
-    """Return a finished or unfinished shaping as text."""
+def shaping_text(shaping: Shaping, n_rows: int = 0) -> str:
+    """Return a finished or unfinished shaping as text.
+
+    Args:
+        shaping: of any status.
+        n_rows: about so many generations, at least the first and the last of every stage; 0: none.
+    """
     stages = shaping.stages
     state, changed = shaping.status, shaping.changed_files
     state += f"; CHANGED SINCE: {', '.join(changed)}" if changed else ""
-    records = [record for run in stages for record in run.generations()]
+    records = shaping.generations()
     seconds = sum(record["seconds"] for record in records)
     parts = [
         title(shaping.configs[-1]).replace(shaping.configs[-1].task, span(shaping)),
@@ -53,6 +58,8 @@ def shaping_text(shaping: Shaping) -> str:
     ]
     if stages:
         parts += ["", _table(stages)]
+    if records and n_rows:
+        parts += ["", generations_table(_chosen(records, n_rows), "number", "stage", "task")]
     if shaping.status == "interrupted":
         parts += ["", f"Continue it with: conevo resume {shaping.path}"]
     return "\n".join(parts)
@@ -67,6 +74,35 @@ def stage_summary(run: Run) -> dict[str, Any]:
         "generations": len(run.generations()),
         "test": run.test_result,
     }
+
+
+def stages_test_text(results: list[dict[str, Any]]) -> str:
+    """Return the tests of one team in the environments of all stages as a table."""
+    measures = list(dict.fromkeys(name for tested in results for name in tested["performance"]))
+    rows = []
+    for tested in results:
+        spreads = [tested["performance"].get(name) for name in measures]
+        mean_s = sum(tested["specialization"]) / len(tested["specialization"])
+        rows.append(
+            [str(tested["stage"]), tested["task"]]
+            + ["-" if s is None else f"{number(s['mean'])} +- {number(s['sd'])}" for s in spreads]
+            + [number(mean_s), castes(tested["castes"])]
+        )
+    last = results[0]
+    return (
+        f"The fittest team of stage {last['team_of']} (generation {last['generation']}), "
+        f"{last['scenarios']} fresh scenarios of each stage (mean +- standard deviation)\n"
+        + table(["stage", "task", *measures, "S", "castes"], rows)
+    )
+
+
+def _chosen(records: list[dict[str, Any]], n: int) -> list[dict[str, Any]]:
+    """Return evenly spaced generations of every stage."""
+    stages: dict[int, list[dict[str, Any]]] = {}
+    for record in records:
+        stages.setdefault(record["stage"], []).append(record)
+    each = max(2, n // len(stages))
+    return [record for stage in stages.values() for record in spaced(stage, each)]
 
 
 def _table(stages: list[Run]) -> str:
@@ -99,11 +135,13 @@ def _table(stages: list[Run]) -> str:
 
 def _next_commands(shaping: Shaping) -> list[str]:
     """Return the exact commands for what can be done now, each after a comment."""
-    last = shaping.stages[-1].path
     commands = {
-        f"conevo show {last}": "the generations of its last stage",
+        f"conevo show {shaping.path}": "its generations, stage by stage",
         f"conevo test {shaping.path} --scenarios 100": "test the team of its last stage longer",
     }
+    if len({run.champion.genes.shape for run in shaping.stages if run.champion}) == 1:
+        every = f"conevo test {shaping.path} --stages"
+        commands[every] = "test it in the environment of every stage"
     if shaping.prey is not None:
         pursuit = f"conevo run pursuit/team-3 --prey {shaping.prey}"
         commands[pursuit] = "set predators on the evolved prey"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 from typing import Any
 
 import click
@@ -12,7 +13,15 @@ from conevo.evolution.methods.registry import METHODS
 from conevo.runs.config import RunConfig, resolve
 from conevo.runs.run import Run
 
-__all__ = ["next_commands", "print_end", "run_text", "test_text", "title"]
+__all__ = [
+    "generations_table",
+    "next_commands",
+    "print_end",
+    "run_text",
+    "spaced",
+    "test_text",
+    "title",
+]
 
 
 def title(config: RunConfig) -> str:
@@ -39,7 +48,7 @@ def run_text(run: Run, n_rows: int) -> str:
     records = run.generations()
     parts = [title(run.config), _state(run)]
     if records:
-        parts += ["", generations_text(records, n_rows)]
+        parts += ["", generations_table(spaced(records, n_rows))]
     if run.test_result:
         parts += ["", test_text(run.test_result)]
     if run.status == "interrupted":
@@ -47,17 +56,21 @@ def run_text(run: Run, n_rows: int) -> str:
     return "\n".join(parts)
 
 
-def generations_text(records: list[dict[str, Any]], n_rows: int) -> str:
-    """Return evenly spaced generations, first and last among them, as a table."""
+def spaced(records: list[dict[str, Any]], n: int) -> list[dict[str, Any]]:
+    """Return ``n`` evenly spaced records at most, first and last among them."""
     last = len(records) - 1
-    picks = sorted({round(last * k / (n_rows - 1)) for k in range(n_rows)})
-    measures = list(records[0]["performance"])
-    head = ["generation", *measures, "best fitness", "mean fitness", "S", "SST", "GST"]
+    return [records[k] for k in sorted({round(last * k / (n - 1)) for k in range(n)})]
+
+
+def generations_table(records: list[dict[str, Any]], *lead: str) -> str:
+    """Return generations as a table; ``lead`` are entries that stand before a run's own."""
+    measures = list(dict.fromkeys(name for one in records for name in one["performance"]))
+    head = [*lead, "generation", *measures, "best fitness", "mean fitness", "S", "SST", "GST"]
     head += ["recombined", "neurons", "evaluations", "castes of the fittest team"]
     rows = [
         [
-            str(record["generation"]),
-            *(number(record["performance"][name]) for name in measures),
+            *(str(record[name]) for name in (*lead, "generation")),
+            *(number(record["performance"].get(name)) for name in measures),
             number(record["best_fitness"]),
             number(record["mean_fitness"]),
             number(record["specialization"]),
@@ -68,7 +81,7 @@ def generations_text(records: list[dict[str, Any]], n_rows: int) -> str:
             count(record["team_evaluations"]),
             castes(record["castes"]),
         ]
-        for record in (records[pick] for pick in picks)
+        for record in records
     ]
     return table(head, rows)
 
@@ -104,7 +117,7 @@ def next_commands(run: Run) -> list[str]:
     """Return the exact commands for what can be done with a finished run, each after a comment."""
     config = run.config
     other = "mesp" if config.method.startswith("cone") else "cone"
-    plain = resolve(config.task, config.method, config.preset).tables()
+    plain = resolve(config.address, config.method, config.preset).tables()
     changes = [
         f" --set {section}.{key}={value}"
         for section in ("run", "world")
@@ -112,7 +125,8 @@ def next_commands(run: Run) -> list[str]:
         if key != "seed" and value != plain[section].get(key)
     ]
     seed = config.run.seed
-    repeat = f"conevo run {config.task} --method {other} --preset {config.preset} --seed {seed}"
+    world = shlex.quote(config.address)
+    repeat = f"conevo run {world} --method {other} --preset {config.preset} --seed {seed}"
     again = f"conevo run --config {run.path}/config.toml --seed {seed + 1}"
     commands = {
         f"conevo show {run.path}": "its generations",

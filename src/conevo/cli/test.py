@@ -20,17 +20,28 @@ __all__ = ["test"]
 @click.option(
     "--threads", type=click.IntRange(1), help="CPU threads (default all); changes no result."
 )
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@click.option("--stages", is_flag=True, help="Of a shaping: in the environment of every stage.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON value.")
 def test(
-    run: str, scenarios: int | None, seed: int | None, threads: int | None, as_json: bool
+    run: str,
+    scenarios: int | None,
+    seed: int | None,
+    threads: int | None,
+    stages: bool,
+    as_json: bool,
 ) -> None:
     """Re-execute the fittest team of RUN (finished or not) in fresh scenarios; writes nothing.
 
-    Of a shaping it is the team of the last stage that has one.
+    Of a shaping it is the team of the last stage that has one, in that stage's environment.
     """
-    from conevo.cli.find import find_run
+    from conevo.cli.find import find_run, find_shaping
+    from conevo.cli.stages import stages_test_text
     from conevo.cli.summary import test_text
 
+    if stages:
+        results = find_shaping(run).test(scenarios, seed, threads=threads)
+        click.echo(json.dumps(results) if as_json else stages_test_text(results))
+        return
     found = find_run(run)
     result = found.test(scenarios, seed, threads=threads)
     click.echo(json.dumps(result) if as_json else test_text({"champion": result}))

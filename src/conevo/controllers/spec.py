@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from conevo.errors import UsageError
+
 __all__ = ["ControllerSpec"]
 
 
@@ -19,6 +21,9 @@ class ControllerSpec:
     slots; slot k < n_hidden feeds context input k; an empty slot feeds 0; slots from n_hidden on
     feed no context. So all genotypes of a world have the same length and recombination between
     populations is always defined (the thesis fixes the inputs while the hidden layer changes).
+
+    Raises:
+        UsageError: fewer slots than neurons at the start.
     """
 
     n_sensors: int
@@ -28,6 +33,12 @@ class ControllerSpec:
     recurrent: bool = True
     bias: bool = False
     weight_scale: float = 10.0  # Nitschke 2009, tables 4.3, 5.5, 6.5: weights in [-10, 10]
+
+    def __post_init__(self) -> None:
+        if self.max_hidden < self.n_hidden:
+            raise UsageError(
+                f"world.max_hidden ({self.max_hidden}) must not be below n_hidden ({self.n_hidden})"
+            )
 
     @property
     def n_context(self) -> int:

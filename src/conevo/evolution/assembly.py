@@ -7,11 +7,16 @@ Methods with one population (P = 1) fill every robot from it.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
 import numpy as np
+from annotated_types import Ge
 
 from conevo.evolution.protocol import BoolArray, IntArray
 
 __all__ = [
+    "SchemeConfig",
     "best_team",
     "distinct",
     "elite_teams",
@@ -21,6 +26,23 @@ __all__ = [
     "shared",
     "systematic",
 ]
+
+
+@dataclass(frozen=True, kw_only=True)
+class SchemeConfig:
+    """How the genotypes of several populations are tried in teams, alike for all such methods.
+
+    Attributes:
+        evaluation: "systematic" tries every genotype once (section 3.3.1), in R x M teams if it is
+            a whole network, in R x U x M if it is a neuron; "shared" draws complete teams in which
+            every genotype takes part ``rounds`` times, rounds x M teams, the scheme ESP itself was
+            published with.
+        rounds: K, trials of each genotype under "shared". More makes fitness less noisy.
+            Choice: 10, as ESP.
+    """
+
+    evaluation: Literal["systematic", "shared"] = "systematic"
+    rounds: Annotated[int, Ge(1)] = 10
 
 
 def rows(active: BoolArray, choice: IntArray, n_genotypes: int, offset: int = 0) -> IntArray:

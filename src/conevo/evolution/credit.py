@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from conevo.evolution.protocol import BoolArray, FloatArray, IntArray
+from conevo.evolution.protocol import FloatArray, IntArray
 
-__all__ = ["mean_of_trials", "of_clones", "of_robot", "overwrite", "utility"]
+__all__ = ["mean_of_trials", "of_clones", "of_robot", "overwrite"]
 
 
 def of_robot(fitness: FloatArray, robot: IntArray | int) -> FloatArray:
@@ -48,21 +48,6 @@ def mean_of_trials(teams: IntArray, fitness: FloatArray, n_rows: int) -> FloatAr
     mean = np.full(n_rows, np.nan)
     np.divide(total, count, out=mean, where=count > 0)
     return mean
-
-
-def utility(fitness: FloatArray, active: BoolArray, chosen: IntArray) -> FloatArray:
-    """Return type B fitness [P]: the sum of type A over a controller's neurons.
-
-    Nitschke 2009, eq. 3.8.
-
-    Args:
-        fitness: [P, U, M] type A.
-        active: [P, U] slots in use.
-        chosen: [P, U] the genotype in each slot.
-    """
-    neuron = np.take_along_axis(fitness, chosen[:, :, None], axis=2)[:, :, 0]
-    total: FloatArray = np.where(active, neuron, 0.0).sum(axis=1)
-    return total
 
 
 def overwrite(fitness: FloatArray, elite: IntArray, credit: FloatArray) -> FloatArray:

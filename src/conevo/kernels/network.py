@@ -12,6 +12,8 @@ __all__ = [
     "WIDE",
     "Networks",
     "Shape",
+    "first_input",
+    "highest",
     "load",
     "out_vector",
     "sigmoid",
@@ -100,6 +102,23 @@ def load(
     for j in range(shape.n_inputs):
         nets.inputs[i * shape.n_inputs + j] = 0.0
     nets.sums[i] = out_vector()
+
+
+@wp.func
+def first_input(nets: Networks, i: int) -> int:
+    """Return where robot ``i``'s inputs begin: its sensors, then its context."""
+    return i * (nets.inputs.shape[0] // nets.n_used.shape[0])
+
+
+@wp.func
+def highest(nets: Networks, i: int, n: int) -> int:
+    """Return the number of robot ``i``'s highest output of the first ``n``, the first of equals."""
+    sums = nets.sums[i]
+    best = int(0)
+    for k in range(1, n):
+        if sums[k] > sums[best]:
+            best = k
+    return best
 
 
 @wp.func

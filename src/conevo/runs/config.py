@@ -18,12 +18,17 @@ A configuration file has three tables. ``[run]`` also holds the three names::
     [method]
     genotypes = 20
 
-Presets (``presets/*.toml``) hold the same three tables once per world, with ``method`` split by
-method; a variant ("cone-1") takes its family's values ("cone") first, then its own::
+The world may be one in a file of its own, ``world = "FILE.py:ENVIRONMENT"``; a run keeps the file's
+whole path, and its digest beside it as ``world_digest``, which is checked when it is given.
 
-    [rover.run]
+Presets (``presets/*.toml``) hold the same three tables, with ``method`` split by method, for any
+world; a world's own table replaces that one. A variant ("cone-1") takes its family's values
+("cone") first, then its own::
+
+    [any.run]
+    [any.method.cone]
     [rover.world]
-    [rover.method.cone]
+    [pursuit.run]
 """
 
 from __future__ import annotations
@@ -38,7 +43,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
-from typing import Annotated, Any, Literal, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, Literal, get_type_hints
 
 import tomli_w
 from annotated_types import Ge, Le
@@ -46,15 +51,21 @@ from pydantic import TypeAdapter, ValidationError
 
 from conevo.errors import EnvironmentFailure, UsageError, unknown_name
 
+if TYPE_CHECKING:
+    from conevo.worlds.protocol import World
+    from conevo.worlds.registry import WorldEntry
+
 __all__ = ["PRESETS", "RunConfig", "RunSettings", "parse_assignment", "resolve"]
 
 PRESETS = ("smoke", "desk", "night", "thesis")
 SECTIONS = ("run", "world", "method")
 NAMES = {
     "world": "",
+    "world_digest": "",
     "method": "cone",
     "preset": "desk",
 }  # the keys of [run] that choose components
+ANY = "any"  # the table of a preset for worlds without one of their own
 
 
 @dataclass(frozen=True)
@@ -93,11 +104,10 @@ class RunSettings:
 class RunConfig:
     """A fully resolved run.
 
-    ``world`` carries its version ("rover-v1"); ``world_params`` and ``method_config`` are the
-    world's and the method's own frozen dataclasses.
+    ``world_params`` and ``method_config`` are the world's and the method's own frozen dataclasses.
     """
 
-    world: str
+    entry: WorldEntry
     environment: str
     method: str
     preset: str
@@ -106,20 +116,35 @@ class RunConfig:
     method_config: Any
 
     @property
+    def world(self) -> str:
+        """The world's name with its version, "rover-v1"."""
+        return self.entry.name
+
+    @property
     def task(self) -> str:
         """World and environment in one name, "rover-v1/complex-1"."""
         return f"{self.world}/{self.environment}"
+
+    @property
+    def address(self) -> str:
+        """What ``resolve`` finds the same world by: the task, or "FILE.py:ENVIRONMENT"."""
+        return self.entry.address(self.environment)
+
+    def build_world(self) -> World:
+        """Return the world of this run."""
+        return self.entry.build(self.environment, self.world_params)
 
     @functools.cached_property
     def run_id(self) -> str:
         """Twelve hex digits that change with any value but the preset's name.
 
         A file counts by its content: where a value has a digest beside it ("prey_digest"), the
-        path does not count.
+        path does not count. Neither does that of a world's file.
         """
         tables = self.tables()
         del tables["run"]["preset"]
-        for table in tables.values():
+        tables["run"]["world"] = self.task
+        for table in (tables["world"], tables["method"]):
             for key in [key for key in table if key.endswith("_digest") and table[key]]:
                 table.pop(key.removesuffix("_digest"), None)
         text = json.dumps(tables, sort_keys=True)
@@ -133,9 +158,12 @@ class RunConfig:
 
     def tables(self) -> dict[str, dict[str, Any]]:
         """Return the three tables of the configuration file, every value spelt out."""
-        names = {"world": self.task, "method": self.method, "preset": self.preset}
+        world = {"world": self.address}
+        if self.entry.digest:
+            world["world_digest"] = self.entry.digest
+        names = {"method": self.method, "preset": self.preset}
         return {
-            "run": names | _set_fields(self.run),
+            "run": world | names | _set_fields(self.run),
             "world": _set_fields(self.world_params),
             "method": _set_fields(self.method_config),
         }
@@ -168,7 +196,8 @@ def resolve(
     """Return the one configuration that all layers together describe.
 
     Args:
-        world: "rover/complex-1"; may be left out if the file names it.
+        world: "rover/complex-1", or "FILE.py:ENVIRONMENT" for a world in a file of its own; may be
+            left out if the configuration file names it.
         method: wins over the file's, as the next two do.
         preset: whose overrides to begin with.
         seed: root of all randomness.
@@ -190,7 +219,7 @@ def resolve(
     names = _take_names([*layers, single], {"world": world, "method": method, "preset": preset})
     if not names["world"]:
         raise UsageError("which world? Name one as WORLD/ENVIRONMENT, for example rover/complex-1")
-    entry, environment = resolve_world(names["world"])
+    entry, environment = resolve_world(names["world"], names["world_digest"])
     if names["method"] not in METHODS:
         raise unknown_name("method", names["method"], METHODS)
     parts: dict[str, type] = {
@@ -204,8 +233,12 @@ def resolve(
         single.setdefault("run", {})["seed"] = _Value(seed, "as the seed")
     base = _read_preset(names["preset"], entry.name, names["method"])
     built = {name: _build(name, part, [base, *layers, single]) for name, part in parts.items()}
+    try:
+        entry.build(environment, built["world"])
+    except ValueError as error:
+        raise UsageError(f"[world]: {error}") from error
     return RunConfig(
-        world=entry.name,
+        entry=entry,
         environment=environment,
         method=names["method"],
         preset=names["preset"],
@@ -267,14 +300,21 @@ def _split_keys(given: Mapping[str, Any], place: str) -> tuple[Layer, dict[str, 
 
 
 def _take_names(layers: list[Layer], asked: Mapping[str, str | None]) -> dict[str, str]:
-    """Remove the three names from the layers' [run] tables and return those that hold."""
+    """Remove the names from the layers' [run] tables and return those that hold."""
     names = dict(NAMES)
     for layer in layers:
-        for name in NAMES:
-            found = layer.get("run", {}).pop(name, None)
+        given = {name: layer.get("run", {}).pop(name, None) for name in NAMES}
+        if given["world_digest"] is not None and given["world"] is None:
+            place = given["world_digest"].place
+            raise UsageError(f"run.world_digest {place}: there is no run.world beside it")
+        if given["world"] is not None:
+            names["world_digest"] = ""  # of another world
+        for name, found in given.items():
             if found is not None and not isinstance(found.value, str):
                 raise UsageError(f"run.{name} = {found.value!r} {found.place}: must be a name")
             names[name] = found.value if found is not None else names[name]
+    if asked["world"] is not None:
+        names["world_digest"] = ""
     return names | {name: value for name, value in asked.items() if value is not None}
 
 
@@ -296,14 +336,12 @@ def _read_preset(preset: str, world: str, method: str) -> Layer:
         raise unknown_name("preset", preset, PRESETS)
     source = resources.files(__package__) / "presets" / f"{preset}.toml"
     worlds = tomllib.loads(source.read_text(encoding="utf-8"))
-    name = world.rsplit("-v", 1)[0]
-    if name not in worlds:
-        raise UsageError(f"preset {preset!r} has no settings for world {name!r}")
-    tables = dict(worlds[name])
-    by_method = tables.pop("method", {})
+    generic, own = dict(worlds[ANY]), dict(worlds.get(world.rsplit("-v", 1)[0], {}))
+    by_method = generic.pop("method") | own.pop("method", {})
     family = method.split("-")[0]
     if not {family, method} & set(by_method):
-        raise UsageError(f"preset {preset!r} has no settings for method {method!r} in {name!r}")
+        raise UsageError(f"preset {preset!r} has no settings for method {method!r} in {world!r}")
+    tables = generic | own
     tables["method"] = by_method.get(family, {}) | by_method.get(method, {})
     return _as_layer(tables, f"in preset {preset!r}")
 

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from conevo.evolution.protocol import Scores, Trials
 from conevo.rng import fold
-from conevo.specialization.individual import castes, degree, label
+from conevo.specialization import individual
 from conevo.worlds.protocol import Outcome, World
 from conevo.worlds.rollout import Rollout
 
@@ -24,7 +24,7 @@ class Portrait:
     Attributes:
         performance: task performance measures.
         specialization: degree of specialization S of each robot.
-        labels: caste of each robot, its most executed action or "non-specialized".
+        labels: caste of each robot, what it did most or "non-specialized".
         castes: number of robots per caste, largest first.
     """
 
@@ -72,23 +72,24 @@ def score(outcome: Outcome, credit: str = "robot") -> Scores:
     """Average an outcome over epochs and give each robot its credit.
 
     Args:
-        outcome: fitness [N, E, R], switches [N, E, R], counts [N, E, R, A].
+        outcome: fitness [N, E, R], switches [N, E, R], counts [N, E, R, C].
         credit: "robot": its own fitness (Nitschke 2009, eq. 5.4, 6.8); "team": the sum over the
             team, the same for all its robots (eq. 5.5).
     """
     fitness = outcome.fitness.astype(np.float64).mean(axis=1)
     if credit == "team":
         fitness = np.repeat(fitness.sum(axis=1, keepdims=True), fitness.shape[1], axis=1)
-    specialization = degree(outcome.switches, outcome.counts).mean(axis=1)
+    specialization = individual.degree(outcome.switches, outcome.counts).mean(axis=1)
     return Scores(fitness=fitness, specialization=specialization)
 
 
-def describe(outcome: Outcome, actions: tuple[str, ...], team: int = 0) -> Portrait:
-    """Return what one team of an outcome did."""
+def describe(outcome: Outcome, castes: tuple[str, ...], team: int = 0) -> Portrait:
+    """Return what one team of an outcome did; ``castes`` are the world's."""
     counts: npt.NDArray[np.int64] = outcome.counts[team].astype(np.int64).sum(axis=0)
-    specialization = degree(outcome.switches[team], outcome.counts[team]).mean(axis=0)
+    specialization = individual.degree(outcome.switches[team], outcome.counts[team]).mean(axis=0)
     labels = [
-        label(float(s), robot, actions) for s, robot in zip(specialization, counts, strict=True)
+        individual.label(float(s), robot, castes)
+        for s, robot in zip(specialization, counts, strict=True)
     ]
     return Portrait(
         performance={
@@ -97,5 +98,5 @@ def describe(outcome: Outcome, actions: tuple[str, ...], team: int = 0) -> Portr
         },
         specialization=[float(value) for value in specialization],
         labels=labels,
-        castes=castes(labels),
+        castes=individual.castes(labels),
     )

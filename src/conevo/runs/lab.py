@@ -11,7 +11,6 @@ from conevo.runs.config import RunConfig
 from conevo.runs.evaluation import Evaluate, make_evaluator
 from conevo.runs.loop import check_budget
 from conevo.worlds.protocol import World
-from conevo.worlds.registry import WORLDS
 from conevo.worlds.rollout import Rollout
 
 __all__ = ["Lab"]
@@ -34,7 +33,7 @@ class Lab:
         Raises:
             EnvironmentFailure: there is no such device.
         """
-        world = WORLDS[config.world].build(config.environment, config.world_params)
+        world = config.build_world()
         rollout = Rollout(world, n_threads=threads, device=device)
         return Lab(
             config=config,

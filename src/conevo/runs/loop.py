@@ -25,7 +25,7 @@ def evolve_generations(
     evaluate: Evaluate,
     *,
     settings: RunSettings,
-    actions: tuple[str, ...],
+    castes: tuple[str, ...],
     iterations: int,
     last: Record | None = None,
     on_generation: Callable[[State, Record], None],
@@ -37,7 +37,7 @@ def evolve_generations(
         state: the method's state at the beginning of a generation.
         evaluate: plays trials.
         settings: the stop conditions.
-        actions: names of the world's actions.
+        castes: names of the world's castes.
         iterations: of one epoch of the world.
         last: record of the generation before, if there was one.
         on_generation: called with the state after a generation and the generation's record.
@@ -51,7 +51,7 @@ def evolve_generations(
         if state.generation >= settings.generations:
             return "generations"
         started = time.perf_counter()
-        finished = _run_generation(method, state, evaluate, actions, settings.budget_evaluations)
+        finished = _run_generation(method, state, evaluate, castes, settings.budget_evaluations)
         if finished is None:
             return "budget"
         began, (state, portrait) = state, finished
@@ -80,7 +80,7 @@ def check_budget(method: Method, state: State, budget: int) -> None:
 
 
 def _run_generation(
-    method: Method, state: State, evaluate: Evaluate, actions: tuple[str, ...], budget: int
+    method: Method, state: State, evaluate: Evaluate, castes: tuple[str, ...], budget: int
 ) -> tuple[State, Portrait] | None:
     """Return the state after one generation and its fittest team's portrait, None if unpayable.
 
@@ -95,7 +95,7 @@ def _run_generation(
             return None
         evaluation = evaluate(trials)
         if trials.phase == "fittest":
-            portrait = describe(evaluation.outcome, actions)
+            portrait = describe(evaluation.outcome, castes)
         state = method.tell(state, trials, evaluation.scores)
     if portrait is None:
         raise RuntimeError(f"{method.name} finished a generation without its fittest team")

@@ -215,7 +215,12 @@ class Run:
         return self
 
     def test(
-        self, scenarios: int | None = None, seed: int | None = None, *, threads: int | None = None
+        self,
+        scenarios: int | None = None,
+        seed: int | None = None,
+        *,
+        threads: int | None = None,
+        team: Team | None = None,
     ) -> Record:
         """Re-execute the fittest team so far in fresh scenarios; writes nothing.
 
@@ -223,14 +228,22 @@ class Run:
             scenarios: how many, by default as many as the run's own testing phase.
             seed: draws other scenarios than the run's own testing phase.
             threads: CPU threads, all by default.
+            team: another run's team, for which the world has robots and networks of the same size.
 
         Raises:
             UsageError: no generation has finished yet, or made with other kernels.
         """
-        champion = self.champion
+        champion = team or self.champion
         if champion is None:
             raise UsageError(f"{self.path} has no finished generation yet, so no team to test")
-        return self._test(self._equip(threads), champion, scenarios, seed)
+        lab = self._equip(threads)
+        fits = (lab.world.n_robots, lab.world.controller.max_hidden, lab.world.controller.n_genes)
+        if champion.genes.shape != fits:
+            raise UsageError(
+                f"{self.path}: a team of {champion.genes.shape} robots, neurons and genes cannot "
+                f"play {self.config.task}, which has {fits}"
+            )
+        return self._test(lab, champion, scenarios, seed)
 
     def _test(
         self, lab: Lab, team: Team, scenarios: int | None = None, seed: int | None = None
@@ -308,8 +321,8 @@ class Run:
                 state,
                 lab.evaluate,
                 settings=settings,
-                actions=lab.world.actions,
-                iterations=lab.world.iterations,
+                castes=lab.world.castes,
+                iterations=lab.world.params.iterations,
                 last=records[-1] if records else None,
                 on_generation=keep,
             )

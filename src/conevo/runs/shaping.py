@@ -4,6 +4,8 @@ Nitschke 2009, sections 4.3 (prey) and 6.4.2 (construction)::
 
     shaping.toml    the resolved configuration of every stage; never changes
     stage-1/ ...    the runs, each as any other; a stage appears when the one before is sealed
+    generations.jsonl   every generation of all stages with the environment that it saw; written
+                    when a stage is sealed
     prey.npz        the evolved prey, if the stages are the six experiments that shape prey
     DONE            the seal of a finished shaping: digests of all files
     lock            held (flock) by the process that is at work here
@@ -12,6 +14,7 @@ Nitschke 2009, sections 4.3 (prey) and 6.4.2 (construction)::
 from __future__ import annotations
 
 import hashlib
+import json
 import shutil
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
@@ -27,12 +30,13 @@ from conevo.runs.directory import CONFIG, SHAPING, Directory, appearing, refuse_
 from conevo.runs.durable import replace_file
 from conevo.runs.evolved_prey import PREY, PREY_TASKS, save_prey
 from conevo.runs.lab import Lab
-from conevo.runs.run import RUNS, Run, Watch, start
+from conevo.runs.run import RUNS, Record, Run, Watch, start
 from conevo.worlds.registry import resolve as resolve_world
 
 __all__ = ["Shaping", "start_shaping", "tasks_up_to"]
 
 FORMAT = 1
+GENERATIONS = "generations.jsonl"
 
 
 def tasks_up_to(task: str) -> list[str]:
@@ -45,7 +49,7 @@ def tasks_up_to(task: str) -> list[str]:
     family, _, number = environment.rpartition("-")
     if not (family and number.isdecimal() and int(number) > 1):
         raise UsageError(f"there is nothing to shape: no environment comes before {task}")
-    return [f"{entry.name}/{family}-{k}" for k in range(1, int(number) + 1)]
+    return [entry.address(f"{family}-{k}") for k in range(1, int(number) + 1)]
 
 
 def start_shaping(
@@ -151,6 +155,55 @@ class Shaping:
             begun.append(run)
         return begun
 
+    def generations(self) -> list[Record]:
+        """Return the record of every finished generation of all stages, each with what it saw.
+
+        Before a run's record stand the generation's ``number`` through all stages, its ``stage``
+        (from 1) and its ``task``: world and environment.
+        """
+        found: list[Record] = []
+        for stage, run in enumerate(self.stages, start=1):
+            found += [
+                {"number": number, **self.place(stage), **record}
+                for number, record in enumerate(run.generations(), start=len(found))
+            ]
+        return found
+
+    def place(self, stage: int) -> Record:
+        """Return a stage's number and its task."""
+        return {"stage": stage, "task": self.tasks[stage - 1]}
+
+    def test(
+        self, scenarios: int | None = None, seed: int | None = None, *, threads: int | None = None
+    ) -> list[Record]:
+        """Re-execute the last stage's fittest team in the environment of every stage begun.
+
+        Args:
+            scenarios: how many of each, by default as many as the stage's own testing phase.
+            seed: draws other scenarios than that.
+            threads: CPU threads, all by default.
+
+        Returns:
+            A result for each stage, as ``Run.test`` has it, with the ``stage``, its ``task`` and
+            the stage that the team is of (``team_of``) before it.
+
+        Raises:
+            UsageError: no generation has finished yet, the stages have teams of different sizes,
+                or a stage was made with other kernels.
+        """
+        stages = self.stages
+        of, champion = len(stages), None
+        while of and (champion := stages[of - 1].champion) is None:
+            of -= 1
+        if champion is None:
+            raise UsageError(f"{self.path} has no finished generation yet, so no team to test")
+        return [
+            self.place(stage)
+            | {"team_of": of}
+            | run.test(scenarios, seed, threads=threads, team=champion)
+            for stage, run in enumerate(stages, start=1)
+        ]
+
     @property
     def prey(self) -> Path | None:
         """The file with the evolved prey of a finished shaping, None if it makes none."""
@@ -205,10 +258,18 @@ class Shaping:
                 run = self._stage(number, threads)
                 if run.status != "finished":
                     carry(run, number)
+                self._write_generations()
             if tuple(self.tasks) == PREY_TASKS:
                 save_prey(self.stages, self.path / PREY)
             self._directory.seal()
         return self
+
+    def _write_generations(self) -> None:
+        """Write the records of all generations so far, one per line."""
+        lines = "".join(f"{json.dumps(one, allow_nan=False)}\n" for one in self.generations())
+        path = self.path / GENERATIONS
+        if not path.is_file() or path.read_bytes() != lines.encode():
+            replace_file(path, lines.encode())
 
     def _stage(self, number: int, threads: int | None) -> Run:
         """Return a stage, begun by now; the ones before are finished."""

@@ -36,9 +36,9 @@ def degree(switches: npt.ArrayLike, counts: npt.ArrayLike) -> npt.NDArray[np.flo
 
 
 def label(
-    specialization: float, counts: npt.ArrayLike, actions: Sequence[str], threshold: float = 0.5
+    specialization: float, counts: npt.ArrayLike, names: Sequence[str], threshold: float = 0.5
 ) -> str:
-    """Return the action a robot is specialized to, or "non-specialized".
+    """Return what a robot is specialized to, or "non-specialized".
 
     Nitschke 2009, 3.2.3: specialized if S < 0.5, then to the most executed action (the first of
     equals). Choice: a robot that executed no action is not specialized.
@@ -46,13 +46,13 @@ def label(
     Args:
         specialization: S.
         counts: [A] how often each action was executed.
-        actions: A names.
+        names: A names, of the actions or of the castes that do them.
         threshold: S from which on a robot is not specialized.
     """
     executed = np.asarray(counts)
     if executed.sum() == 0 or not specialization < threshold:
         return NON_SPECIALIZED
-    return actions[int(executed.argmax())]
+    return names[int(executed.argmax())]
 
 
 def castes(labels: Iterable[str]) -> dict[str, int]:

@@ -16,9 +16,8 @@ from annotated_types import Ge, Gt, Le
 from conevo.errors import UsageError
 from conevo.kernels.khepera import RADIUS
 from conevo.rng import stream
-from conevo.worlds.protocol import Simulation
+from conevo.worlds.protocol import Scenarios, Simulation
 from conevo.worlds.pursuit_bodies import N_OBSTACLES, Params, Scene, Team
-from conevo.worlds.pursuit_dynamics import N_ACTIONS
 
 __all__ = ["ArenaParams", "ArenaScenarios", "draw_scenarios", "simulate"]
 
@@ -52,14 +51,14 @@ class ArenaParams:
     prey_speed: Annotated[float, Gt(0), Le(1.2)] = 1.2
 
 
-@dataclass(frozen=True)
-class ArenaScenarios:
+@dataclass(frozen=True, kw_only=True)
+class ArenaScenarios(Scenarios):
     """E scenarios: places in cm, headings in [-pi, pi). The team's R robots come first.
 
     x, y, heading [E, B] float32; n_bodies [E] int32, the bodies beyond are absent; obstacle_x,
     obstacle_y [E, 6] float32; n_obstacles [E] int32; prey_in [Q * H, 8], prey_out [Q * H, 2]
     float32, weights of the prey's networks; clamp [R, S] float32, sensor inputs held at a value,
-    NaN where free; seed [E] uint64.
+    NaN where free.
     """
 
     x: npt.NDArray[np.float32]
@@ -72,11 +71,6 @@ class ArenaScenarios:
     prey_in: npt.NDArray[np.float32]
     prey_out: npt.NDArray[np.float32]
     clamp: npt.NDArray[np.float32]
-    seed: npt.NDArray[np.uint64]
-
-    def __len__(self) -> int:
-        """Return the number of scenarios."""
-        return len(self.seed)
 
 
 def draw_scenarios(
@@ -168,7 +162,6 @@ def simulate(
     robots: int,
     bodies: int,
     team_is_prey: bool,
-    performance: int,
     prey_mode: int = 0,
     prey_hidden: int = 0,
     window: int = 1,
@@ -196,11 +189,9 @@ def simulate(
     ).split()
     sizes = (
         dict.fromkeys(per_body, bodies)
-        | dict.fromkeys(("heuristic", "action", "fitness", "switches"), robots)
         | dict.fromkeys(("captured", "captures"), prey)
         | dict.fromkeys(("moved", "commanded"), prey * window)
-        | {"infrared": bodies * 8, "counts": robots * int(N_ACTIONS), "first": 1}
-        | {"performance": performance}
+        | {"infrared": bodies * 8, "first": 1}
     )
     return Simulation(
         state=Team,

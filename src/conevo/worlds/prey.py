@@ -60,12 +60,8 @@ class PreyParams(ArenaParams):
     max_hidden: Annotated[int, Ge(2), Le(32)] = 10
 
     def __post_init__(self) -> None:
-        for low, high in (("n_hidden", "max_hidden"), ("least", "most")):
-            if getattr(self, high) < getattr(self, low):
-                raise UsageError(
-                    f"world.{high} ({getattr(self, high)}) must not be below {low} "
-                    f"({getattr(self, low)})"
-                )
+        if self.most < self.least:
+            raise UsageError(f"world.most ({self.most}) must not be below least ({self.least})")
 
 
 @dataclass(frozen=True)
@@ -77,6 +73,7 @@ class PreyWorld:
 
     name: ClassVar[str] = "prey-v1"
     actions: ClassVar[tuple[str, ...]] = ACTIONS
+    castes: ClassVar[tuple[str, ...]] = actions
     performance: ClassVar[tuple[str, ...]] = ("path", "collided")
     heuristics: ClassVar[tuple[str, ...]] = ("heuristic", "random")
 
@@ -89,11 +86,6 @@ class PreyWorld:
     def n_robots(self) -> int:
         """Number of prey."""
         return 1 + (self.experiment - 1) // 3
-
-    @property
-    def iterations(self) -> int:
-        """Iterations of one epoch."""
-        return self.params.iterations
 
     @property
     def controller(self) -> ControllerSpec:
@@ -131,5 +123,4 @@ class PreyWorld:
             robots=self.n_robots,
             bodies=self.n_robots + self._predators[1],
             team_is_prey=True,
-            performance=len(self.performance),
         )

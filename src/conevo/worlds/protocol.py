@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, ClassVar, Protocol
 
 import numpy as np
@@ -11,16 +11,16 @@ import numpy.typing as npt
 
 from conevo.controllers import ControllerSpec
 
-__all__ = ["Outcome", "Simulation", "World"]
+__all__ = ["Outcome", "Scenarios", "Simulation", "World"]
 
 
 @dataclass(frozen=True)
 class Outcome:
     """What happened to a batch of teams.
 
-    fitness [N, E, R]: each robot's private fitness. counts [N, E, R, A]: how often each robot
-    executed each action. switches [N, E, R]: how often it executed another action than just before.
-    performance: task performance measures, each [N, E].
+    fitness [N, E, R]: each robot's private fitness. counts [N, E, R, C]: how many actions each
+    robot executed for each of the world's castes. switches [N, E, R]: how often it executed another
+    action than just before. performance: task performance measures, each [N, E].
     """
 
     fitness: npt.NDArray[np.float32]
@@ -29,12 +29,28 @@ class Outcome:
     performance: dict[str, npt.NDArray[np.float32]]
 
 
+@dataclass(frozen=True, kw_only=True)
+class Scenarios:
+    """E scenarios of a world, each drawn from a key.
+
+    A world adds an array for each further field of its scene: [E, ...], or of any shape if all
+    scenarios share it. seed [E] uint64: of what is random while a scenario is played.
+    """
+
+    seed: npt.NDArray[np.uint64]
+
+    def __len__(self) -> int:
+        """Return the number of scenarios."""
+        return len(self.seed)
+
+
 @dataclass(frozen=True)
 class Simulation:
     """The Warp side of a world: what ``worlds.rollout`` needs to run it.
 
     state: struct type of a team's state, with a field ``nets`` of networks; its other arrays are
-        flat over a batch of teams. sizes: elements that one team needs of each of them.
+        flat over a batch of teams. sizes: elements that one team needs of those that do not have
+        one for each robot; the world's names tell those of ``counts`` and ``performance``.
     scene: struct type of a scenario; its arrays are those of the scenarios object, by name: flat
         over the scenarios, or of two and more dimensions if all scenarios share them.
     params_type, params: struct type of the parameters, and the parameters.
@@ -44,23 +60,32 @@ class Simulation:
     """
 
     state: Any
-    sizes: dict[str, int]
     scene: Any
     params_type: Any
     params: Any
     functions: dict[str, Any]
     recorded: tuple[str, ...]
+    sizes: dict[str, int] = field(default_factory=dict)
     recorded_at_end: tuple[str, ...] = ()
 
 
 class World(Protocol):
     """One environment of a task, with its parameters.
 
-    The dataclass of its parameters has a field ``iterations``; ``heuristics`` names at least one.
+    Attributes:
+        name: with its version, "rover-v1".
+        actions: A names; the state array ``action`` holds indices into them.
+        castes: C names, one per column of ``Outcome.counts``: the caste of a robot that spends most
+            of its life on it. Most worlds count actions, so castes are actions; a world that tells
+            apart what for an action was executed has more. Every executed action counts in exactly
+            one column.
+        performance: names of the task performance measures, the main one first.
+        heuristics: names of the heuristic controllers, at least one.
     """
 
     name: ClassVar[str]
     actions: ClassVar[tuple[str, ...]]
+    castes: ClassVar[tuple[str, ...]]
     performance: ClassVar[tuple[str, ...]]
     heuristics: ClassVar[tuple[str, ...]]
 
@@ -73,14 +98,14 @@ class World(Protocol):
         """Number of robots in a team."""
 
     @property
-    def iterations(self) -> int:
-        """Iterations of one epoch, T."""
+    def params(self) -> Any:
+        """Its parameters, a dataclass; ``iterations``, those of one epoch, is among them."""
 
     @property
     def controller(self) -> ControllerSpec:
         """Shape of the robots' controllers."""
 
-    def scenarios(self, keys: Sequence[int]) -> Any:
+    def scenarios(self, keys: Sequence[int]) -> Scenarios:
         """Return one scenario per key: the same key always gives the same scenario."""
 
     def simulation(self) -> Simulation:

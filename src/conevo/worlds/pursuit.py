@@ -86,10 +86,6 @@ class PursuitParams(ArenaParams):
     max_hidden: Annotated[int, Gt(0), Le(32)] = 12
 
     def __post_init__(self) -> None:
-        if self.max_hidden < self.n_hidden:
-            raise UsageError(
-                f"world.max_hidden ({self.max_hidden}) must not be below n_hidden ({self.n_hidden})"
-            )
         if self.prey in PREY_MODES:
             if self.prey_digest:
                 raise UsageError(f"world.prey_digest belongs to a prey file, not to {self.prey!r}")
@@ -116,6 +112,7 @@ class PursuitWorld:
 
     name: ClassVar[str] = "pursuit-v1"
     actions: ClassVar[tuple[str, ...]] = ACTIONS
+    castes: ClassVar[tuple[str, ...]] = actions
     performance: ClassVar[tuple[str, ...]] = (
         "capture_time",
         "first_capture",
@@ -145,11 +142,6 @@ class PursuitWorld:
     def n_prey(self) -> int:
         """Number of prey."""
         return 1 + (self.team_type - 1) // 5
-
-    @property
-    def iterations(self) -> int:
-        """Iterations of one epoch."""
-        return self.params.iterations
 
     @property
     def controller(self) -> ControllerSpec:
@@ -184,7 +176,6 @@ class PursuitWorld:
             robots=self.n_robots,
             bodies=self.n_robots + self.n_prey,
             team_is_prey=False,
-            performance=len(self.performance),
             prey_mode=PREY_MODES.get(p.prey, 0),
             prey_hidden=len(self._prey_weights()[0]) // self.n_prey,
             window=p.capture_window,

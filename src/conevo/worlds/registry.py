@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from conevo.errors import UsageError, unknown_name
@@ -20,7 +21,8 @@ class WorldEntry:
     """What the registry knows of a world without loading it.
 
     ``module`` holds the classes named ``params_name`` (parameters) and ``world_name`` (built from
-    an environment name and parameters).
+    an environment name and parameters). An entry in a file outside the package leaves it out;
+    ``worlds.outside`` fills it in, with the file's path and the digest of its text.
     """
 
     name: str
@@ -28,9 +30,11 @@ class WorldEntry:
     summary: str
     source: str
     environments: tuple[str, ...]
-    module: str
     params_name: str
     world_name: str
+    module: str = ""
+    file: str = ""
+    digest: str = ""
 
     @property
     def short_name(self) -> str:
@@ -43,10 +47,20 @@ class WorldEntry:
         found: type[Any] = getattr(import_module(self.module), self.params_name)
         return found
 
+    def address(self, environment: str) -> str:
+        """What ``resolve`` finds an environment of this world by."""
+        return f"{self.file}:{environment}" if self.file else f"{self.name}/{environment}"
+
     def build(self, environment: str, params: Any) -> World:
-        """Return one environment of this world."""
+        """Return one environment of this world.
+
+        Raises:
+            UsageError: parameters that do not fit together.
+        """
         make: Callable[[str, Any], World] = getattr(import_module(self.module), self.world_name)
-        return make(environment, params)
+        built = make(environment, params)
+        _ = built.controller  # refuses fewer slots than neurons
+        return built
 
 
 WORLDS: dict[str, WorldEntry] = {
@@ -84,32 +98,69 @@ WORLDS: dict[str, WorldEntry] = {
             params_name="PreyParams",
             world_name="PreyWorld",
         ),
+        WorldEntry(
+            name="gacc-v1",
+            title="Gathering and collective construction",
+            summary="30 robots gather objects of three types and build with them in order",
+            source="Nitschke 2009, chapter 6",
+            environments=tuple(f"simple-{n}" for n in range(1, 11))
+            + tuple(f"complex-{n}" for n in range(1, 10)),
+            module="conevo.worlds.gacc",
+            params_name="GaccParams",
+            world_name="GaccWorld",
+        ),
     )
 }
 
 
-def resolve(path: str) -> tuple[WorldEntry, str]:
-    """Return the entry and environment of a path like "rover/complex-1" or "rover-v1/complex-1".
+def resolve(path: str, digest: str = "") -> tuple[WorldEntry, str]:
+    """Return the entry and environment of a path.
+
+    Args:
+        path: "rover/complex-1", "rover-v1/complex-1", or "FILE.py:ENVIRONMENT" for a world in a
+            file outside the package.
+        digest: of that file, checked if it is given.
 
     Raises:
-        UsageError: no such world or environment, or no environment given.
+        UsageError: no such world or environment, or no environment given; a file that holds no
+            world or has changed.
     """
-    name, _, environment = path.partition("/")
-    newest = {entry.short_name: entry for entry in WORLDS.values()}
-    entry = WORLDS.get(name) or newest.get(name)
-    if entry is None:
-        raise unknown_name("world", name, [*newest, *WORLDS])
+    file, _, environment = path.rpartition(":")
+    if path.endswith(".py"):
+        file, environment = path, ""
+    if file.endswith(".py"):
+        from conevo.worlds.outside import load
+
+        name, entry = file, load(Path(file), digest)
+        example = f"{file}:{entry.environments[0]}"
+    elif ".py/" in path:
+        raise UsageError(f"world {path!r}: a world in a file is named FILE.py:ENVIRONMENT")
+    else:
+        name, _, environment = path.partition("/")
+        entry = _named(name)
+        example = f"{entry.short_name}/{entry.environments[0]}"
+        if digest:
+            raise UsageError(f"run.world_digest belongs to a world in a file, not to {path!r}")
     if not environment:
-        raise UsageError(
-            f"world {name!r} needs an environment, as in {entry.short_name}/{entry.environments[0]}"
-        )
+        raise UsageError(f"world {name!r} needs an environment, as in {example}")
     if environment not in entry.environments:
         raise unknown_name("environment", environment, entry.environments, f"of world {name!r}")
     return entry, environment
 
 
+def _named(name: str) -> WorldEntry:
+    """Return the entry of a world of the package, the newest version if none is named."""
+    newest = {entry.short_name: entry for entry in WORLDS.values()}
+    entry = WORLDS.get(name) or newest.get(name)
+    if entry is None:
+        raise unknown_name("world", name, [*newest, *WORLDS])
+    return entry
+
+
 def world(path: str, **params: Any) -> World:
-    """Return the world at a path like "rover/complex-1", with parameters other than its defaults.
+    """Return the world at a path, with parameters other than its defaults.
+
+    The path is one that ``resolve`` knows: "rover/complex-1", or "FILE.py:ENVIRONMENT".
 
     Raises:
         UsageError: unknown world, environment or parameter.

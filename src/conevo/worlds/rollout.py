@@ -16,7 +16,7 @@ from conevo.errors import EnvironmentFailure
 from conevo.kernels import engine
 from conevo.kernels.engine import barrier
 from conevo.kernels.network import WIDE, Shape, load, out_vector, think, wide_vector
-from conevo.worlds.protocol import Outcome, Simulation, World
+from conevo.worlds.protocol import Outcome, Scenarios, Simulation, World
 
 __all__ = ["Rollout", "episode_kernel"]
 
@@ -101,6 +101,15 @@ def _episode_kernel(
     return episode
 
 
+def _sizes_of(world: World, simulation: Simulation) -> dict[str, int]:
+    """Return how many elements of each flat array of the state one team needs."""
+    arrays = {name for name, var in simulation.state.vars.items() if wp.types.is_array(var.type)}
+    known = {"counts": world.n_robots * len(world.castes), "performance": len(world.performance)}
+    if unknown := set(simulation.sizes) - arrays:
+        raise ValueError(f"sizes of what is no array of the state: {', '.join(sorted(unknown))}")
+    return dict.fromkeys(arrays, world.n_robots) | known | simulation.sizes
+
+
 def _check_device(device: str) -> None:
     """Refuse a device that this machine does not have."""
     allowed = ["cpu", *(d.alias for d in wp.get_cuda_devices())]
@@ -141,6 +150,7 @@ class Rollout:
         self._chunk = CHUNK if device == "cpu" else CUDA_CHUNK
         _check_device(device)
         self._simulation = world.simulation()
+        self._sizes = _sizes_of(world, self._simulation)
         self._kernel = episode_kernel(self._simulation)
         spec = world.controller
         shape = Shape()
@@ -164,7 +174,7 @@ class Rollout:
         self,
         genes: npt.NDArray[np.float32],
         teams: npt.NDArray[np.int32],
-        scenarios: Any,
+        scenarios: Scenarios,
         heuristic: npt.NDArray[np.int32] | None = None,
     ) -> Outcome:
         """Run every team in every scenario and return what happened.
@@ -180,7 +190,7 @@ class Rollout:
         """
         genes, teams, heuristic = self._checked(genes, teams, heuristic)
         n_teams, e, r = len(teams), len(scenarios), self.world.n_robots
-        n_actions = len(self.world.actions)
+        n_castes = len(self.world.castes)
         parts = []
         scene = self._scene(scenarios)
         step = max(1, self._chunk // e)
@@ -193,7 +203,7 @@ class Rollout:
         joined = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
         return Outcome(
             fitness=joined["fitness"].reshape(n_teams, e, r),
-            counts=joined["counts"].reshape(n_teams, e, r, n_actions),
+            counts=joined["counts"].reshape(n_teams, e, r, n_castes),
             switches=joined["switches"].reshape(n_teams, e, r),
             performance={
                 name: joined["performance"].reshape(n_teams, e, -1)[:, :, k]
@@ -205,7 +215,7 @@ class Rollout:
         self,
         genes: npt.NDArray[np.float32],
         team: npt.NDArray[np.int32],
-        scenarios: Any,
+        scenarios: Scenarios,
         heuristic: npt.NDArray[np.int32] | None = None,
     ) -> dict[str, npt.NDArray[Any]]:
         """Run one team in one scenario and return its state after every iteration.
@@ -231,8 +241,8 @@ class Rollout:
         job = self._job(genes, teams, modes, 1)
         steps: dict[str, list[npt.NDArray[Any]]] = {n: [] for n in self._simulation.recorded}
         inputs: list[npt.NDArray[Any]] = []
-        r, n_inputs, sizes = self.world.n_robots, self._shape.n_inputs, self._simulation.sizes
-        for t in range(self.world.iterations):
+        r, n_inputs, sizes = self.world.n_robots, self._shape.n_inputs, self._sizes
+        for t in range(self.world.params.iterations):
             job.t_begin, job.t_end = t, t + 1
             self._launch(batch, scene, job, 1)
             for name, values in steps.items():
@@ -270,7 +280,7 @@ class Rollout:
             np.ascontiguousarray(heuristic, dtype=np.int32),
         )
 
-    def _scene(self, scenarios: Any) -> Any:
+    def _scene(self, scenarios: Scenarios) -> Any:
         scene = self._simulation.scene()
         for name in self._simulation.scene.vars:
             values = getattr(scenarios, name)
@@ -297,7 +307,7 @@ class Rollout:
         job.heuristic = self._array(heuristic)
         job.n_scenarios = n_scenarios
         job.n_robots = self.world.n_robots
-        job.t_begin, job.t_end = 0, self.world.iterations
+        job.t_begin, job.t_end = 0, self.world.params.iterations
         return job
 
     def _batch(self, n: int) -> _Workspace:
@@ -305,7 +315,7 @@ class Rollout:
         if self._workspace is None or self._workspace.n < n:
             r, chunks = self.world.n_robots, self._shape.n_chunks
             state = self._simulation.state()
-            for name, size in self._simulation.sizes.items():
+            for name, size in self._sizes.items():
                 dtype = self._simulation.state.vars[name].type.dtype
                 setattr(state, name, wp.zeros(n * size, dtype=dtype, device=self.device))
             nets = state.nets
@@ -333,8 +343,10 @@ class Rollout:
 
     def _collect(self, batch: _Workspace, n_teams: int, e: int) -> dict[str, npt.NDArray[Any]]:
         n = n_teams * e
-        sizes = self._simulation.sizes
         return {
-            name: getattr(batch.state, name).numpy()[: n * sizes[name]].reshape(n_teams, -1).copy()
+            name: getattr(batch.state, name)
+            .numpy()[: n * self._sizes[name]]
+            .reshape(n_teams, -1)
+            .copy()
             for name in ("fitness", "counts", "switches", "performance")
         }

@@ -49,8 +49,8 @@ from conevo.controllers import ControllerSpec
 from conevo.kernels.geometry import COVER_WORDS
 from conevo.rng import stream
 from conevo.worlds import canals, rocks
-from conevo.worlds.protocol import Simulation
-from conevo.worlds.rover_dynamics import FUNCTIONS, N_ACTIONS, ROCK_CELLS, Params, Scene, Team
+from conevo.worlds.protocol import Scenarios, Simulation
+from conevo.worlds.rover_dynamics import FUNCTIONS, ROCK_CELLS, Params, Scene, Team
 
 __all__ = ["RoverParams", "RoverScenarios", "RoverWorld"]
 
@@ -91,20 +91,14 @@ class RoverParams:
     n_hidden: Annotated[int, Ge(2), Le(16)] = 10
     max_hidden: Annotated[int, Ge(2), Le(32)] = 20  # Choice: twice the initial number
 
-    def __post_init__(self) -> None:
-        if self.max_hidden < self.n_hidden:
-            raise ValueError(
-                f"max_hidden ({self.max_hidden}) must not be below n_hidden ({self.n_hidden})"
-            )
 
-
-@dataclass(frozen=True)
-class RoverScenarios:
+@dataclass(frozen=True, kw_only=True)
+class RoverScenarios(Scenarios):
     """Scenarios of one environment: E of them, K rocks each, sorted by grid cell.
 
     rock_x, rock_y, rock_value [E, K] float32; rock_type [E, K] int32 (0..4 for A..E);
     cell [E, cells + 1] int32, first rock of each grid cell; canal [rows, columns] uint8;
-    start_x, start_y [E, R] float32; lander [E, 2] float32; seed [E] uint64.
+    start_x, start_y [E, R] float32; lander [E, 2] float32.
     """
 
     rock_x: npt.NDArray[np.float32]
@@ -116,11 +110,6 @@ class RoverScenarios:
     start_x: npt.NDArray[np.float32]
     start_y: npt.NDArray[np.float32]
     lander: npt.NDArray[np.float32]
-    seed: npt.NDArray[np.uint64]
-
-    def __len__(self) -> int:
-        """Return the number of scenarios."""
-        return len(self.seed)
 
 
 @dataclass(frozen=True)
@@ -132,6 +121,7 @@ class RoverWorld:
 
     name: ClassVar[str] = "rover-v1"
     actions: ClassVar[tuple[str, ...]] = ("low", "med", "hi", "move")
+    castes: ClassVar[tuple[str, ...]] = actions
     performance: ClassVar[tuple[str, ...]] = ("value", "area")
     heuristics: ClassVar[tuple[str, ...]] = ("low", "med", "hi", "non-specialized")
 
@@ -139,11 +129,6 @@ class RoverWorld:
     def n_robots(self) -> int:
         """Number of rovers."""
         return self.params.n_robots
-
-    @property
-    def iterations(self) -> int:
-        """Iterations of one epoch."""
-        return self.params.iterations
 
     @property
     def controller(self) -> ControllerSpec:
@@ -225,19 +210,11 @@ class RoverWorld:
         params.min_distance_2 = p.min_distance**2
         params.separation_2 = p.separation**2
         params.fitness_is_product = int(p.fitness == "value_times_area")
-        r = p.n_robots
-        one_per_robot = (
-            "x y to_x to_y action chosen setting heuristic energy covered covered_range value "
-            "fitness switches"
-        ).split()
         return Simulation(
             state=Team,
-            sizes=dict.fromkeys(one_per_robot, r)
-            | {
+            sizes={
                 "detected": int(sum(rocks.mix(self.environment))),
-                "cover": r * int(COVER_WORDS),
-                "counts": r * int(N_ACTIONS),
-                "performance": 2,
+                "cover": p.n_robots * int(COVER_WORDS),
             },
             scene=Scene,
             params_type=Params,

@@ -10,13 +10,13 @@ children have no fitness before they are tried; the first generation takes any g
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Annotated, Literal
+from typing import Annotated
 
 import numpy as np
 from annotated_types import Ge
 
 from conevo.evolution import credit
-from conevo.evolution.assembly import best_team, rows, shared
+from conevo.evolution.assembly import SchemeConfig, best_team, rows, shared
 from conevo.evolution.generation import (
     advance,
     begin,
@@ -36,21 +36,14 @@ __all__ = ["Ccga", "CcgaConfig"]
 
 
 @dataclass(frozen=True, kw_only=True)
-class CcgaConfig(VariationConfig):
-    """Parameters of CCGA.
+class CcgaConfig(VariationConfig, SchemeConfig):
+    """Parameters of CCGA; under the scheme "shared" no partners come from the elite.
 
     Attributes:
         genotypes: M, whole networks per population (table 5.5: 500; 600 in all for pursuit).
-        evaluation: "systematic" tries every genotype once, R x M teams; "shared" draws complete
-            teams in which every genotype takes part ``rounds`` times, rounds x M teams, no partners
-            from the elite.
-        rounds: K, trials of each genotype under "shared". More makes fitness less noisy.
-            Choice: 10, as ESP.
     """
 
     genotypes: Annotated[int, Ge(2)] = 500
-    evaluation: Literal["systematic", "shared"] = "systematic"
-    rounds: Annotated[int, Ge(1)] = 10
 
 
 @dataclass(frozen=True)

@@ -7,13 +7,20 @@ sub-populations, fitness is type A only, and controllers grow or shrink when the
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import Annotated, Literal
+from typing import Annotated
 
 import numpy as np
 from annotated_types import Ge, Gt, Le
 
 from conevo.evolution import credit
-from conevo.evolution.assembly import best_team, lesion_teams, on_trial, shared, systematic
+from conevo.evolution.assembly import (
+    SchemeConfig,
+    best_team,
+    lesion_teams,
+    on_trial,
+    shared,
+    systematic,
+)
 from conevo.evolution.generation import advance, begin, count, crown, grade, trials
 from conevo.evolution.population import elite_count, random_genes
 from conevo.evolution.protocol import (
@@ -33,16 +40,11 @@ __all__ = ["Mesp", "MespConfig"]
 
 
 @dataclass(frozen=True, kw_only=True)
-class MespConfig(VariationConfig):
+class MespConfig(VariationConfig, SchemeConfig):
     """Parameters of Multi-Agent ESP.
 
     Attributes:
         genotypes: M, neurons per sub-population (table 5.5: 500 per population of 10).
-        evaluation: "systematic" tries every genotype once, R x U x M teams (section 3.3.1);
-            "shared" draws complete teams in which every genotype takes part ``rounds`` times,
-            rounds x M teams, the scheme ESP itself was published with.
-        rounds: K, trials of each genotype under "shared". More makes fitness less noisy.
-            Choice: 10, as ESP.
         stagnation_y: Y, generations without progress before a controller's size is questioned
             (table 5.5: 15; 20 for pursuit).
         lesion_ratio: share of its fitness that a controller must keep without its least needed
@@ -50,8 +52,6 @@ class MespConfig(VariationConfig):
     """
 
     genotypes: Annotated[int, Ge(2)] = 50
-    evaluation: Literal["systematic", "shared"] = "systematic"
-    rounds: Annotated[int, Ge(1)] = 10
     stagnation_y: Annotated[int, Ge(1)] = 15
     lesion_ratio: Annotated[float, Gt(0), Le(1)] = 0.9
 

@@ -1,0 +1,55 @@
+"""Steps in the plane: where a robot wants to go, and whether another is there already."""
+
+import warp as wp
+
+from conevo.kernels.network import sigmoid
+
+__all__ = ["is_taken", "random_step", "steered_step"]
+
+
+@wp.func
+def random_step(u: float, length: float) -> wp.vec2f:
+    """Return a step of a length in the direction 2 pi ``u``."""
+    turn = u * 6.2831853
+    return wp.vec2f(length * wp.cos(turn), length * wp.sin(turn))
+
+
+@wp.func
+def steered_step(sum_x: float, sum_y: float, length: float) -> wp.vec2f:
+    """Return the step that two output sums stand for, of a length at most.
+
+    "Normalized and scaled" (Nitschke 2009, 5.2) so that both at an extreme make the longest step.
+    """
+    most = length * 1.4142135
+    return wp.vec2f(most * (sigmoid(sum_x) - 0.5), most * (sigmoid(sum_y) - 0.5))
+
+
+@wp.func
+def is_taken(
+    xs: wp.array[float],
+    ys: wp.array[float],
+    n: int,
+    i: int,
+    x: float,
+    y: float,
+    separation_2: float,
+) -> bool:
+    """Return whether one of the first ``n`` robots, ``i`` left out, is too close to a place.
+
+    Args:
+        xs: [R] first coordinates.
+        ys: [R] second coordinates.
+        n: how many robots to look at: all, or ``i``, those with a lower number.
+        i: the robot that asks.
+        x: first coordinate of the place.
+        y: second coordinate.
+        separation_2: the square of the smallest distance allowed.
+    """
+    close = int(0)
+    j = int(0)
+    while j < n:
+        dx = xs[j] - x
+        dy = ys[j] - y
+        close += int(dx * dx + dy * dy < separation_2 and j != i)
+        j += 1
+    return close > 0

@@ -1,0 +1,349 @@
+"""Gathering and collective construction: thirty robots gather objects and build with them in order.
+
+=============  =========================================================================
+name           ``gacc-v1``
+source         Nitschke 2009, chapter 6, appendix D
+environments   ``simple-1..10`` (one type of object, table 6.6), ``complex-1..9`` (build
+               sequences of table 6.8; 10 obstacles in all but complex-1)
+robots         30
+epoch          3000 iterations
+sensors        8 for objects and obstacles, 8 for robots, 8 for the home area, one of each
+               for every octant; 3 for the demand for objects of type A, B, C
+actions        detect A, B, C; move; grip A, B, C
+controller     37-10-8 simple recurrent network (27 sensors, 10 context units) with bias
+performance    ``delivered``, objects delivered in correct order; ``completed``, complex
+               objects; ``optimum``, percent of all objects that are delivered
+=============  =========================================================================
+
+**Task.** Objects of type A, B and C lie about and are to be built into complex objects of ten parts
+in the construction zone, in the middle of the home area. A robot detects objects with the sensor
+setting of their type, grips them with the gripper setting of their type, carries them home, and
+waits there for help: 2, 3, 4 robots must hold an object of type A, B, C to build it in. An ordered
+complex object takes only the next type of its sequence, a disordered one any type that it lacks.
+
+**The life of an object** (``life`` of a recorded epoch):
+
+=========  ===============================  ====================================================
+state      meaning                          what comes next
+=========  ===============================  ====================================================
+LYING      where it was                     GRIPPED, by one robot outside the home area
+GRIPPED    held outside the home area       CARRIED, as its robot moves
+CARRIED    goes where its robot goes        WAITING, in the home area; DROPPED, if let go
+WAITING    one robot holds it at home       HELPED, another grips it; DROPPED, after 30 iterations
+HELPED     several do, not yet enough       DELIVERED, enough do and it is needed next; DROPPED,
+                                            it is not needed, or all have waited 30 iterations;
+                                            WAITING, all but one have
+DELIVERED  a part of a complex object       nothing
+DROPPED    lies where a robot let it go     GRIPPED outside, WAITING or more in the home area
+=========  ===============================  ====================================================
+
+**One iteration.** Every robot senses and chooses where all were at the end of the iteration before;
+then all move and grip; then a referee looks at what is held in the home area.
+
+**In the home area** four situations of section 6.2.8 decide instead of the controller. (1) Another
+robot holds an object: go to the closest such robot and grip it too. (2) The robot itself holds one:
+wait. (3) An object lies there: go to the closest one and grip it. (4) At least two hold an object
+that cannot be built in now: they let go. Else, and everywhere outside, the controller decides.
+
+Choices, all declared in ``GaccParams`` or here:
+
+- Choice: an object can be gripped whether or not it has been detected; detection tells a robot
+  where to go. "It must first be detected" (6.5.3) is ``needs_detection``: then any robot's
+  detection, once, is enough. But eq. 6.8 pays only those who deliver, not who detects for them.
+- Choice: in the home area a robot is aware of all of it (``home_sight``): with the sensors' own
+  0.05 hardly anybody is helped within the 30 iterations of table 6.4.
+- Choice: home area, grip distance and home sight are as large as they are because in smaller ones
+  nothing is ever delivered by random teams, so nothing can evolve (docs/results/gacc.md).
+- Choice: outside the home area one robot carries an object alone and nobody else can grip it; of
+  two that grip it in the same iteration the one with the lower number gets it. Nobody grips over
+  the border of the home area.
+- Choice: gripping with another setting lets go of what is held; with the same, nothing happens.
+- Choice: every robot waits its own 30 iterations (table 6.4), then lets go. It keeps off that
+  object ("other objects", 6.2.8) until it has left the home area.
+- Choice: waiting counts as gripping. "Leave the home area and continue searching" (situation 1) is
+  left to the controller.
+- Choice: a robot without energy lets go, stays where it is as a body, and does nothing more.
+- Choice: an obstacle blocks the view of other robots too, not of the home area or of the demand.
+- Choice: where several complex objects need a type, the first of them gets it; of several objects
+  that are ready in one iteration, the first comes first.
+- Choice: walls and obstacles are sensed where they are closest, with a negative reading.
+- Choice: a step is refused by where it ends; obstacles are too wide to be jumped over.
+
+**Castes** (6.1.1) go by how a robot spends its time: activating its detection sensors; gripping or
+moving with an object (gatherer); from its arrival in the home area on, or from its grip there, with
+an object that is then built in (constructor). Choice: a robot that mostly moves with empty hands
+has none of these, and is non-specialized.
+
+Version history:
+
+- v1: first version.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Annotated, Any, ClassVar
+
+import numpy as np
+import numpy.typing as npt
+from annotated_types import Ge, Gt, Le
+
+from conevo.controllers import ControllerSpec
+from conevo.errors import UsageError
+from conevo.rng import stream
+from conevo.worlds.gacc_dynamics import FUNCTIONS
+from conevo.worlds.gacc_plans import TYPES, Plan, plan
+from conevo.worlds.gacc_senses import N_SENSORS
+from conevo.worlds.gacc_state import N_CASTES, Params, Scene, Team
+from conevo.worlds.protocol import Simulation
+
+__all__ = ["GaccParams", "GaccScenarios", "GaccWorld"]
+
+Positive = Annotated[float, Gt(0)]
+NonNegative = Annotated[float, Ge(0)]
+Range = Annotated[float, Gt(0), Le(0.5)]
+
+
+@dataclass(frozen=True)
+class GaccParams:
+    """Parameters of the world; lengths in sides of the square, energy in units.
+
+    Nitschke 2009, table 6.4, unless marked. Choice: tables 6.1 and 6.2 have lost the settings of
+    detection sensors and grippers; all types have the same.
+    """
+
+    n_robots: Annotated[int, Ge(2), Le(64)] = 30
+    iterations: Annotated[int, Ge(2), Le(1_000_000)] = 3000
+    energy: Positive = 1000.0
+    home_side: Annotated[float, Gt(0), Le(0.8)] = 0.7  # Choice: see docs/results/gacc.md
+    zone_side: Annotated[float, Gt(0), Le(0.5)] = 0.06  # Choice
+    home_range: Annotated[float, Gt(0), Le(1)] = 1.0  # Choice: sensed from everywhere
+    home_sight: Annotated[float, Gt(0), Le(1)] = 1.0  # Choice: at home, all of home is in sight
+    object_range: Range = 0.05
+    object_accuracy: Annotated[float, Ge(0), Le(1)] = 1.0  # Choice
+    object_cost: NonNegative = 0.02  # Choice
+    robot_range: Range = 0.05
+    robot_cost: NonNegative = 0.01
+    grip_distance: Range = 0.05  # Choice: what can be detected can be gripped
+    grip_cost: NonNegative = 0.01  # Choice
+    move_range: Annotated[float, Gt(0), Le(0.02)] = 0.01  # Choice: the rovers', table 5.4
+    move_cost: NonNegative = 0.01
+    wait: Annotated[int, Ge(1), Le(1_000_000)] = 30
+    needs_detection: bool = False  # Choice: whether nobody grips what nobody has detected
+    min_distance: Positive = 0.01  # Choice: the bound of eq. 6.1, read as a maximum
+    separation: NonNegative = 0.002  # Choice: "only one robot can occupy any position" (6.1.2)
+    obstacle_least: Annotated[float, Ge(0.02), Le(0.1)] = 0.02  # Choice: sides of an obstacle
+    obstacle_most: Annotated[float, Ge(0.02), Le(0.1)] = 0.1  # Choice
+    obstacle_gap: Annotated[float, Gt(0), Le(0.05)] = 0.03  # Choice: around every obstacle
+    n_hidden: Annotated[int, Ge(2), Le(16)] = 10
+    max_hidden: Annotated[int, Ge(2), Le(32)] = 20  # Choice: twice the initial number
+
+    def __post_init__(self) -> None:
+        for low, high in (
+            ("n_hidden", "max_hidden"),
+            ("zone_side", "home_side"),
+            ("obstacle_least", "obstacle_most"),
+        ):
+            if getattr(self, high) < getattr(self, low):
+                raise UsageError(
+                    f"world.{high} ({getattr(self, high)}) must not be below {low} "
+                    f"({getattr(self, low)})"
+                )
+
+
+@dataclass(frozen=True)
+class GaccScenarios:
+    """E scenarios of one environment; lengths in sides of the square.
+
+    object_x, object_y [E, K] float32; object_type [E, K] int32 (0..2 for A..C, in this order);
+    left, bottom, right, top [E, obstacles] float32; start_x, start_y [E, R] float32; plan [C, 10]
+    int32, type of every part of every complex object; seed [E] uint64.
+    """
+
+    object_x: npt.NDArray[np.float32]
+    object_y: npt.NDArray[np.float32]
+    object_type: npt.NDArray[np.int32]
+    left: npt.NDArray[np.float32]
+    bottom: npt.NDArray[np.float32]
+    right: npt.NDArray[np.float32]
+    top: npt.NDArray[np.float32]
+    start_x: npt.NDArray[np.float32]
+    start_y: npt.NDArray[np.float32]
+    plan: npt.NDArray[np.int32]
+    seed: npt.NDArray[np.uint64]
+
+    def __len__(self) -> int:
+        """Return the number of scenarios."""
+        return len(self.seed)
+
+
+@dataclass(frozen=True)
+class GaccWorld:
+    """One environment of the gathering and construction task."""
+
+    environment: str
+    params: GaccParams = field(default_factory=GaccParams)
+
+    name: ClassVar[str] = "gacc-v1"
+    actions: ClassVar[tuple[str, ...]] = (
+        *(f"detect {kind}" for kind in TYPES),
+        "move",
+        *(f"grip {kind}" for kind in TYPES),
+    )
+    castes: ClassVar[tuple[str, ...]] = (
+        *(f"{kind}-detector" for kind in TYPES),
+        "non-specialized",
+        *(f"{kind}-gatherer" for kind in TYPES),
+        *(f"{kind}-constructor" for kind in TYPES),
+    )
+    performance: ClassVar[tuple[str, ...]] = ("delivered", "completed", "optimum")
+    heuristics: ClassVar[tuple[str, ...]] = (
+        *(f"{kind}-detector" for kind in TYPES),
+        *(f"{kind}-gatherer" for kind in TYPES),
+        *(f"{kind}-constructor" for kind in TYPES),
+        "non-specialized",
+    )
+
+    @property
+    def n_robots(self) -> int:
+        """Number of robots."""
+        return self.params.n_robots
+
+    @property
+    def iterations(self) -> int:
+        """Iterations of one epoch."""
+        return self.params.iterations
+
+    @property
+    def plan(self) -> Plan:
+        """What is to be built."""
+        return plan(self.environment)
+
+    @property
+    def controller(self) -> ControllerSpec:
+        """The robot's network (section 6.2.7)."""
+        return ControllerSpec(
+            n_sensors=int(N_SENSORS),
+            n_hidden=self.params.n_hidden,
+            n_outputs=8,
+            max_hidden=self.params.max_hidden,
+            bias=True,
+        )
+
+    def scenarios(self, keys: Sequence[int]) -> GaccScenarios:
+        """Return one scenario per key: obstacles, objects and starts at random places.
+
+        Raises:
+            UsageError: no room for an obstacle.
+        """
+        plan = self.plan
+        drawn = [self._draw(key, plan) for key in keys]
+        stacked = {name: np.stack([one[name] for one in drawn]) for name in drawn[0]}
+        return GaccScenarios(plan=plan.parts, seed=np.array(keys, dtype=np.uint64), **stacked)
+
+    def _draw(self, key: int, plan: Plan) -> dict[str, npt.NDArray[Any]]:
+        rng = stream(key, self.name)
+        blocks = self._obstacles(rng, plan.n_obstacles)
+        types = plan.object_types
+        objects = self._free_places(rng, len(types), blocks, 0.0)
+        starts = self._free_places(rng, self.n_robots, blocks, self.params.separation)
+        left, bottom, right, top = np.ascontiguousarray(blocks.T)
+        return {
+            "object_x": objects[:, 0],
+            "object_y": objects[:, 1],
+            "object_type": types,
+            "left": left,
+            "bottom": bottom,
+            "right": right,
+            "top": top,
+            "start_x": starts[:, 0],
+            "start_y": starts[:, 1],
+        }
+
+    def _obstacles(self, rng: np.random.Generator, n: int) -> npt.NDArray[np.float32]:
+        """Draw rectangles [n, 4], apart from the home area, the walls and each other."""
+        p = self.params
+        half = p.home_side / 2
+        gap = p.obstacle_gap
+        taken = [np.array([0.5 - half, 0.5 - half, 0.5 + half, 0.5 + half])]
+        for _ in range(10_000):
+            if len(taken) > n:
+                return np.array(taken[1:], dtype=np.float32).reshape(n, 4)
+            sides = rng.uniform(p.obstacle_least, p.obstacle_most, 2)
+            corner = rng.uniform(gap, 1 - gap - sides)
+            block = np.concatenate([corner, corner + sides])
+            if all(
+                np.any(block[:2] > other[2:] + gap) or np.any(block[2:] < other[:2] - gap)
+                for other in taken
+            ):
+                taken.append(block)
+        raise UsageError(f"the square has no room for {n} obstacles, {gap:g} apart")
+
+    def _free_places(
+        self,
+        rng: np.random.Generator,
+        n: int,
+        blocks: npt.NDArray[np.float32],
+        separation: float,
+    ) -> npt.NDArray[np.float32]:
+        """Draw places [n, 2] outside the home area and all obstacles, apart from each other."""
+        edge = self.params.home_side / 2 + 1e-6  # more than float32 rounds
+        places: list[npt.NDArray[np.float32]] = []
+        while len(places) < n:
+            place = rng.random(2, dtype=np.float32)
+            is_out = bool(np.any(np.abs(place - np.float32(0.5)) > edge))
+            in_block = (place >= blocks[:, :2]) & (place <= blocks[:, 2:])
+            is_free = not in_block.all(axis=1).any()
+            if is_out and is_free:
+                gaps = [float(np.sum((place - other) ** 2)) for other in places]
+                if all(gap >= separation**2 for gap in gaps):
+                    places.append(place)
+        return np.array(places)
+
+    def simulation(self) -> Simulation:
+        """Return the Warp side of this world."""
+        p, plan = self.params, self.plan
+        params = Params()
+        params.n_robots = p.n_robots
+        params.n_objects = plan.parts.size
+        params.n_complex = len(plan.parts)
+        params.ordered = sum(1 << c for c, ordered in enumerate(plan.is_ordered) if ordered)
+        params.energy = p.energy
+        params.home = p.home_side / 2
+        params.zone = p.zone_side
+        params.home_range_2 = p.home_range**2
+        params.home_sight_2 = p.home_sight**2
+        params.object_range_2 = p.object_range**2
+        params.object_accuracy = p.object_accuracy
+        params.object_cost = p.object_cost
+        params.robot_range_2 = p.robot_range**2
+        params.robot_cost = p.robot_cost
+        params.grip_2 = p.grip_distance**2
+        params.grip_cost = p.grip_cost
+        params.move_range = p.move_range
+        params.move_cost = p.move_cost
+        params.wait = p.wait
+        params.needs_detection = int(p.needs_detection)
+        params.min_distance_2 = p.min_distance**2
+        params.separation_2 = p.separation**2
+        r, k, c = p.n_robots, plan.parts.size, len(plan.parts)
+        per_robot = (
+            "x y to_x to_y action chosen target held waited dropped situation heuristic energy "
+            "fitness switches"
+        ).split()
+        per_object = "object_x object_y life detected part holders".split()
+        return Simulation(
+            state=Team,
+            sizes=dict.fromkeys(per_robot, r)
+            | dict.fromkeys(per_object, k)
+            | {"counts": r * int(N_CASTES), "built": c, "missing": 3 * c}
+            | {"demand": 3, "performance": len(self.performance)},
+            scene=Scene,
+            params_type=Params,
+            params=params,
+            functions=FUNCTIONS,
+            recorded=(
+                *("x", "y", "energy", "fitness", "action", "held", "waited", "dropped"),
+                *("situation", "object_x", "object_y", "life", "detected", "part", "demand"),
+                "counts",
+            ),
+        )
