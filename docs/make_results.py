@@ -5,8 +5,10 @@
 Runs are named METHOD-sSEED, or METHOD-WHAT-IS-DIFFERENT-sSEED, if need be with the task before
 it. Writes ``NAME.csv`` (one row per run), ``NAME-curves.csv`` (every tenth part of each run) and
 ``NAME.png`` (learning curves), and puts the tables between the markers of ``NAME.md``. Where the
-world has teams to compare with (pursuit-evasion: heuristic predators, random networks), they play
-the same test scenarios; what its predators do is in ``NAME-behaviours.csv``. Needs matplotlib.
+world has teams to compare with (heuristic ones, random networks), they play the same test
+scenarios; what predators do is in ``NAME-behaviours.csv``. Shapings in the same directory, in
+environments of the same world, get a table and a picture of their own (``shaped_tables.py``). Needs
+matplotlib.
 """
 
 from __future__ import annotations
@@ -27,7 +29,12 @@ import conevo
 import pages
 from conevo.rng import fold
 from conevo.runs.evaluation import describe
+from conevo.runs.shaping import Shaping
+from mixes import best, team_of
 from pages import Row
+from shaped_tables import draw as draw_shaped
+from shaped_tables import finished_shapings, rows_of
+from shaped_tables import table as shaped_table
 from teams import controlled, error, play, random_networks
 
 ORDER = ("homcne", "hetcne", "ccga", "mesp", "cone", "cone-1", "cone-2", "cone-3")
@@ -44,7 +51,7 @@ class Sheet:
         axis: what the learning curves show.
         ticks: of a logarithmic axis; none makes it linear.
         others: teams to compare with, and how they are written: heuristic controllers of the
-            world, and "random" networks.
+            world, the "best mix" of them that a search finds, and "random" networks.
         is_ratio: whether generation 0 is compared by a ratio, else by a difference.
         has_behaviours: whether ``behaviour_tables`` knows what the robots do.
     """
@@ -80,6 +87,20 @@ SHEETS = {
         is_ratio=False,
         has_behaviours=True,
     ),
+    "gacc-v1": Sheet(
+        measures=(
+            ("delivered", "delivered", ".2f"),
+            ("optimum", "of the optimum, %", ".1f"),
+            ("completed", "completed", ".2f"),
+        ),
+        axis="objects delivered, fittest team of a generation",
+        others=(
+            ("best mix", "best mix of heuristic robots"),
+            ("non-specialized", "non-specialized heuristic robots"),
+            ("random", "random networks"),
+        ),
+        is_ratio=False,
+    ),
 }
 Read = tuple[Row, list[Row], list[float]]  # numbers of a run, its generations, its test scenarios
 
@@ -89,7 +110,7 @@ def read_runs(folder: Path) -> list[Read]:
     runs = []
     for path in sorted(folder.glob("*/test.json")):
         run = path.parent
-        if not (run / "DONE").exists():
+        if not (run / "DONE").exists():  # nor is a shaping
             continue
         config = tomllib.loads((run / "config.toml").read_text())
         about = json.loads((run / "provenance.json").read_text())
@@ -98,7 +119,7 @@ def read_runs(folder: Path) -> list[Read]:
         generations = [json.loads(line) for line in lines]
         champion, first = test["champion"], test["generation_0"]
         method = config["run"]["method"]
-        rest = re.sub(r"-s?\d+$", "", run.name).removeprefix(prefix(config["run"]["world"]))
+        rest = re.sub(rf"^{prefix(config['run']['world'])}|-s?\d+$", "", run.name)
         label = f"{method} {rest.removeprefix(method).replace('-', ' ').strip()}".strip()
         sheet = sheet_of(config["run"]["world"])
         row = {
@@ -123,9 +144,9 @@ def read_runs(folder: Path) -> list[Read]:
 
 
 def prefix(task: str) -> str:
-    """Return what the names of runs may begin with, "pursuit-team-3-" for pursuit-v1/team-3."""
+    """Return a pattern of what names of runs may begin with, of "pursuit-team-3-", "team-3-"."""
     world, _, environment = task.partition("/")
-    return f"{world.rpartition('-v')[0]}-{environment}-"
+    return f"({world.rpartition('-v')[0]}-)?{environment}-"
 
 
 def measured(sheet: Sheet, performance: Row, suffix: str) -> Row:
@@ -149,7 +170,8 @@ def task_of(folder: Path) -> tuple[conevo.Run, str]:
     Raises:
         SystemExit: runs of different worlds or with different parameters of the world.
     """
-    runs = [conevo.Run(path.parent) for path in sorted(folder.glob("*/DONE"))]
+    runs = [conevo.Run(path.parent) for path in sorted(folder.glob("*/test.json"))]
+    runs = [run for run in runs if run.status == "finished"]
     if not runs or len({(run.config.task, run.config.world_params) for run in runs}) > 1:
         raise SystemExit(f"{folder}: expected finished runs of one task with one set of parameters")
     return runs[0], runs[0].config.task
@@ -184,6 +206,8 @@ def compare(run: conevo.Run, sheet: Sheet, seeds: list[int]) -> tuple[list[Row],
         for kind, _ in sheet.others:
             if kind == "random":
                 teams = random_networks(world, N_RANDOM, seed, "results")
+            elif kind == "best mix":
+                teams = team_of(world, best(world))
             else:
                 teams = controlled(world, kind, world.heuristics.index(kind))
             outcome = play(world, teams, keys)
@@ -327,6 +351,23 @@ def draw(sheet: Sheet, points: list[Row], path: Path, lines: dict[str, float]) -
     figure.savefig(path, dpi=130, metadata={"Software": None})
 
 
+def write_shaped(sheet: Sheet, shapings: list[Shaping], name: str) -> None:
+    """Write what a results page shows of shapings."""
+    measures = [key for key, _, _ in sheet.measures]
+    has_mix = ("best mix", sheet.others[0][1]) in sheet.others if sheet.others else False
+    bar = (lambda world: team_of(world, best(world))) if has_mix else None
+    rows, text = [], ""
+    for shaping in shapings:
+        some = rows_of(shaping, measures, bar)
+        heading = f"**{title(shaping.configs[0].method)}, seed {shaping.configs[0].run.seed}**"
+        text += f"{heading}\n\n{shaped_table(some, sheet.measures, 'best mix' if bar else '')}\n"
+        rows += some
+    pages.write(rows, Path(f"{name}-shaped.csv"))
+    draw_shaped(shapings, sheet.main, sheet.measures[0][1], Path(f"{name}-shaped.png"))
+    pages.put(text, Path(f"{name}.md"), "shaped")
+    print(text)
+
+
 def main(folder: str, name: str) -> None:
     """Write everything a results page shows."""
     run, task = task_of(Path(folder))
@@ -345,6 +386,8 @@ def main(folder: str, name: str) -> None:
     text = table(sheet, runs, others, first)
     pages.put(text, page)
     print(text)
+    if shapings := finished_shapings(Path(folder)):
+        write_shaped(sheet, shapings, name)
     if sheet.has_behaviours:
         from behaviour_tables import tables
 

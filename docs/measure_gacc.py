@@ -8,9 +8,7 @@ the first case then the same teams with one chosen parameter changed at a time. 
 ``docs/results/gacc.csv`` (every number) and the tables between the markers of
 ``docs/results/gacc.md``. The same seed and runs give the same numbers. About ten minutes of a core.
 
-The search: ``ROUNDS[0]`` random mixes in a few scenarios, of which those that deliver most go on to
-the next round, in more and fresh ones. The numbers of the best are from scenarios that no round
-has met.
+The numbers of the best mix (``mixes.py``) are from scenarios that the search for it has not met.
 """
 
 from __future__ import annotations
@@ -25,10 +23,10 @@ from annotated_types import Le
 
 import conevo
 import pages
-from conevo.rng import stream
 from conevo.runs.config import resolve
 from conevo.worlds.gacc import GaccParams, GaccWorld
 from conevo.worlds.gacc_state import DELIVERED, GRIPPED, HELPED, UNDETECTED, WAITING
+from mixes import Mix, best, team_of, written
 from pages import Row
 from teams import (
     Numbers,
@@ -48,7 +46,6 @@ CASES = (  # environment and iterations
     *(("complex-1", SHORT), ("complex-4", SHORT), ("simple-1", SHORT)),
     *(("complex-1", 3000), ("complex-9", 3000)),
 )
-ROUNDS = ((200, 10), (20, 50), (5, 200))  # mixes and scenarios of each
 N_SCENARIOS = 200  # of a heuristic team or a champion
 N_RANDOM, N_EPOCHS = 200, 5  # random teams of each kind, and scenarios of each
 N_WATCHED = 20  # epochs in which every object is watched
@@ -61,7 +58,6 @@ NARROW = {"home_side": 0.2, "home_sight": 0.05, "grip_distance": 0.02, "needs_de
 HOME_SIDES = (0.2, 0.5)
 DEFAULTS = GaccParams()
 PAGE = Path(__file__).parent / "results" / "gacc.md"
-Mix = tuple[int, ...]  # robots of each heuristic
 
 
 def world_of(environment: str, **params: Any) -> GaccWorld:
@@ -87,38 +83,6 @@ def settings() -> dict[str, Row]:
     found[f"`needs_detection` {str(needs).lower()}"] = {"needs_detection": needs}
     words = " ".join(f"`{name}` {str(value).lower()}" for name, value in NARROW.items())
     return found | {f"all of {words}": dict(NARROW)}
-
-
-# --- the best mix ---------------------------------------------------------------------------------
-
-
-def random_mix(world: GaccWorld, seed: int, k: int) -> Mix:
-    """Return random shares of the non-specialized and the heuristics of types that are needed."""
-    types = sorted(set(world.plan.parts.ravel().tolist()))
-    useful = [3 * row + kind for row in range(3) for kind in types] + [9]
-    rng = stream(seed, "measure_gacc", world.environment, "mix", k)
-    mix = np.zeros(len(world.heuristics), dtype=int)
-    mix[useful] = rng.multinomial(world.n_robots, rng.dirichlet(np.full(len(useful), 0.5)))
-    return tuple(mix.tolist())
-
-
-def team_of(world: GaccWorld, mix: Mix, kind: str) -> Teams:
-    """Return the team of a mix."""
-    return controlled(world, kind, np.repeat(np.arange(len(mix)), mix))
-
-
-def search(world: GaccWorld, seed: int) -> Mix:
-    """Return the mix that delivers most."""
-    mixes = list(dict.fromkeys(random_mix(world, seed, k) for k in range(ROUNDS[0][0])))
-    for number, (n_mixes, n_scenarios) in enumerate(ROUNDS):
-        mixes = mixes[:n_mixes]
-        teams = team_of(world, mixes[0], "mix")
-        for mix in mixes[1:]:
-            teams += team_of(world, mix, "mix")
-        keys = keys_of(seed, n_scenarios, "measure_gacc", "round", str(number))
-        delivered = play(world, teams, keys).performance["delivered"].mean(axis=1)
-        mixes = [mixes[k] for k in np.argsort(-delivered, kind="stable")]
-    return mixes[0]
 
 
 # --- what is measured -----------------------------------------------------------------------------
@@ -164,15 +128,12 @@ def groups(world: GaccWorld, mix: Mix, runs: list[str], seed: int) -> list[tuple
     fixed = controlled(world, world.heuristics[0], 0)
     for k, name in enumerate(world.heuristics[1:], start=1):
         fixed += controlled(world, name, k)
-    fixed += team_of(world, mix, "best mix")
+    fixed += team_of(world, mix)
     for path in runs:
         run = conevo.Run(path)
-        length = run.config.world_params.iterations
-        if (run.config.task, length) == (
-            f"{world.name}/{world.environment}",
-            world.params.iterations,
-        ):
-            fixed += champion(run, f"{run.config.method} seed {run.config.run.seed}")
+        config = run.config
+        if config.environment == world.environment and config.world_params == world.params:
+            fixed += champion(run, f"{config.method} seed {config.run.seed}")
     networks = random_networks(world, N_RANDOM, seed, "measure_gacc")
     clones = random_clones(world, N_RANDOM, seed, "measure_gacc")
     return [(fixed, N_SCENARIOS), (networks, N_EPOCHS), (clones, N_EPOCHS)]
@@ -194,11 +155,6 @@ def measure(
                 row |= watch(world, teams.only(kind), keys_of(seed, N_WATCHED, "measure_gacc"))
             rows.append(row | {"name": setting})
     return rows
-
-
-def written(world: GaccWorld, mix: Mix) -> str:
-    """Return a mix in words."""
-    return ", ".join(f"{n} {name}" for name, n in zip(world.heuristics, mix, strict=True) if n)
 
 
 # --- tables ---------------------------------------------------------------------------------------
@@ -252,7 +208,7 @@ def main() -> None:
     rows, text = [], ""
     for number, (environment, iterations) in enumerate(CASES):
         world = world_of(environment, iterations=iterations)
-        mix = search(world, args.seed)
+        mix = best(world, args.seed)
         some = groups(world, mix, args.run, args.seed)
         found = measure(world, some, "default", args.seed, is_watched=True)
         next(row for row in found if row["teams"] == "best mix")["mix"] = written(world, mix)

@@ -27,8 +27,9 @@ FENCE = re.compile(
     re.DOTALL,
 )
 WORDS = "low|med|hi|move|rest|stop|forward|left|right|reverse|non-specialized"
+WORDS += "|[ABC]-(?:detector|gatherer|constructor)"
 CASTES = re.compile(rf"(?:\b(?:{WORDS}) \d+(?:, )?)+")
-CASTES_JSON = re.compile(r"\{(?:['\"][a-z-]+['\"]: \d+,? ?)+\}")
+CASTES_JSON = re.compile(r"\{(?:['\"][A-Za-z-]+['\"]: \d+,? ?)+\}")
 NUMBER = re.compile(r"-?\d[\d,.]*(?:e[-+]?\d+)?")
 SPAN = re.compile(r"# h # min|# min # s|# s\b")
 SPACE = re.compile(r"(?<=\[) +| +(?= )")

@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 
 import conevo
+from conevo.runs.shaping import start_shaping
 
 ROOT = Path(__file__).resolve().parent.parent
 EXECUTED = ("README.md", "docs/quickstart.md", "docs/worlds.md")
@@ -136,6 +137,44 @@ def test_runs_become_a_results_page_beside_heuristic_predators(tmp_path):
     assert f"| {sum(more) / 2:.1f} ± " in text
     assert text.count("| HomCNE |") == 4
     assert (tmp_path / "page.png").stat().st_size > 5000
+
+
+def test_construction_runs_and_shapings_become_a_results_page(tmp_path, monkeypatch):
+    pytest.importorskip("matplotlib")
+    make_results = script("make_results")
+    monkeypatch.setattr(sys.modules["mixes"], "ROUNDS", ((12, 2), (2, 2)))
+    few = {"run.generations": 2, "run.n_tests": 3, "method.genotypes": 10, "world.iterations": 200}
+    place = tmp_path / "runs"
+    run = conevo.evolve(
+        "gacc/complex-1", "homcne", "smoke", out=place / "complex-1-homcne-1", overrides=few,
+        threads=1,
+    )  # fmt: skip
+    shaping = start_shaping(
+        ["gacc/complex-1", "gacc/complex-2"], "homcne", "smoke", 1, place / "shaped-homcne-1", few,
+        threads=1,
+    ).resume(threads=1)  # fmt: skip
+    page = tmp_path / "page.md"
+    page.write_text("<!-- results -->\n<!-- end -->\n<!-- shaped -->\n<!-- end -->\n")
+    make_results.main(str(place), str(tmp_path / "page"))
+    with (tmp_path / "page.csv").open() as file:
+        rows = {row["run"]: row for row in csv.DictReader(file)}
+    assert list(rows) == [run.path.name, "best mix-s1", "non-specialized-s1", "random-s1"]
+    assert rows[run.path.name]["method"] == "homcne"
+    with (tmp_path / "page-shaped.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    for row, stage, first in zip(rows, shaping.stages, (0, 2), strict=True):
+        test = stage.test_result["champion"]
+        assert row["environment"] == stage.config.environment
+        assert int(row["first_generation"]) == first
+        delivered = test["performance"]["delivered"]["mean"]
+        assert float(row["delivered"]) == pytest.approx(delivered, 1e-5)
+    own = rows[-1]
+    assert own["delivered_of_last"] == own["delivered"]
+    text = page.read_text()
+    assert text.count("| HomCNE |") == 1
+    assert "| 2 | `complex-2` | 2–3 |" in text
+    for name in ("page.png", "page-shaped.png"):
+        assert (tmp_path / name).stat().st_size > 5000
 
 
 def test_a_page_without_markers_is_refused(tmp_path):

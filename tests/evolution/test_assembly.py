@@ -12,6 +12,8 @@ from conevo.evolution.assembly import (
     shared,
     systematic,
 )
+from conevo.evolution.methods.registry import method
+from conevo.evolution.protocol import Layout
 
 # Two populations in three slots: the first uses slots 0 and 2, the second slot 1.
 ACTIVE = np.array([[True, False, True], [False, True, False]])
@@ -122,3 +124,19 @@ def test_distinct_members_are_different_and_evenly_used():
     np.testing.assert_allclose(share, 1 / 7, atol=0.015)
     assert sorted(distinct(1, 7, 7, generator())[0]) == list(range(7))
     assert distinct(4, 0, 7, generator()).shape == (4, 0)
+
+
+def test_shared_rounds_are_told_apart_only_if_they_are_to_have_their_own_scenarios():
+    for name in ("ccga", "mesp", "cone"):
+        told = {}
+        for fresh in (False, True):
+            chosen = method(name, genotypes=4, evaluation="shared", rounds=3, fresh_rounds=fresh)
+            state = chosen.init(Layout(n_robots=2, n_hidden=2, max_hidden=3, n_genes=5), root=1)
+            told[fresh] = chosen.ask(state)
+        assert (told[False].rounds, told[True].rounds) == (1, 3)
+        np.testing.assert_array_equal(told[False].teams, told[True].teams)
+        for part in np.split(told[True].teams, 3):  # every genotype once in every round
+            used = part[part >= 0]
+            assert len(used) == len(np.unique(used)) == 2 * 2 * 4
+        alone = method(name, genotypes=4, evaluation="systematic", fresh_rounds=True)
+        assert alone.ask(alone.init(Layout(2, 2, 3, 5), root=1)).rounds == 1

@@ -70,3 +70,24 @@ def test_a_generation_shares_scenarios_and_all_fittest_teams_share_others() -> N
     assert not np.array_equal(counts("genotypes", 4), counts("genotypes", 5))
     assert counts("fittest", 4).shape[1] == 3
     np.testing.assert_array_equal(counts("fittest", 4), counts("fittest", 5))
+
+
+def test_each_round_of_trials_meets_scenarios_of_its_own() -> None:
+    """The first round those of the generation, every further one as many others."""
+    task = world("rover/complex-1", n_robots=3, iterations=60, n_hidden=2, max_hidden=2)
+    evaluate = make_evaluator(
+        Rollout(task, n_threads=1), task, seed=1, epochs=2, fittest_epochs=3, credit="robot"
+    )
+    genes = stream(1, "genes").uniform(-1, 1, (6, 23)).astype(np.float32)
+    team = np.arange(6, dtype=np.int32).reshape(1, 3, 2)
+    same = np.repeat(team, 4, axis=0)
+    in_rounds = evaluate(Trials("genotypes", 4, genes, same, rounds=2))
+    at_once = evaluate(Trials("genotypes", 4, genes, same))
+    played = in_rounds.outcome.counts
+    assert played.shape[:2] == (4, 2)
+    np.testing.assert_array_equal(played[:2], at_once.outcome.counts[:2])
+    np.testing.assert_array_equal(played[2], played[3])
+    assert not np.array_equal(played[0], played[2])
+    assert in_rounds.scores.fitness.shape == (4, 3)
+    for name, values in in_rounds.outcome.performance.items():
+        np.testing.assert_array_equal(values[:2], at_once.outcome.performance[name][:2])

@@ -197,6 +197,8 @@ def test_what_is_unknown_stays_unknown():
 
 FOUND = SMALL | {"needs_detection": True, "wait": 30}
 WIDE = {"object_range": 0.3, "robot_range": 0.4, "move_range": 0.02}
+PRICES = {"zone_side": 0.1, "object_cost": 0.03, "robot_cost": 0.02, "grip_cost": 0.04,
+          "move_cost": 0.05}  # fmt: skip
 # Environment, minds, robots, iterations, sides of the squares that robots and objects start in.
 CASES = [
     ("complex-1", "networks", 30, 100, 0.3, 0.3, SMALL | {"grip_distance": 0.05}),
@@ -205,7 +207,7 @@ CASES = [
     ("complex-9", "both", 30, 150, 0.3, 0.3, FOUND),
     ("complex-9", "heuristics", 30, 150, 0.3, 0.3, FOUND | {"wait": 3, "energy": 2.503}),
     ("complex-5", "heuristics", 30, 150, 0.25, 0.15, FOUND | {"wait": 6, "home_sight": 0.1}),
-    ("complex-8", "heuristics", 40, 120, 0.2, 0.2, SMALL | {"wait": 3, "home_sight": 0.2}),
+    ("complex-8", "heuristics", 40, 120, 0.2, 0.2, SMALL | PRICES | {"wait": 3, "home_sight": 0.2}),
     ("complex-2", "heuristics", 40, 200, 0.23, 0.23, SMALL | {"wait": 8, "move_range": 0.02}),
     ("complex-3", "heuristics", 30, 150, 0.2, 0.1, SMALL | {"wait": 8, "grip_distance": 0.05}),
     ("complex-7", "networks", 30, 120, 0.3, 0.3, SMALL | WIDE | {"grip_distance": 0.04}),

@@ -39,10 +39,19 @@ class SchemeConfig:
             published with.
         rounds: K, trials of each genotype under "shared". More makes fitness less noisy.
             Choice: 10, as ESP.
+        fresh_rounds: whether each round of "shared" is played in scenarios of its own: for the same
+            evaluations every genotype meets ``rounds`` times as many, and all meet the same ones.
+            Choice: off, so that all teams of a generation meet the same scenarios.
     """
 
     evaluation: Literal["systematic", "shared"] = "systematic"
     rounds: Annotated[int, Ge(1)] = 10
+    fresh_rounds: bool = False
+
+    @property
+    def n_parts(self) -> int:
+        """How many parts of a generation's teams have scenarios of their own."""
+        return self.rounds if self.evaluation == "shared" and self.fresh_rounds else 1
 
 
 def rows(active: BoolArray, choice: IntArray, n_genotypes: int, offset: int = 0) -> IntArray:

@@ -85,9 +85,12 @@ def pool(state: State) -> FloatArray:
     return state.genes.reshape(-1, state.genes.shape[-1])
 
 
-def trials(state: State, teams: IntArray, genes: FloatArray | None = None) -> Trials:
+def trials(
+    state: State, teams: IntArray, genes: FloatArray | None = None, rounds: int = 1
+) -> Trials:
     """Return ``teams`` as the state's trials, over its own pool unless another is given."""
-    return Trials(state.phase, state.generation, pool(state) if genes is None else genes, teams)
+    genes = pool(state) if genes is None else genes
+    return Trials(state.phase, state.generation, genes, teams, rounds)
 
 
 def count(state: State, asked: Trials, scores: Scores) -> State:

@@ -55,12 +55,15 @@ class Trials:
         generation: the generation they belong to.
         genes: [K, G] float32 pool of neuron genotypes.
         teams: [N, R, U] int32 rows of ``genes``: the neuron in robot r's slot k, -1 = empty slot.
+        rounds: the teams come in so many parts of equal length, each of which tries every genotype
+            once; each part is to be played in scenarios of its own.
     """
 
     phase: str
     generation: int
     genes: FloatArray
     teams: IntArray
+    rounds: int = 1
 
     def networks(self) -> FloatArray:
         """Return the genes of every neuron of every robot, [N, R, U, G]; empty slots are zero."""

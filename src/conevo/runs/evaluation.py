@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,7 +14,7 @@ from conevo.specialization import individual
 from conevo.worlds.protocol import Outcome, World
 from conevo.worlds.rollout import Rollout
 
-__all__ = ["Evaluation", "Portrait", "describe", "make_evaluator", "score"]
+__all__ = ["Evaluation", "Portrait", "describe", "join", "make_evaluator", "score"]
 
 
 @dataclass(frozen=True)
@@ -51,21 +51,43 @@ def make_evaluator(
     """Return the function that plays trials in a world.
 
     All trials of a generation meet the same ``epochs`` scenarios, addressed by seed, generation
-    and epoch, so a score depends neither on the batch nor on when it is computed. The fittest teams
-    of all generations meet the same ``fittest_epochs`` scenarios.
+    and epoch, so a score depends neither on the batch nor on when it is computed; if the trials
+    have rounds, so many further ones in each. The fittest teams of all generations meet the same
+    ``fittest_epochs`` scenarios.
     """
 
     def evaluate(trials: Trials) -> Evaluation:
         if trials.phase == "fittest":
             keys = [fold(seed, "fittest", epoch) for epoch in range(fittest_epochs)]
         else:
-            keys = [fold(seed, "epoch", trials.generation, epoch) for epoch in range(epochs)]
+            met = range(trials.rounds * epochs)
+            keys = [fold(seed, "epoch", trials.generation, epoch) for epoch in met]
         genes = np.asarray(trials.genes, dtype=np.float32)
         teams = np.asarray(trials.teams, dtype=np.int32)
-        outcome = rollout.evaluate(genes, teams, world.scenarios(keys))
+        scenarios = np.array_split(np.arange(len(keys)), trials.rounds)
+        outcome = join(
+            rollout.evaluate(genes, part, world.scenarios([keys[k] for k in its]))
+            for part, its in zip(np.split(teams, trials.rounds), scenarios, strict=True)
+        )
         return Evaluation(score(outcome, credit), outcome)
 
     return evaluate
+
+
+def join(parts: Iterable[Outcome]) -> Outcome:
+    """Return the outcomes of parts of the teams as one, in their order."""
+    several = list(parts)
+    if len(several) == 1:
+        return several[0]
+    return Outcome(
+        fitness=np.concatenate([one.fitness for one in several]),
+        counts=np.concatenate([one.counts for one in several]),
+        switches=np.concatenate([one.switches for one in several]),
+        performance={
+            name: np.concatenate([one.performance[name] for one in several])
+            for name in several[0].performance
+        },
+    )
 
 
 def score(outcome: Outcome, credit: str = "robot") -> Scores:

@@ -93,8 +93,8 @@ from conevo.rng import stream
 from conevo.worlds.gacc_dynamics import FUNCTIONS
 from conevo.worlds.gacc_plans import TYPES, Plan, plan
 from conevo.worlds.gacc_senses import N_SENSORS
-from conevo.worlds.gacc_state import N_CASTES, Params, Scene, Team
-from conevo.worlds.protocol import Simulation
+from conevo.worlds.gacc_state import Params, Scene, Team
+from conevo.worlds.protocol import Scenarios, Simulation
 
 __all__ = ["GaccParams", "GaccScenarios", "GaccWorld"]
 
@@ -139,7 +139,6 @@ class GaccParams:
 
     def __post_init__(self) -> None:
         for low, high in (
-            ("n_hidden", "max_hidden"),
             ("zone_side", "home_side"),
             ("obstacle_least", "obstacle_most"),
         ):
@@ -150,13 +149,13 @@ class GaccParams:
                 )
 
 
-@dataclass(frozen=True)
-class GaccScenarios:
+@dataclass(frozen=True, kw_only=True)
+class GaccScenarios(Scenarios):
     """E scenarios of one environment; lengths in sides of the square.
 
     object_x, object_y [E, K] float32; object_type [E, K] int32 (0..2 for A..C, in this order);
     left, bottom, right, top [E, obstacles] float32; start_x, start_y [E, R] float32; plan [C, 10]
-    int32, type of every part of every complex object; seed [E] uint64.
+    int32, type of every part of every complex object.
     """
 
     object_x: npt.NDArray[np.float32]
@@ -169,11 +168,6 @@ class GaccScenarios:
     start_x: npt.NDArray[np.float32]
     start_y: npt.NDArray[np.float32]
     plan: npt.NDArray[np.int32]
-    seed: npt.NDArray[np.uint64]
-
-    def __len__(self) -> int:
-        """Return the number of scenarios."""
-        return len(self.seed)
 
 
 @dataclass(frozen=True)
@@ -207,11 +201,6 @@ class GaccWorld:
     def n_robots(self) -> int:
         """Number of robots."""
         return self.params.n_robots
-
-    @property
-    def iterations(self) -> int:
-        """Iterations of one epoch."""
-        return self.params.iterations
 
     @property
     def plan(self) -> Plan:
@@ -325,18 +314,12 @@ class GaccWorld:
         params.needs_detection = int(p.needs_detection)
         params.min_distance_2 = p.min_distance**2
         params.separation_2 = p.separation**2
-        r, k, c = p.n_robots, plan.parts.size, len(plan.parts)
-        per_robot = (
-            "x y to_x to_y action chosen target held waited dropped situation heuristic energy "
-            "fitness switches"
-        ).split()
+        c = len(plan.parts)
         per_object = "object_x object_y life detected part holders".split()
         return Simulation(
             state=Team,
-            sizes=dict.fromkeys(per_robot, r)
-            | dict.fromkeys(per_object, k)
-            | {"counts": r * int(N_CASTES), "built": c, "missing": 3 * c}
-            | {"demand": 3, "performance": len(self.performance)},
+            sizes=dict.fromkeys(per_object, plan.parts.size)
+            | {"built": c, "missing": 3 * c, "demand": 3},
             scene=Scene,
             params_type=Params,
             params=params,

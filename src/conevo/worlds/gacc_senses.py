@@ -10,6 +10,7 @@ import warp as wp
 from conevo.kernels.geometry import octant
 from conevo.kernels.network import first_input
 from conevo.kernels.random import uniform
+from conevo.kernels.sensing import closest_in_octants, mark
 from conevo.worlds.gacc_state import (
     MOVE,
     UNDETECTED,
@@ -104,25 +105,26 @@ def look_around(team: Team, scene: Scene, p: Params, i: int) -> octants:
     """Return the eight robot sensors: what the closest robot carries (eq. 6.3), 0 if nothing."""
     x = team.x[i]
     y = team.y[i]
-    closest = octants()
-    reading = octants()
-    for o in range(8):
-        closest[o] = p.robot_range_2
+    seen = wp.uint64(0)
     j = int(0)
     while j < p.n_robots:
         dx = team.x[j] - x
         dy = team.y[j] - y
-        d2 = dx * dx + dy * dy
-        if d2 < p.robot_range_2 and j != i:
-            o = octant(dx, dy)
-            if d2 < closest[o]:
-                if not is_blocked(scene, x, y, dx, dy):
-                    closest[o] = d2
-                    reading[o] = 0.0
-                    k = team.held[j]
-                    if k >= 0:
-                        reading[o] = float(scene.object_type[k] + 1) / 3.0 * nearness(p, d2)
+        if dx * dx + dy * dy < p.robot_range_2 and j != i:
+            if not is_blocked(scene, x, y, dx, dy):
+                seen = mark(seen, j)
         j += 1
+    closest = closest_in_octants(team.x, team.y, seen, x, y, p.robot_range_2)
+    reading = octants()
+    for o in range(8):
+        j = closest[o]
+        if j >= 0:
+            k = team.held[j]
+            if k >= 0:
+                dx = team.x[j] - x
+                dy = team.y[j] - y
+                near = nearness(p, dx * dx + dy * dy)
+                reading[o] = float(scene.object_type[k] + 1) / 3.0 * near
     return reading
 
 

@@ -9,7 +9,9 @@ rules and the choices stand on the cards of the two worlds.
 
 import warp as wp
 
+from conevo.kernels.actions import begin_counting, count_action
 from conevo.kernels.khepera import RADIUS, drive
+from conevo.kernels.network import first_input
 from conevo.worlds.pursuit_bodies import (
     NONE,
     Params,
@@ -59,11 +61,8 @@ def reset(team: Team, scene: Scene, p: Params, i: int) -> None:
         team.captured[q] = 0
         team.captures[q] = 0
         q += p.n_robots
-    team.action[i] = NONE
     team.fitness[i] = 0.0
-    team.switches[i] = 0
-    for a in range(N_ACTIONS):
-        team.counts[i * N_ACTIONS + a] = 0
+    begin_counting(team.action, team.switches, team.counts, i)
     if i == 0:
         team.first[0] = NONE
 
@@ -75,7 +74,7 @@ def reset(team: Team, scene: Scene, p: Params, i: int) -> None:
 def sense(team: Team, scene: Scene, p: Params, i: int, t: int) -> None:
     """Fill robot ``i``'s sensor inputs, and those of prey that are not the team."""
     n_sensors = scene.clamp.shape[1]
-    base = i * (team.nets.inputs.shape[0] // p.n_robots)
+    base = first_input(team.nets, i)
     seen = look(team, scene, p, i, False)
     for k in range(8):
         team.nets.inputs[base + k] = seen[k]
@@ -196,14 +195,9 @@ def commit(team: Team, scene: Scene, p: Params, i: int, t: int) -> None:
             team.moved[at] = wp.where(is_out == 0, d, 0.0)
         if b == i:
             a = primitive(team.left[b], team.right[b])
-            previous = team.action[i]
             if p.team_is_prey != 0 and was_out != 0:
                 a = NONE
-            else:
-                team.counts[i * N_ACTIONS + a] = team.counts[i * N_ACTIONS + a] + 1
-                if previous != NONE and previous != a:
-                    team.switches[i] = team.switches[i] + 1
-            team.action[i] = a
+            count_action(team.action, team.switches, team.counts, i, a, a)
         b += p.n_robots
 
 

@@ -9,9 +9,12 @@ of such a ``range`` in memory (the whole kernel was 1.2 to 1.3 times as fast wit
 
 import warp as wp
 
+from conevo.kernels.actions import NONE, begin_counting, count_action, heuristic_action
 from conevo.kernels.geometry import COVER_CELLS, COVER_WORDS, cover_disc, covered_by_any, octant
-from conevo.kernels.network import Networks, sigmoid
+from conevo.kernels.network import Networks, first_input, highest
 from conevo.kernels.random import uniform
+from conevo.kernels.sensing import closest_in_octants, is_marked, mark
+from conevo.kernels.steps import is_taken, random_step, steered_step
 from conevo.worlds import canals
 
 __all__ = [
@@ -27,7 +30,6 @@ __all__ = [
 
 N_ACTIONS = wp.constant(4)
 MOVE = wp.constant(3)
-NONE = wp.constant(-1)
 ROCK_CELLS = wp.constant(40)  # grid over the rocks; 0.025 wide, so a disc needs few cells
 CANAL_CELLS = wp.constant(canals.N_CELLS)
 UNDETECTED = wp.constant(2**31 - 1)
@@ -103,16 +105,13 @@ def reset(team: Team, scene: Scene, p: Params, i: int) -> None:
     """Put rover ``i`` at its start and clear its share of what is recorded."""
     team.x[i] = scene.start_x[i]
     team.y[i] = scene.start_y[i]
-    team.action[i] = NONE
     team.setting[i] = 0
     team.energy[i] = p.energy
     team.covered[i] = 0
     team.covered_range[i] = 0.0
     team.value[i] = 0.0
     team.fitness[i] = 0.0
-    team.switches[i] = 0
-    for a in range(N_ACTIONS):
-        team.counts[i * N_ACTIONS + a] = 0
+    begin_counting(team.action, team.switches, team.counts, i)
     for word in range(COVER_WORDS):
         team.cover[i * COVER_WORDS + word] = wp.uint64(0)
     for k in range(i, team.detected.shape[0], p.n_robots):
@@ -137,35 +136,29 @@ def sense(team: Team, scene: Scene, p: Params, i: int, t: int) -> None:
     """
     if team.energy[i] <= 0.0:
         return
-    base = i * (team.nets.inputs.shape[0] // p.n_robots)
+    base = first_input(team.nets, i)
     x = team.x[i]
     y = team.y[i]
     for k in range(16):
         team.nets.inputs[base + k] = 0.0
-    near = int(0)
+    near = wp.uint64(0)
     j = int(0)
     while j < p.n_robots:
         dx = team.x[j] - x
         dy = team.y[j] - y
-        near += int(dx * dx + dy * dy < p.rover_range_2)
+        if dx * dx + dy * dy < p.rover_range_2 and j != i:
+            near = mark(near, j)
         j += 1
-    if near > 1:
+    if near != wp.uint64(0):
+        closest = closest_in_octants(team.x, team.y, near, x, y, p.rover_range_2)
         for o in range(8):
-            closest = float(p.rover_range_2)
-            setting = int(0)
-            j = int(0)
-            while j < p.n_robots:
+            j = closest[o]
+            if j >= 0:
                 dx = team.x[j] - x
                 dy = team.y[j] - y
-                d2 = dx * dx + dy * dy
-                if j != i and d2 < closest:
-                    if octant(dx, dy) == o:
-                        closest = d2
-                        setting = team.setting[j] + 1
-                j += 1
-            team.nets.inputs[base + o] = (
-                float(setting) * p.min_distance_2 / (3.0 * wp.max(closest, p.min_distance_2))
-            )
+                d2 = wp.max(dx * dx + dy * dy, p.min_distance_2)
+                setting = float(team.setting[j] + 1)
+                team.nets.inputs[base + o] = setting * p.min_distance_2 / (3.0 * d2)
     a = team.action[i]
     if a != NONE and a < MOVE:
         r = p.ranges[a]
@@ -204,14 +197,7 @@ def is_refused(team: Team, scene: Scene, p: Params, i: int, x: float, y: float) 
     n = float(CANAL_CELLS)
     if scene.canal[int(y * n), int(x * n)] != wp.uint8(0):
         return True
-    close = int(0)
-    j = int(0)
-    while j < p.n_robots:
-        dx = team.x[j] - x
-        dy = team.y[j] - y
-        close += int(dx * dx + dy * dy < p.separation_2 and j != i)
-        j += 1
-    return close > 0
+    return is_taken(team.x, team.y, p.n_robots, i, x, y, p.separation_2)
 
 
 @wp.func
@@ -225,34 +211,22 @@ def act(team: Team, scene: Scene, p: Params, i: int, t: int) -> None:
     if team.energy[i] <= 0.0:
         team.chosen[i] = NONE
         return
-    a = int(0)
-    dx = float(0.0)
-    dy = float(0.0)
+    a = int(MOVE)
+    step = wp.vec2f(0.0, 0.0)
     h = team.heuristic[i]
     if h >= 0:
-        u = uniform(scene.seed[0], t, HEURISTIC, i)
-        if h < 3:
-            a = wp.where(u < 0.7, h, MOVE)
-        else:
-            a = wp.min(int(u * 4.0), MOVE)
-        turn = uniform(scene.seed[0], t, HEURISTIC + 1, i) * 6.2831853
-        dx = p.move_range * wp.cos(turn)
-        dy = p.move_range * wp.sin(turn)
+        own = wp.where(h < 3, h, NONE)
+        a = heuristic_action(uniform(scene.seed[0], t, HEURISTIC, i), own, MOVE, N_ACTIONS)
+        step = random_step(uniform(scene.seed[0], t, HEURISTIC + 1, i), p.move_range)
     else:
-        sums = team.nets.sums[i]
-        best = sums[0]
-        for k in range(1, 5):
-            if sums[k] > best:
-                best = sums[k]
-                a = wp.min(k, MOVE)
+        a = wp.min(highest(team.nets, i, 5), MOVE)  # outputs 3 and 4: move
         if a == MOVE:
-            # Choice: "normalized and scaled" (5.2): both at an extreme make the largest step.
-            dx = p.move_range * 1.4142135 * (sigmoid(sums[3]) - 0.5)
-            dy = p.move_range * 1.4142135 * (sigmoid(sums[4]) - 0.5)
+            sums = team.nets.sums[i]
+            step = steered_step(sums[3], sums[4], p.move_range)
     team.chosen[i] = a
     if a == MOVE:
-        x = team.x[i] + dx
-        y = team.y[i] + dy
+        x = team.x[i] + step[0]
+        y = team.y[i] + step[1]
         if not is_refused(team, scene, p, i, x, y):
             team.to_x[i] = x
             team.to_y[i] = y
@@ -265,22 +239,14 @@ def commit(team: Team, scene: Scene, p: Params, i: int, t: int) -> None:
     Choice: of two rovers that propose the same place, the one with the lower number gets it.
     """
     a = team.chosen[i]
-    previous = team.action[i]
-    team.action[i] = a
+    count_action(team.action, team.switches, team.counts, i, a, a)
     if a == NONE:
         return
     x = team.to_x[i]
     y = team.to_y[i]
     if a == MOVE:
         if x != team.x[i] or y != team.y[i]:
-            close = int(0)
-            j = int(0)
-            while j < i:
-                dx = team.to_x[j] - x
-                dy = team.to_y[j] - y
-                close += int(dx * dx + dy * dy < p.separation_2)
-                j += 1
-            if close == 0:
+            if not is_taken(team.to_x, team.to_y, i, i, x, y, p.separation_2):
                 team.x[i] = x
                 team.y[i] = y
                 team.covered_range[i] = 0.0
@@ -288,9 +254,6 @@ def commit(team: Team, scene: Scene, p: Params, i: int, t: int) -> None:
     else:
         team.setting[i] = a
         team.energy[i] = team.energy[i] - p.rover_cost - p.cost[a]
-    if previous != NONE and previous != a:
-        team.switches[i] = team.switches[i] + 1
-    team.counts[i * N_ACTIONS + a] = team.counts[i * N_ACTIONS + a] + 1
 
 
 # --- resolve --------------------------------------------------------------------------------------
@@ -332,7 +295,7 @@ def resolve(team: Team, scene: Scene, p: Params, i: int, t: int) -> None:
             dy = team.y[j] - y
             reach = r + p.ranges[b]
             if dx * dx + dy * dy < reach * reach:
-                mates = mates | (wp.uint64(1) << wp.uint64(j))
+                mates = mark(mates, j)
         j += 1
     if mates == wp.uint64(0):
         return
@@ -374,7 +337,7 @@ def is_paired(
     r = p.ranges[need]
     j = int(0)
     while j < p.n_robots:
-        if ((mates >> wp.uint64(j)) & wp.uint64(1)) != wp.uint64(0) and team.action[j] == need:
+        if is_marked(mates, j) and team.action[j] == need:
             dx = scene.rock_x[k] - team.x[j]
             dy = scene.rock_y[k] - team.y[j]
             if dx * dx + dy * dy < r * r:

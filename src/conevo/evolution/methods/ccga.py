@@ -72,7 +72,7 @@ class Ccga:
         generator = stream(state.root, "teams", state.generation)
         if config.evaluation == "shared":
             teams = shared(state.active, m, config.rounds, generator, networks=True)
-            return trials(state, teams)
+            return trials(state, teams, rounds=config.n_parts)
         n_robots, n_kept = len(state.active), state.partners.shape[2]
         n_from, offset = (n_kept, len(pool(state))) if n_kept else (m, 0)
         choice = generator.integers(n_from, size=(n_robots * m, n_robots, 1), dtype=np.int32)

@@ -80,7 +80,8 @@ class Mesp:
         if state.phase == "genotypes":
             generator = stream(state.root, "teams", state.generation)
             if self.config.evaluation == "shared":
-                return trials(state, shared(state.active, m, self.config.rounds, generator))
+                teams = shared(state.active, m, self.config.rounds, generator)
+                return trials(state, teams, rounds=self.config.n_parts)
             return trials(state, systematic(state.active, m, generator))
         fittest = best_team(state.active, state.elite, m)
         if state.phase == "lesion":

@@ -1,0 +1,55 @@
+"""The best team of heuristic robots in gathering and construction, found by a search.
+
+The ten teams of one heuristic and random mixes, 200 in all, play a few scenarios; those that
+deliver most go on to the next round, in more and fresh ones (``ROUNDS``).
+"""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+
+from conevo.rng import stream
+from conevo.worlds.gacc import GaccWorld
+from teams import Teams, controlled, keys_of, play
+
+ROUNDS = ((200, 10), (20, 50), (5, 200))  # mixes and scenarios of each
+Mix = tuple[int, ...]  # robots of each heuristic
+
+
+def candidate(world: GaccWorld, seed: int, k: int) -> Mix:
+    """Return the teams of one heuristic first, then random shares of those that can be of use."""
+    if k < len(world.heuristics):
+        return tuple(world.n_robots * (h == k) for h in range(len(world.heuristics)))
+    types = sorted(set(world.plan.parts.ravel().tolist()))
+    useful = [3 * row + kind for row in range(3) for kind in types] + [9]
+    rng = stream(seed, "mixes", world.environment, k)
+    mix = np.zeros(len(world.heuristics), dtype=int)
+    mix[useful] = rng.multinomial(world.n_robots, rng.dirichlet(np.full(len(useful), 0.5)))
+    return tuple(mix.tolist())
+
+
+def team_of(world: GaccWorld, mix: Mix, kind: str = "best mix") -> Teams:
+    """Return the team of a mix."""
+    return controlled(world, kind, np.repeat(np.arange(len(mix)), mix))
+
+
+def written(world: GaccWorld, mix: Mix) -> str:
+    """Return a mix in words."""
+    return ", ".join(f"{n} {name}" for name, n in zip(world.heuristics, mix, strict=True) if n)
+
+
+@cache
+def best(world: GaccWorld, seed: int = 1) -> Mix:
+    """Return the mix that delivers most."""
+    mixes = list(dict.fromkeys(candidate(world, seed, k) for k in range(ROUNDS[0][0])))
+    for number, (n_mixes, n_scenarios) in enumerate(ROUNDS):
+        mixes = mixes[:n_mixes]
+        teams = team_of(world, mixes[0])
+        for mix in mixes[1:]:
+            teams += team_of(world, mix)
+        keys = keys_of(seed, n_scenarios, "mixes", str(number))
+        delivered = play(world, teams, keys).performance["delivered"].mean(axis=1)
+        mixes = [mixes[k] for k in np.argsort(-delivered, kind="stable")]
+    return mixes[0]
