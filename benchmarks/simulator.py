@@ -21,6 +21,7 @@ from conevo.worlds.rollout import Rollout
 from machine import alternate, machine, spread, table
 
 SEED = 2009
+WORLDS = ("rover/complex-5", "pursuit/team-3", "gacc/complex-9")
 
 
 def workload(world: World, rollout: Rollout, batch: int) -> Callable[[], float]:
@@ -59,7 +60,7 @@ def label(world: World) -> str:
 def main() -> None:
     """Measure every world with every batch and number of threads, in turns; print the tables."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--world", nargs="+", default=["rover/complex-5", "pursuit/team-3"])
+    parser.add_argument("--world", nargs="+", default=WORLDS)
     parser.add_argument("--iterations", type=int, help="of an epoch; by default the world's own")
     parser.add_argument("--batch", type=int, nargs="+", default=[64, 512])
     parser.add_argument("--threads", type=int, nargs="+", default=[1, 2])

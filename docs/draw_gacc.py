@@ -28,7 +28,7 @@ ENVIRONMENT = "complex-5"
 # Colours of Okabe and Ito (2008), which differ in lightness too; every type has its own marker.
 TYPES = (("A", "#0072B2", "o"), ("B", "#E69F00", "s"), ("C", "#B3446C", "^"))
 ROBOT = "#3A3A3A"
-MIX = (2, 0, 2, 9, 2, 7, 3, 0, 3, 2)  # robots of each heuristic
+MIX = (0, 0, 0, 15, 8, 6, 0, 0, 0, 1)  # robots of each heuristic: gatherers do best
 
 
 def draw_place(ax, world, scene):
@@ -137,7 +137,7 @@ def main():
     """Write ``pictures/gacc.png``."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--run", help="whose champion plays; by default heuristic robots do")
-    parser.add_argument("--seed", type=int, default=1, help="of the epoch")
+    parser.add_argument("--seed", type=int, default=11, help="of the epoch")
     options = parser.parse_args()
     if options.run:
         run = conevo.Run(options.run)

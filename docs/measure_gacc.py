@@ -160,9 +160,9 @@ def measure(
 # --- tables ---------------------------------------------------------------------------------------
 
 
-def percent(share: float) -> str:
-    """Return a share as a percentage with two digits that count."""
-    return f"{100 * share:.2g} %"
+def percent(value: float) -> str:
+    """Return a percentage with at most two digits that count."""
+    return f"{value:.0f} %" if value >= 10 else f"{value:.2g} %"
 
 
 def bars_table(rows: list[Row]) -> str:
@@ -175,8 +175,8 @@ def bars_table(rows: list[Row]) -> str:
             nothing.append(row["teams"])
             continue
         line = [row["teams"], row["n_teams"], f"{row['delivered']:.3g} ± {row['se']:.2g}"]
-        line += [f"{row['optimum']:.2g} %", percent(row["epochs_with_any"])]
-        line += [percent(row["teams_with_any"]) if row["n_teams"] > 1 else "–"]
+        line += [percent(row["optimum"]), percent(100 * row["epochs_with_any"])]
+        line += [percent(100 * row["teams_with_any"]) if row["n_teams"] > 1 else "–"]
         lines.append([*line, *(f"{row[fate]:.0f} %" for fate in FATES)])
     text = pages.table(head, lines)
     return text + (f"\nNothing at all: {', '.join(nothing)}.\n" if nothing else "")
@@ -221,15 +221,14 @@ def main() -> None:
             f"{environment}, {iterations}: {written(world, mix)}\n{bars_table(found)}", flush=True
         )
         if number == 0:
-            varied = some
+            alone = range(len(world.heuristics) - 1)  # but the non-specialized
+            varied = [(some[0][0].without(alone), N_SCENARIOS), *some[1:]]
     found = []
     for name, changed in settings().items():
         world = world_of(CASES[0][0], iterations=CASES[0][1], **changed)
         found += measure(world, varied, name, args.seed, is_watched=False)
         print(name, flush=True)
     kinds = [kind for teams, _ in varied for kind in dict.fromkeys(teams.kinds)]
-    most = {kind: max(row["most"] for row in found if row["teams"] == kind) for kind in kinds}
-    kinds = [kind for kind in kinds if most[kind] > 0]
     numbers = [{k: v for k, v in row.items() if k != "name"} for row in rows + found]
     pages.write(numbers, PAGE.with_suffix(".csv"))
     pages.put(text, PAGE, "bars")

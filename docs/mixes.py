@@ -1,7 +1,7 @@
 """The best team of heuristic robots in gathering and construction, found by a search.
 
-The ten teams of one heuristic and random mixes, 200 in all, play a few scenarios; those that
-deliver most go on to the next round, in more and fresh ones (``ROUNDS``).
+The ten teams of one heuristic and 190 random mixes play a few scenarios; those that deliver most go
+on to the next round, in more and fresh ones (``ROUNDS``).
 """
 
 from __future__ import annotations

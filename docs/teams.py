@@ -40,6 +40,12 @@ class Teams:
         some = self.of(kind)
         return Teams(self.genes, self.slots[some], self.heuristic[some], (kind,) * len(some))
 
+    def without(self, numbers: Sequence[int]) -> Teams:
+        """Return all teams but those with these numbers."""
+        some = [n for n in range(len(self.kinds)) if n not in numbers]
+        kinds = tuple(self.kinds[n] for n in some)
+        return Teams(self.genes, self.slots[some], self.heuristic[some], kinds)
+
     def __add__(self, other: Teams) -> Teams:
         """Return the teams of both."""
         moved = np.where(other.slots >= 0, other.slots + len(self.genes), -1).astype(np.int32)

@@ -250,6 +250,29 @@ def test_kills_between_and_within_the_stages_are_not_noticed(tmp_path: Path) -> 
     assert list(path.glob(".*")) == []
 
 
+def test_kills_while_construction_is_learned_in_turn_are_not_noticed(tmp_path: Path) -> None:
+    """The environments differ in objects, obstacles and what is to be built, not in teams."""
+    tasks, path = tasks_up_to("gacc/complex-4"), tmp_path / "killed"
+    settings = tiny_settings("cone", tasks[0]) | {"run.generations": 2, "world.iterations": 150}
+    arguments = ["run", "gacc/complex-4", "--shape", *command(path, settings)]
+    for begun, pattern in (
+        (1, r"stage-1/checkpoint-b"),
+        (1, r"/\.stage-2\.\w+/config\.toml"),  # between two stages
+        (3, r"stage-3/generations\.jsonl$"),
+        (4, r"stage-4/test\.json"),
+    ):
+        killed_at(pattern, *arguments)
+        assert len(Shaping(path).stages) == begun, pattern
+        arguments = ["resume", str(path)]
+    Shaping(path).resume(threads=2)
+    whole = start_shaping(tasks, "cone", "smoke", out=tmp_path / "whole", overrides=settings)
+    assert stages_content(path) == stages_content(whole.resume(threads=1).path)
+    seen = Shaping(path).generations()
+    assert [(one["number"], one["task"]) for one in seen] == [
+        (number, tasks[number // 2]) for number in range(8)
+    ]
+
+
 def test_an_interrupted_stage_can_also_be_finished_by_itself(tmp_path: Path) -> None:
     shaping = begin(tmp_path / "shaped")
     interrupt(shaping, stage=2)

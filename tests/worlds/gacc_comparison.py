@@ -165,8 +165,8 @@ def compare(a_world, genes, slots, scenarios, heuristic, seen=None):
     if seen is None:
         seen = rollout.record(genes, slots, scenarios, heuristic)
     w = build(a_world, genes, slots, scenarios, heuristic)
-    tally = Tally(steps=a_world.iterations)
-    for t in range(a_world.iterations):
+    tally = Tally(steps=a_world.params.iterations)
+    for t in range(a_world.params.iterations):
         check_iteration(w, seen, t, tally)
         tally.events.update(f"demand {k}" for k in demands(w))
     out = rollout.evaluate(genes, slots[None], scenarios, heuristic[None])

@@ -37,7 +37,7 @@ def check_places(a_world, scenarios, seen):
         assert seen[x].max() < 1
         assert seen[y].max() < 1
         assert not within(s, seen[x], seen[y]).any()
-    for t in range(0, a_world.iterations, 10):
+    for t in range(0, a_world.params.iterations, 10):
         x, y = seen["x"][t].astype(float), seen["y"][t].astype(float)
         gaps = np.hypot(x[:, None] - x, y[:, None] - y) + np.eye(len(x))
         assert gaps.min() >= p.separation * (1 - 1e-4)

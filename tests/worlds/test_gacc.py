@@ -59,7 +59,7 @@ def test_what_there_is_to_build(environment):
 def test_names_and_sizes():
     a_world = world("gacc/complex-9")
     assert a_world.n_robots == 30
-    assert a_world.iterations == 3000
+    assert a_world.params.iterations == 3000
     spec = a_world.controller
     assert (spec.n_sensors, spec.n_context, spec.n_hidden, spec.n_outputs) == (27, 10, 10, 8)
     assert (spec.n_genes, spec.bias) == (45, True)

@@ -294,7 +294,7 @@ def test_an_epoch_without_correction_stays_with_the_oracle(number):
     a_world, *rest = setup(number)
     seen = Rollout(a_world, n_threads=1).record(*rest)
     w = build(a_world, *rest)
-    oracle.run(w, a_world.iterations)
+    oracle.run(w, a_world.params.iterations)
     assert [r.action for r in w.robots] == seen["action"][-1].tolist()
     assert [r.x for r in w.robots] == pytest.approx(seen["x"][-1].tolist(), abs=1e-4)
     assert [block.life for block in w.objects] == seen["life"][-1].tolist()

@@ -37,6 +37,8 @@ DELIVERED  a part of a complex object       nothing
 DROPPED    lies where a robot let it go     GRIPPED outside, WAITING or more in the home area
 =========  ===============================  ====================================================
 
+States are those at the end of an iteration: what is gripped and let go in one has not changed.
+
 **One iteration.** Every robot senses and chooses where all were at the end of the iteration before;
 then all move and grip; then a referee looks at what is held in the home area.
 
@@ -66,7 +68,8 @@ Choices, all declared in ``GaccParams`` or here:
 - Choice: an obstacle blocks the view of other robots too, not of the home area or of the demand.
 - Choice: where several complex objects need a type, the first of them gets it; of several objects
   that are ready in one iteration, the first comes first.
-- Choice: walls and obstacles are sensed where they are closest, with a negative reading.
+- Choice: walls and obstacles are sensed where they are closest, with a negative reading. The bound
+  of eq. 6.1 limits a reading, not which thing is the closest.
 - Choice: a step is refused by where it ends; obstacles are too wide to be jumped over.
 
 **Castes** (6.1.1) go by how a robot spends its time: activating its detection sensors; gripping or
@@ -94,6 +97,7 @@ from conevo.worlds.gacc_dynamics import FUNCTIONS
 from conevo.worlds.gacc_plans import TYPES, Plan, plan
 from conevo.worlds.gacc_senses import N_SENSORS
 from conevo.worlds.gacc_state import Params, Scene, Team
+from conevo.worlds.places import draw_places
 from conevo.worlds.protocol import Scenarios, Simulation
 
 __all__ = ["GaccParams", "GaccScenarios", "GaccWorld"]
@@ -222,7 +226,7 @@ class GaccWorld:
         """Return one scenario per key: obstacles, objects and starts at random places.
 
         Raises:
-            UsageError: no room for an obstacle.
+            UsageError: no room for the obstacles, or for the robots.
         """
         plan = self.plan
         drawn = [self._draw(key, plan) for key in keys]
@@ -232,9 +236,16 @@ class GaccWorld:
     def _draw(self, key: int, plan: Plan) -> dict[str, npt.NDArray[Any]]:
         rng = stream(key, self.name)
         blocks = self._obstacles(rng, plan.n_obstacles)
+        edge = self.params.home_side / 2 + 1e-6  # more than float32 rounds
+
+        def is_free(place: npt.NDArray[np.float32]) -> bool:
+            if (np.abs(place - np.float32(0.5)) <= edge).all():
+                return False
+            return not ((place >= blocks[:, :2]) & (place <= blocks[:, 2:])).all(axis=1).any()
+
         types = plan.object_types
-        objects = self._free_places(rng, len(types), blocks, 0.0)
-        starts = self._free_places(rng, self.n_robots, blocks, self.params.separation)
+        objects = draw_places(rng, len(types), 0.0, is_free)
+        starts = draw_places(rng, self.n_robots, self.params.separation, is_free)
         left, bottom, right, top = np.ascontiguousarray(blocks.T)
         return {
             "object_x": objects[:, 0],
@@ -253,40 +264,17 @@ class GaccWorld:
         p = self.params
         half = p.home_side / 2
         gap = p.obstacle_gap
-        taken = [np.array([0.5 - half, 0.5 - half, 0.5 + half, 0.5 + half])]
+        taken = np.array([[0.5 - half, 0.5 - half, 0.5 + half, 0.5 + half]])
         for _ in range(10_000):
             if len(taken) > n:
-                return np.array(taken[1:], dtype=np.float32).reshape(n, 4)
+                return taken[1:].astype(np.float32)
             sides = rng.uniform(p.obstacle_least, p.obstacle_most, 2)
             corner = rng.uniform(gap, 1 - gap - sides)
             block = np.concatenate([corner, corner + sides])
-            if all(
-                np.any(block[:2] > other[2:] + gap) or np.any(block[2:] < other[:2] - gap)
-                for other in taken
-            ):
-                taken.append(block)
+            beyond = (block[:2] > taken[:, 2:] + gap) | (block[2:] < taken[:, :2] - gap)
+            if beyond.any(axis=1).all():
+                taken = np.vstack([taken, block])
         raise UsageError(f"the square has no room for {n} obstacles, {gap:g} apart")
-
-    def _free_places(
-        self,
-        rng: np.random.Generator,
-        n: int,
-        blocks: npt.NDArray[np.float32],
-        separation: float,
-    ) -> npt.NDArray[np.float32]:
-        """Draw places [n, 2] outside the home area and all obstacles, apart from each other."""
-        edge = self.params.home_side / 2 + 1e-6  # more than float32 rounds
-        places: list[npt.NDArray[np.float32]] = []
-        while len(places) < n:
-            place = rng.random(2, dtype=np.float32)
-            is_out = bool(np.any(np.abs(place - np.float32(0.5)) > edge))
-            in_block = (place >= blocks[:, :2]) & (place <= blocks[:, 2:])
-            is_free = not in_block.all(axis=1).any()
-            if is_out and is_free:
-                gaps = [float(np.sum((place - other) ** 2)) for other in places]
-                if all(gap >= separation**2 for gap in gaps):
-                    places.append(place)
-        return np.array(places)
 
     def simulation(self) -> Simulation:
         """Return the Warp side of this world."""

@@ -49,6 +49,7 @@ from conevo.controllers import ControllerSpec
 from conevo.kernels.geometry import COVER_WORDS
 from conevo.rng import stream
 from conevo.worlds import canals, rocks
+from conevo.worlds.places import draw_places
 from conevo.worlds.protocol import Scenarios, Simulation
 from conevo.worlds.rover_dynamics import FUNCTIONS, ROCK_CELLS, Params, Scene, Team
 
@@ -181,16 +182,12 @@ class RoverWorld:
         self, rng: np.random.Generator, mask: npt.NDArray[np.bool_]
     ) -> npt.NDArray[np.float32]:
         """Draw places outside the canals, no two rovers on the same one."""
-        starts: list[npt.NDArray[np.float32]] = []
-        while len(starts) < self.n_robots:
-            place = rng.random(2, dtype=np.float32)
+
+        def is_free(place: npt.NDArray[np.float32]) -> bool:
             column, row = (place * np.float32(canals.N_CELLS)).astype(int)
-            apart = all(
-                float(np.sum((place - other) ** 2)) >= self.params.separation**2 for other in starts
-            )
-            if apart and not mask[row, column]:
-                starts.append(place)
-        return np.array(starts)
+            return not mask[row, column]
+
+        return draw_places(rng, self.n_robots, self.params.separation, is_free)
 
     def simulation(self) -> Simulation:
         """Return the Warp side of this world."""
