@@ -1,7 +1,7 @@
 """The best team of heuristic robots in gathering and construction, found by a search.
 
-The ten teams of one heuristic and 190 random mixes play a few scenarios; those that deliver most go
-on to the next round, in more and fresh ones (``ROUNDS``).
+The ten teams of one heuristic and 190 random mixes play a few scenarios; the ten that deliver most
+and ten neighbours of each play more and fresh ones, the best ten of these more again (``ROUNDS``).
 """
 
 from __future__ import annotations
@@ -14,7 +14,8 @@ from conevo.rng import stream
 from conevo.worlds.gacc import GaccWorld
 from teams import Teams, controlled, keys_of, play
 
-ROUNDS = ((200, 10), (20, 50), (5, 200))  # mixes and scenarios of each
+ROUNDS = ((200, 10), (110, 40), (10, 200))  # mixes and scenarios of each
+BRED, NEIGHBOURS = 10, 10  # mixes that have neighbours after the first round, and how many each
 Mix = tuple[int, ...]  # robots of each heuristic
 
 
@@ -22,12 +23,27 @@ def candidate(world: GaccWorld, seed: int, k: int) -> Mix:
     """Return the teams of one heuristic first, then random shares of those that can be of use."""
     if k < len(world.heuristics):
         return tuple(world.n_robots * (h == k) for h in range(len(world.heuristics)))
-    types = sorted(set(world.plan.parts.ravel().tolist()))
-    useful = [3 * row + kind for row in range(3) for kind in types] + [9]
-    rng = stream(seed, "mixes", world.environment, k)
+    rng, useful = stream(seed, "mixes", world.environment, k), useful_in(world)
     mix = np.zeros(len(world.heuristics), dtype=int)
     mix[useful] = rng.multinomial(world.n_robots, rng.dirichlet(np.full(len(useful), 0.5)))
     return tuple(mix.tolist())
+
+
+def useful_in(world: GaccWorld) -> list[int]:
+    """Return the heuristics of types that are built with, and the non-specialized one."""
+    types = sorted(set(world.plan.parts.ravel().tolist()))
+    return [3 * row + kind for row in range(3) for kind in types] + [9]
+
+
+def neighbour(world: GaccWorld, mix: Mix, seed: int, k: int) -> Mix:
+    """Return a mix in which up to eight robots follow another heuristic than before."""
+    rng = stream(seed, "mixes", world.environment, "neighbour", *map(str, mix), k)
+    found = list(mix)
+    loses = rng.choice(np.flatnonzero(mix))
+    n = min(int(rng.integers(1, 9)), found[loses])
+    found[loses] -= n
+    found[rng.choice(useful_in(world))] += n
+    return tuple(found)
 
 
 def team_of(world: GaccWorld, mix: Mix, kind: str = "best mix") -> Teams:
@@ -45,6 +61,10 @@ def best(world: GaccWorld, seed: int = 1) -> Mix:
     """Return the mix that delivers most."""
     mixes = list(dict.fromkeys(candidate(world, seed, k) for k in range(ROUNDS[0][0])))
     for number, (n_mixes, n_scenarios) in enumerate(ROUNDS):
+        if number == 1:
+            pairs = ((mix, k) for mix in mixes[:BRED] for k in range(NEIGHBOURS))
+            bred = [neighbour(world, mix, seed, k) for mix, k in pairs]
+            mixes = list(dict.fromkeys([*mixes[:BRED], *bred]))
         mixes = mixes[:n_mixes]
         teams = team_of(world, mixes[0])
         for mix in mixes[1:]:
