@@ -43,8 +43,8 @@ from teams import (
 
 SHORT = resolve("gacc/complex-1", preset="desk").world_params.iterations
 CASES = (  # environment and iterations
-    *(("complex-1", SHORT), ("complex-4", SHORT), ("simple-1", SHORT)),
-    *(("complex-1", 3000), ("complex-9", 3000)),
+    *((name, SHORT) for name in ("complex-1", "complex-4", "complex-9", "simple-1")),
+    ("complex-1", 3000),
 )
 N_SCENARIOS = 200  # of a heuristic team or a champion
 N_RANDOM, N_EPOCHS = 200, 5  # random teams of each kind, and scenarios of each

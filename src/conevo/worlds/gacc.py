@@ -27,7 +27,7 @@ complex object takes only the next type of its sequence, a disordered one any ty
 state      meaning                          what comes next
 =========  ===============================  ====================================================
 LYING      where it was                     GRIPPED, by one robot outside the home area
-GRIPPED    held outside the home area       CARRIED, as its robot moves
+GRIPPED    held outside the home area       CARRIED, as its robot moves; or as that
 CARRIED    goes where its robot goes        WAITING, in the home area; DROPPED, if let go
 WAITING    one robot holds it at home       HELPED, another grips it; DROPPED, after 30 iterations
 HELPED     several do, not yet enough       DELIVERED, enough do and it is needed next; DROPPED,
