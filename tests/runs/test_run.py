@@ -45,6 +45,17 @@ def test_a_budget_is_never_passed_and_nearly_spent(method: str, tmp_path: Path) 
     assert run.provenance["stopped_by"] == "budget"
 
 
+@pytest.mark.parametrize("task", ["rover/complex-1", "gacc/complex-1"])
+def test_a_world_without_room_is_refused_before_anything_is_written(
+    task: str, tmp_path: Path
+) -> None:
+    with pytest.raises(UsageError, match="no room for"):
+        conevo.evolve(
+            task, "homcne", "smoke", out=tmp_path / "run", overrides={"world.separation": 0.5}
+        )
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_a_budget_below_one_generation_is_refused_before_anything_is_written(
     tmp_path: Path,
 ) -> None:

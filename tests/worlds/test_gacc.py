@@ -419,6 +419,11 @@ def test_obstacles_that_have_no_room_are_refused():
     assert "\n" not in str(caught.value)
 
 
+def test_robots_that_have_no_room_are_refused():
+    with pytest.raises(UsageError, match="no room for 30 places"):
+        world("gacc/simple-1", separation=0.3).scenarios([1])
+
+
 def test_environments_that_do_not_exist_name_the_nearest():
     with pytest.raises(UsageError, match="complex-"):
         world("gacc/complex-10")

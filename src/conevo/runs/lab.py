@@ -57,7 +57,8 @@ class Lab:
             ancestor: whose populations to begin with; random ones by default.
 
         Raises:
-            UsageError: the budget does not pay for one generation, or the ancestor does not fit.
+            UsageError: the budget does not pay for one generation, the ancestor does not fit, or
+                the world has no room for what belongs in it.
         """
         spec, seed = self.world.controller, self.config.run.seed
         layout = Layout(self.world.n_robots, spec.n_hidden, spec.max_hidden, spec.n_genes)
@@ -66,4 +67,5 @@ class Lab:
         else:
             state = hand_on(self.method, layout, seed, ancestor)
         check_budget(self.method, state, self.config.run.budget_evaluations)
+        self.world.scenarios([seed])
         return state

@@ -133,7 +133,7 @@ def resolve(path: str, digest: str = "") -> tuple[WorldEntry, str]:
 
         name, entry = file, load(Path(file), digest)
         example = f"{file}:{entry.environments[0]}"
-    elif ".py/" in path:
+    elif file or ".py/" in path:
         raise UsageError(f"world {path!r}: a world in a file is named FILE.py:ENVIRONMENT")
     else:
         name, _, environment = path.partition("/")
