@@ -93,7 +93,7 @@ SHEETS = {
             ("optimum", "of the optimum, %", ".1f"),
             ("completed", "completed", ".2f"),
         ),
-        axis="objects delivered, fittest team of a generation",
+        axis="objects delivered by the fittest team",
         others=(
             ("best mix", "best mix of heuristic robots"),
             ("non-specialized", "non-specialized heuristic robots"),
@@ -327,7 +327,8 @@ def draw(sheet: Sheet, points: list[Row], path: Path, lines: dict[str, float]) -
     labels = sorted({point["method"] for point in points}, key=rank)
     for k, label in enumerate(labels):
         colour = plt.get_cmap("viridis")(k / max(1, len(labels) - 0.5))
-        for seed in sorted({point["seed"] for point in points if point["method"] == label}):
+        seeds = sorted({point["seed"] for point in points if point["method"] == label})
+        for seed in seeds:
             one = [p for p in points if p["method"] == label and p["seed"] == seed]
             axes.plot(
                 [p["team_evaluations"] for p in one],
@@ -336,7 +337,7 @@ def draw(sheet: Sheet, points: list[Row], path: Path, lines: dict[str, float]) -
                 linestyle=styles[k % len(styles)],
                 marker="os^DvxP"[k % 7],
                 markersize=4,
-                label=title(label) if one[0]["seed"] == min(p["seed"] for p in points) else None,
+                label=title(label) if seed == seeds[0] else None,
             )
     for k, (name, height) in enumerate(lines.items()):
         axes.axhline(height, color="0.4", linewidth=0.9, linestyle=(0, (6, 2 + 4 * k)), label=name)

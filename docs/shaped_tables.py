@@ -112,7 +112,8 @@ def draw(shapings: list[Shaping], measure: str, axis: str, path: Path) -> None:
                           xycoords=("data", "axes fraction"))  # fmt: skip
             before = x[-1]
         config = shaping.configs[0]
-        axes.set_ylabel(f"{config.method}, seed {config.run.seed}\n{axis}", fontsize="small")
+        name = conevo.METHODS[config.method].title
+        axes.set_ylabel(f"{name}, seed {config.run.seed}\n{axis}", fontsize="small")
         axes.set_ylim(bottom=0)
         axes.set_xlim(0, before)
         axes.spines[["top", "right"]].set_visible(False)

@@ -200,5 +200,5 @@ def is_lying(team: Team, k: int) -> bool:
 
 @wp.func
 def is_known(team: Team, p: Params, k: int, t: int) -> bool:
-    """Return whether a robot may grip object ``k``: it has been detected (6.2.5, 6.5.3)."""
+    """Return whether a robot may grip object ``k``: it has been detected (6.2.6, 6.5.3)."""
     return team.detected[k] < t or p.needs_detection == 0
