@@ -1,0 +1,64 @@
+"""One run that begins with the populations of another."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+import conevo
+from conevo.errors import UsageError
+from conevo.runs.config import resolve
+from conevo.runs.run import start
+from runs.tiny import TASK, content, evolve_tiny, tiny_settings
+
+
+def descend(origin: conevo.Run, path: Path | None, seed: int = 1) -> conevo.Run:
+    settings = tiny_settings("cone")
+    config = resolve(TASK, "cone", "smoke", seed, overrides=settings)
+    return start(config, path, threads=1, origin=origin)
+
+
+def test_a_run_may_begin_with_the_populations_of_another(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    origin = evolve_tiny(tmp_path / "origin")
+    run = descend(origin, None)
+    checkpoint = run.provenance["origin"]["checkpoint"]
+    assert run.path.name == f"{origin.config.label}-from-{checkpoint[:6]}"
+    shutil.rmtree(origin.path)  # nothing of it is needed any more
+    run.resume(threads=1)
+    again = evolve_tiny(tmp_path / "again")
+    assert run.config.run_id == again.config.run_id
+    assert content(run.path)["generations"] != content(again.path)["generations"]
+
+
+def test_the_same_settings_on_other_populations_are_another_run(tmp_path: Path) -> None:
+    """Their files are foreign to each other, although the settings are the same."""
+    runs = [
+        descend(evolve_tiny(tmp_path / f"origin-{seed}", run__seed=seed), tmp_path / f"run-{seed}")
+        for seed in (1, 2)
+    ]
+    assert runs[0].config.run_id == runs[1].config.run_id
+    (last,) = runs[0].resume(threads=1).path.glob("checkpoint-?.npz")
+    shutil.copy(last, runs[1].path)
+    with pytest.raises(UsageError, match="is foreign: origin is"):
+        runs[1].resume(threads=1)
+    plain = start(runs[1].config, tmp_path / "plain", threads=1)
+    shutil.copy(last, plain.path)
+    with pytest.raises(UsageError, match="is foreign: origin is"):
+        plain.resume(threads=1)
+
+
+def test_an_unfinished_or_changed_origin_is_refused(tmp_path: Path) -> None:
+    config = resolve(TASK, "cone", "smoke", overrides=tiny_settings("cone"))
+    unfinished = start(config, tmp_path / "unfinished", threads=1)
+    with pytest.raises(UsageError, match="is not finished, so no run can begin with"):
+        descend(unfinished, tmp_path / "run")
+    changed = evolve_tiny(tmp_path / "changed")
+    (changed.path / "test.json").write_text("{}")
+    with pytest.raises(UsageError, match=r"was changed since it was finished \(test\.json\)"):
+        descend(changed, tmp_path / "run")
+    assert not (tmp_path / "run").exists()
