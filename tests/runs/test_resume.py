@@ -13,9 +13,9 @@ import pytest
 import conevo
 from conevo.errors import EnvironmentFailure, UsageError
 from conevo.evolution.methods.registry import METHODS
-from conevo.runs import durable
 from conevo.runs.config import resolve
 from conevo.runs.run import start
+from runs.crashes import Crash, fail_at
 from runs.tiny import (
     TASK,
     TASKS,
@@ -37,25 +37,6 @@ def test_resume_after_kills_at_random_moments(method: str, task: str, tmp_path: 
     kills = kill_twice(path, command(path, method, task, run__generations=60))
     conevo.Run(path).resume(threads=2)
     assert content(path) == content(whole.path), kills
-
-
-class Crash(BaseException):
-    """The end of the process at this point."""
-
-
-def fail_at(monkeypatch: pytest.MonkeyPatch, call: int, problem: BaseException) -> list[int]:
-    """Let the ``call``-th fsync of the run's files fail; return the list that counts them."""
-    calls: list[int] = []
-    sync = os.fsync
-
-    def fsync(handle: int) -> None:
-        calls.append(handle)
-        if len(calls) - 1 == call:
-            raise problem
-        sync(handle)
-
-    monkeypatch.setattr(durable.os, "fsync", fsync)
-    return calls
 
 
 @pytest.mark.parametrize("every", [1, 2])

@@ -20,10 +20,10 @@ import conevo
 from conevo.errors import EnvironmentFailure, UsageError
 from conevo.evolution.methods.registry import METHODS
 from conevo.rng import fold
-from conevo.runs import durable
 from conevo.runs.evolved_prey import PREY_TASKS
 from conevo.runs.shaping import Shaping, start_shaping, tasks_up_to
 from conevo.worlds import prey_sets
+from runs.crashes import Crash, fail_at
 from runs.tiny import TINY, arrays, content, evolve_tiny, tiny_settings
 
 TASKS = tasks_up_to("rover/complex-3")
@@ -136,25 +136,6 @@ def test_the_last_team_is_tested_in_the_environment_of_every_stage(tmp_path: Pat
     )
     values = others[0]["performance"]["value"]["values"]
     assert values == outcome.performance["value"][0].tolist()
-
-
-class Crash(BaseException):
-    """The end of the process at this point."""
-
-
-def fail_at(monkeypatch: pytest.MonkeyPatch, call: int, problem: BaseException) -> list[int]:
-    """Let the ``call``-th fsync fail; return the list that counts them."""
-    calls: list[int] = []
-    sync = os.fsync
-
-    def fsync(handle: int) -> None:
-        calls.append(handle)
-        if len(calls) - 1 == call:
-            raise problem
-        sync(handle)
-
-    monkeypatch.setattr(durable.os, "fsync", fsync)
-    return calls
 
 
 @pytest.mark.slow

@@ -56,18 +56,18 @@ def make_evaluator(
     ``fittest_epochs`` scenarios.
     """
 
-    def evaluate(trials: Trials) -> Evaluation:
+    def keys(trials: Trials, part: int) -> list[int]:
         if trials.phase == "fittest":
-            keys = [fold(seed, "fittest", epoch) for epoch in range(fittest_epochs)]
-        else:
-            met = range(trials.rounds * epochs)
-            keys = [fold(seed, "epoch", trials.generation, epoch) for epoch in met]
+            return [fold(seed, "fittest", epoch) for epoch in range(fittest_epochs)]
+        met = range(part * epochs, (part + 1) * epochs)
+        return [fold(seed, "epoch", trials.generation, epoch) for epoch in met]
+
+    def evaluate(trials: Trials) -> Evaluation:
         genes = np.asarray(trials.genes, dtype=np.float32)
         teams = np.asarray(trials.teams, dtype=np.int32)
-        scenarios = np.array_split(np.arange(len(keys)), trials.rounds)
         outcome = join(
-            rollout.evaluate(genes, part, world.scenarios([keys[k] for k in its]))
-            for part, its in zip(np.split(teams, trials.rounds), scenarios, strict=True)
+            rollout.evaluate(genes, some, world.scenarios(keys(trials, part)))
+            for part, some in enumerate(np.split(teams, trials.rounds))
         )
         return Evaluation(score(outcome, credit), outcome)
 

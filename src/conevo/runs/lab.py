@@ -67,5 +67,5 @@ class Lab:
         else:
             state = hand_on(self.method, layout, seed, ancestor)
         check_budget(self.method, state, self.config.run.budget_evaluations)
-        self.world.scenarios([seed])
+        self.world.scenarios([seed])  # says so now if there is no room for what belongs in it
         return state
