@@ -6,7 +6,7 @@ In each of ``CASES``: every heuristic controller alone, the best mix of them tha
 teams of random networks and of their clones, the champions of the given runs (of preset desk). In
 the first case then the same teams with one chosen parameter changed at a time. Writes
 ``docs/results/gacc.csv`` (every number) and the tables between the markers of
-``docs/results/gacc.md``. The same seed and runs give the same numbers. A quarter of an hour.
+``docs/results/gacc.md``. The same seed and runs give the same numbers. Ten minutes of a core.
 
 The numbers of the best mix (``mixes.py``) are from scenarios that the search for it has not met.
 """
