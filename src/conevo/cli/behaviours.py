@@ -24,10 +24,10 @@ def behaviours(
     run: str, scenarios: int, seed: int | None, threads: int | None, as_json: bool
 ) -> None:
     """Watch the fittest team of RUN, a run of pursuit, in fresh scenarios; writes nothing."""
-    from conevo.analysis.report import report
+    from conevo.analysis.behaviour_report import behaviour_report
     from conevo.cli.find import find_run
 
-    found = report(find_run(run), scenarios, seed, threads=threads)
+    found = behaviour_report(find_run(run), scenarios, seed, threads=threads)
     click.echo(json.dumps(found) if as_json else _text(found))
 
 

@@ -1,15 +1,29 @@
-"""Which run is meant, or which shaping."""
+"""Which run is meant, which shaping, or which campaign."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from conevo.errors import UsageError, unknown_name
-from conevo.runs.directory import kind_of
+from conevo.runs.directory import CAMPAIGN, kind_of
 from conevo.runs.run import RUNS, Run
 from conevo.runs.shaping import Shaping
 
-__all__ = ["directories", "find", "find_run", "find_shaping"]
+if TYPE_CHECKING:
+    from conevo.campaigns.campaign import Campaign
+
+__all__ = [
+    "campaign_at",
+    "campaigns_in",
+    "directories",
+    "find",
+    "find_campaign",
+    "find_run",
+    "find_shaping",
+    "only_campaign",
+    "sealed",
+]
 
 
 def find(text: str) -> Run | Shaping:
@@ -61,9 +75,78 @@ def directories(folder: Path) -> list[Path]:
     if not folder.is_dir():
         return []
     return sorted(
-        path for path in folder.iterdir() if not path.name.startswith(".") and kind_of(path)
+        path
+        for path in folder.iterdir()
+        if not path.name.startswith(".") and kind_of(path) in ("run", "shaping")
     )
 
 
+def campaigns_in(folder: Path) -> list[Path]:
+    """Return the directories in ``folder`` that hold a campaign, by name."""
+    return sorted(file.parent for file in folder.glob(f"[!.]*/{CAMPAIGN}"))
+
+
+def campaign_at(text: str) -> Campaign | None:
+    """Return the campaign at a path, or of this name in campaigns/; None if there is none."""
+    from conevo.campaigns.campaign import CAMPAIGNS, Campaign
+
+    for path in (Path(text), CAMPAIGNS / text):
+        if (path / CAMPAIGN).is_file():
+            return Campaign(path)
+    return None
+
+
+def find_campaign(text: str) -> Campaign:
+    """Return the campaign that is meant.
+
+    Raises:
+        UsageError: there is none at this path, nor of this name in campaigns/.
+    """
+    from conevo.campaigns.campaign import CAMPAIGNS
+
+    found = campaign_at(text)
+    if found is None:
+        known = [path.name for path in campaigns_in(CAMPAIGNS)]
+        raise unknown_name("campaign", text, known, f"in {CAMPAIGNS}/")
+    return found
+
+
+def only_campaign() -> Campaign:
+    """Return the campaign in campaigns/.
+
+    Raises:
+        UsageError: there is none, or more than one.
+    """
+    from conevo.campaigns.campaign import CAMPAIGNS, Campaign
+
+    paths = campaigns_in(CAMPAIGNS)
+    if len(paths) == 1:
+        return Campaign(paths[0])
+    names = ", ".join(path.name for path in paths)
+    raise UsageError(
+        f"which campaign? Name one of: {names}" if paths else f"no campaigns in {CAMPAIGNS}/ yet"
+    )
+
+
+def sealed(campaign: Campaign) -> Campaign:
+    """Return the campaign with tables of all that is finished.
+
+    While it runs they are as its coordinator last made them.
+
+    Raises:
+        UsageError: no run is finished yet.
+    """
+    if not campaign.is_running:
+        with campaign.locked():
+            campaign.seal()
+    if not (campaign.places.tables / "runs.parquet").is_file():
+        raise UsageError(f"{campaign.path} has no finished run yet, so there is nothing to show")
+    return campaign
+
+
 def _open(path: Path) -> Run | Shaping:
+    if kind_of(path) == "campaign":
+        raise UsageError(
+            f"{path} is a campaign; see its runs with 'conevo campaign status {path} --runs'"
+        )
     return Shaping(path) if kind_of(path) == "shaping" else Run(path)

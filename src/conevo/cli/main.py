@@ -21,6 +21,9 @@ VERBS = {
     "resume": "Continue an interrupted run, to the bit.",
     "test": "Re-execute a run's fittest team in fresh scenarios.",
     "behaviours": "Say who pursues, blocks, flanks, knocks and idles.",
+    "campaign": "Start, watch, stop and retry plans of many runs.",
+    "report": "Write what a campaign says: page, tables, figures, numbers.",
+    "query": "Ask the tables of a campaign anything, in SQL.",
     "show": "Print a finished or running run.",
     "list": "List worlds, methods or runs.",
 }

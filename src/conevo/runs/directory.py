@@ -2,7 +2,8 @@
 
 ::
 
-    config.toml or shaping.toml    says what it holds: a run, or a shaping with a run per stage
+    config.toml, shaping.toml      says what it holds: a run, a shaping with a run per stage,
+      or plan.toml                   or a campaign with many runs
     lock                           held (flock) by the process that is at work here
     DONE                           the seal of what is finished: digests of all files
 """
@@ -25,6 +26,7 @@ from conevo.errors import EnvironmentFailure, UsageError
 from conevo.runs.durable import replace_file, sync_directory, writing
 
 __all__ = [
+    "CAMPAIGN",
     "CONFIG",
     "SHAPING",
     "Directory",
@@ -35,12 +37,12 @@ __all__ = [
     "refuse_existing",
 ]
 
-CONFIG, SHAPING, LOCK, SEAL = "config.toml", "shaping.toml", "lock", "DONE"
-KINDS = {CONFIG: "run", SHAPING: "shaping"}
+CONFIG, SHAPING, CAMPAIGN, LOCK, SEAL = "config.toml", "shaping.toml", "plan.toml", "lock", "DONE"
+KINDS = {CONFIG: "run", SHAPING: "shaping", CAMPAIGN: "campaign"}
 
 
 def kind_of(path: Path) -> str:
-    """Return what a directory holds: "run", "shaping" or nothing ("")."""
+    """Return what a directory holds: "run", "shaping", "campaign" or nothing ("")."""
     return next((kind for name, kind in KINDS.items() if (path / name).is_file()), "")
 
 
@@ -87,6 +89,8 @@ def refuse_existing(path: Path) -> None:
     if not kind:
         raise UsageError(f"{path} exists and is no run; choose another place with --out")
     directory = Directory(path, kind)
+    if kind == "campaign":
+        raise UsageError(f"{path} already holds a campaign; see 'conevo campaign status {path}'")
     if directory.is_finished:
         advice = f"finished: see it with 'conevo show {path}', or choose another --seed or --out"
     elif directory.is_in_use:
@@ -101,7 +105,7 @@ class Directory:
 
     Args:
         path: the directory.
-        kind: what it must hold, "run" or "shaping".
+        kind: what it must hold, "run", "shaping" or "campaign".
 
     Raises:
         UsageError: it does not.

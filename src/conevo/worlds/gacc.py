@@ -202,6 +202,11 @@ class GaccWorld:
     )
 
     @property
+    def optimum(self) -> float:
+        """Number of all objects."""
+        return float(self.plan.parts.size)
+
+    @property
     def n_robots(self) -> int:
         """Number of robots."""
         return self.params.n_robots

@@ -81,6 +81,9 @@ class World(Protocol):
             one column.
         performance: names of the task performance measures, the main one first.
         heuristics: names of the heuristic controllers, at least one.
+
+    A world may have a property ``optimum``: the largest possible value of its main task performance
+    measure, of which reports then give the share.
     """
 
     name: ClassVar[str]

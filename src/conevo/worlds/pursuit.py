@@ -134,6 +134,11 @@ class PursuitWorld:
         return int(self.environment.rpartition("-")[2])
 
     @property
+    def optimum(self) -> float:
+        """Capture time if a prey is held from the first iteration on."""
+        return float(self.params.iterations)
+
+    @property
     def n_robots(self) -> int:
         """Number of predators."""
         return 2 + (self.team_type - 1) % 5

@@ -127,6 +127,12 @@ class RoverWorld:
     heuristics: ClassVar[tuple[str, ...]] = ("low", "med", "hi", "non-specialized")
 
     @property
+    def optimum(self) -> float:
+        """Value of all red rocks."""
+        counts = rocks.mix(self.environment)
+        return float(sum(n * value for n, value in zip(counts, rocks.VALUES, strict=True)))
+
+    @property
     def n_robots(self) -> int:
         """Number of rovers."""
         return self.params.n_robots

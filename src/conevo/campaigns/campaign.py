@@ -1,0 +1,259 @@
+"""A campaign on disk, and the coordinator that carries it out.
+
+::
+
+    plan.toml             the plan, resolved: scale, seeds and all settings
+    runs.jsonl            every run of the plan, written before anything starts
+    ledger.sqlite         how every run stands; written by the coordinator only
+    runs/LABEL/           the runs, each as any other; or shapings
+    studies/LABEL.json    what the fittest team of a finished run does
+    ended/LABEL.json      how the last worker of a run ended
+    logs/LABEL.txt        what its workers said
+    tables/*.parquet      what analysis reads, made of all that is finished
+    lock                  held (flock) by the coordinator
+
+Runs, not the ledger, are the truth: whatever is killed, starting the campaign again finishes what
+is missing, and a finished run is never run twice.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import time
+from collections import deque
+from collections.abc import Callable
+from pathlib import Path
+
+from conevo.campaigns.executors import Ending, Executor, Job
+from conevo.campaigns.ledger import Entry, Ledger
+from conevo.campaigns.places import Places
+from conevo.campaigns.plan import Plan, PlannedRun
+from conevo.campaigns.plan_file import read_plan
+from conevo.campaigns.tables import seal_tables
+from conevo.campaigns.work import planned_runs
+from conevo.errors import UsageError
+from conevo.runs.directory import Directory, appearing, read_json
+from conevo.runs.durable import replace_file
+
+__all__ = ["ATTEMPTS", "CAMPAIGNS", "Campaign", "Stopped", "create"]
+
+CAMPAIGNS = Path("campaigns")  # where campaigns are made and looked for unless told otherwise
+ATTEMPTS = 3  # of a run whose worker is lost, or whose machine refused
+SEAL_EVERY = 60.0  # seconds at least between two makings of the tables while runs go on
+LOOK = 0.25  # seconds between two looks at workers and the order to stop
+
+
+class Stopped(Exception):
+    """The campaign was told to stop by ``Campaign.stop``."""
+
+
+Watch = Callable[["Campaign", "Ending | None"], None]
+
+
+def create(plan: Plan, path: Path) -> Campaign:
+    """Write a campaign out; nothing is started.
+
+    A campaign that is there already is extended if the plan has all its runs and more.
+
+    Raises:
+        UsageError: a run that cannot be, or ``path`` holds something else; nothing was written.
+        EnvironmentFailure: it cannot be written.
+    """
+    runs = plan.write_out()
+    lines = "".join(f"{json.dumps(dataclasses.asdict(run))}\n" for run in runs).encode()
+    if Places(path).plan.is_file():
+        campaign = Campaign(path)
+        _refuse_other(campaign, {run.label: run for run in runs})
+        with campaign.locked():
+            replace_file(campaign.places.runs, lines)
+            replace_file(campaign.places.plan, plan.to_toml().encode())
+        return Campaign(path)
+    with appearing(path) as draft:
+        replace_file(Places(draft).plan, plan.to_toml().encode())
+        replace_file(Places(draft).runs, lines)
+    return Campaign(path)
+
+
+def _refuse_other(campaign: Campaign, runs: dict[str, PlannedRun]) -> None:
+    """Raise UsageError if a campaign has runs that are not among these."""
+    for label, planned in campaign.planned.items():
+        if label not in runs:
+            what = "does not have"
+        elif runs[label] != planned:
+            what = "has with other settings"
+        else:
+            continue
+        raise UsageError(
+            f"{campaign.path} holds another campaign: its run {label} is one that this plan "
+            f"{what}; continue it with 'conevo campaign start {campaign.path}', or choose another "
+            f"--out"
+        )
+
+
+class Campaign:
+    """A campaign on disk, finished or not.
+
+    Args:
+        path: its directory.
+
+    Raises:
+        UsageError: there is no campaign at ``path``, or it is damaged.
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        self._directory = Directory(Path(path), "campaign")
+        self.path = self._directory.path
+        self.places = Places(self.path)
+        self.plan: Plan = read_plan(self.places.plan)
+        self.planned: dict[str, PlannedRun] = planned_runs(self.path)
+        self.ledger = Ledger(self.places.ledger)
+        self.locked = self._directory.locked
+
+    def __repr__(self) -> str:
+        return f"Campaign({str(self.path)!r})"
+
+    @property
+    def is_running(self) -> bool:
+        """Whether a coordinator is at work on it."""
+        return self._directory.is_in_use
+
+    def is_finished(self, label: str) -> bool:
+        """Whether a run is sealed and studied."""
+        return (self.places.run(label) / "DONE").is_file() and self._is_studied(label)
+
+    def _is_studied(self, label: str) -> bool:
+        planned = self.planned[label]
+        return not planned.studies or all(self.places.study(n).is_file() for n in planned.names)
+
+    def standings(self) -> dict[str, Entry]:
+        """Return how every run stands, in the order of the plan; writes nothing."""
+        known = {entry.label: entry for entry in self.ledger.entries()}
+        found = {}
+        for label in self.planned:
+            entry = known.get(label, Entry(label, "pending", 0, "", 0, None, 0.0))
+            if self.is_finished(label):
+                entry = dataclasses.replace(entry, state="finished")
+            elif entry.state == "finished" or (entry.state == "running" and not self.is_running):
+                entry = dataclasses.replace(entry, state="pending")
+            found[label] = entry
+        return found
+
+    def stop(self) -> None:
+        """Ask the coordinator to stop: its workers write their checkpoints and leave.
+
+        Raises:
+            UsageError: none is at work.
+        """
+        if not self.is_running:
+            raise UsageError(
+                f"{self.path} is not running; see 'conevo campaign status {self.path}'"
+            )
+        replace_file(self.places.stop, b"")
+
+    def retry(self) -> list[str]:
+        """Let every failed run wait again, and return their labels.
+
+        Raises:
+            UsageError: a coordinator is at work.
+        """
+        with self.locked():
+            self._reconcile()
+            failed = [label for label, one in self.standings().items() if one.state == "failed"]
+            self.ledger.put(failed, "pending", "to be tried again")
+        return failed
+
+    def carry_on(
+        self, executor: Executor, *, threads: int = 1, watch: Watch | None = None
+    ) -> dict[str, Entry]:
+        """Finish what is missing, and make the tables of all that is finished.
+
+        A run that fails is written down and does not end the campaign. Cores that no waiting run
+        needs are given to the last ones.
+
+        Args:
+            executor: where runs are carried out.
+            threads: CPU threads of a run, at most as many as the executor has cores.
+            watch: called with the campaign and each ending; with None while there is none.
+
+        Raises:
+            UsageError: a coordinator is at work already.
+            Stopped: by ``stop``; the campaign can be carried on.
+        """
+        with self.locked():
+            self.places.stop.unlink(missing_ok=True)
+            self._reconcile()
+            try:
+                self._carry_on(executor, min(threads, executor.cores), watch)
+            finally:
+                executor.stop()
+                self.ledger.release()
+                self._reconcile()
+                self.places.stop.unlink(missing_ok=True)
+            self.seal()
+        return self.standings()
+
+    def seal(self) -> None:
+        """Make the tables of all that is finished, unless they are those already."""
+        finished = [run for label, run in self.planned.items() if self.is_finished(label)]
+        if finished:
+            seal_tables(self.places, finished)
+
+    def _reconcile(self) -> None:
+        """Make the ledger say what the directories say."""
+        self.ledger.enrol(self.planned)
+        self.ledger.release()
+        entries = {entry.label: entry.state for entry in self.ledger.entries()}
+        done = {label for label in self.planned if self.is_finished(label)}
+        was = {label for label, state in entries.items() if state == "finished"}
+        self.ledger.put(sorted(done - was), "finished", "found finished")
+        self.ledger.put(sorted((was & set(self.planned)) - done), "pending", "found unfinished")
+
+    def _carry_on(self, executor: Executor, threads: int, watch: Watch | None) -> None:
+        waiting = deque(
+            entry.label
+            for entry in self.ledger.entries()
+            if entry.state == "pending" and entry.label in self.planned
+        )
+        at_work: dict[str, Job] = {}
+        next_seal = time.monotonic() + SEAL_EVERY
+        while waiting or at_work:
+            free = executor.cores - sum(job.threads for job in at_work.values())
+            while waiting and free >= threads:
+                share = max(threads, free // len(waiting))
+                job = Job(self.path, waiting.popleft(), share)
+                at_work[job.label] = job
+                free -= share
+                self.places.ended(job.label).unlink(missing_ok=True)
+                self.ledger.begin(job.label, share, time.time())
+                executor.submit(job)
+            for ending in executor.wait(LOOK):
+                del at_work[ending.label]
+                if self._settle(ending) == "pending":
+                    waiting.appendleft(ending.label)
+                if watch is not None:
+                    watch(self, ending)
+            if self.places.stop.is_file():
+                raise Stopped
+            if (began := time.monotonic()) >= next_seal:
+                self.seal()
+                ended = time.monotonic()
+                next_seal = ended + max(SEAL_EVERY, 20 * (ended - began))
+            if watch is not None:
+                watch(self, None)
+
+    def _settle(self, ending: Ending) -> str:
+        """Write down how a worker ended, and return the state of its run."""
+        label, path = ending.label, self.places.ended(ending.label)
+        attempts = 1 + next(e.attempts for e in self.ledger.entries() if e.label == label)
+        if not path.is_file():
+            lost = ending.lost or f"left without a word; see {self.places.log(label)}"
+            state = "pending" if attempts < ATTEMPTS else "failed"
+            self.ledger.end(label, state, f"{lost} (attempt {attempts} of {ATTEMPTS})")
+            return state
+        ended = read_json(path)
+        state = ended["status"]
+        if state == "failed" and ended["origin"] == "machine" and attempts < ATTEMPTS:
+            state = "pending"
+        self.ledger.end(label, state, ended["message"], ended["core_seconds"])
+        return str(state)

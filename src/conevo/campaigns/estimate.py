@@ -1,0 +1,83 @@
+"""When a campaign will be finished, judged by the runs that are."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from statistics import fmean
+
+from conevo.campaigns.campaign import Campaign
+from conevo.campaigns.ledger import Entry
+from conevo.errors import ConevoError
+
+__all__ = ["remaining_seconds"]
+
+
+def remaining_seconds(
+    campaign: Campaign, entries: Mapping[str, Entry], cores: int, at: float
+) -> float | None:
+    """Return the seconds until the last run is finished; None if nothing can be said yet.
+
+    A run is expected to take as many core seconds as the finished ones of its cell, else of its
+    world, else of all; while none is finished, as many as those at work will, by their progress.
+
+    Args:
+        campaign: whose runs.
+        entries: how they stand.
+        cores: that work on them together.
+        at: the present time, seconds since 1970.
+    """
+    planned = campaign.planned
+    known: dict[tuple[str, ...], list[float]] = {}
+    left = spent = 0.0
+    for label, entry in entries.items():
+        seconds = entry.core_seconds if entry.state == "finished" else 0.0
+        if seconds > 0:
+            for key in _keys(campaign, label):
+                known.setdefault(key, []).append(seconds)
+    running = [label for label, entry in entries.items() if entry.state == "running"]
+    if not known:
+        for label in running:
+            share, passed = _share(campaign, label), _passed(entries[label], at)
+            if share > 0:
+                for key in _keys(campaign, label):
+                    known.setdefault(key, []).append(passed / share)
+    for label, entry in entries.items():
+        if label not in planned or entry.state not in ("pending", "running"):
+            continue
+        costs = next((known[key] for key in _keys(campaign, label) if key in known), None)
+        if costs is None:
+            return None
+        spent = _passed(entry, at) if entry.state == "running" else 0.0
+        left += max(fmean(costs) - spent, 0.0)
+    longest = max((e.threads for e in entries.values() if e.state == "running"), default=1)
+    return left / max(cores, longest, 1)
+
+
+def _keys(campaign: Campaign, label: str) -> list[tuple[str, ...]]:
+    """Return what a run is like, the closest likeness first."""
+    run = campaign.planned[label]
+    return [(run.world, run.method, run.variant), (run.world.partition("/")[0],), ()]
+
+
+def _passed(entry: Entry, at: float) -> float:
+    """Return the core seconds that an attempt has had."""
+    return max(at - (entry.began or at), 0.0) * entry.threads
+
+
+def _share(campaign: Campaign, label: str) -> float:
+    """Return the share of a run that is over: of its generations, or of its budget."""
+    planned = campaign.planned[label]
+    over = 0.0
+    try:
+        configs = planned.configs()
+        for name, config in zip(planned.names, configs, strict=True):
+            path = campaign.places.run(name) / "generations.jsonl"
+            lines = path.read_bytes().split(b"\n")[:-1] if path.is_file() else []
+            if lines:
+                budget = config.run.budget_evaluations
+                spent = json.loads(lines[-1])["team_evaluations"] / budget if budget else 0.0
+                over += min(max(len(lines) / config.run.generations, spent), 1.0)
+        return over / len(configs)
+    except (ConevoError, ValueError, KeyError):
+        return 0.0

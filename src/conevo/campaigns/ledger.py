@@ -1,0 +1,153 @@
+"""What the coordinator of a campaign knows of every run: SQLite, one writer.
+
+Only the process that holds the campaign's lock writes here; others read. The runs' directories are
+the truth: a ledger that is lost is made again from them.
+"""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Iterable, Iterator
+from contextlib import closing, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from conevo.errors import EnvironmentFailure, UsageError
+from conevo.runs.provenance import now
+
+__all__ = ["STATES", "Entry", "Ledger"]
+
+STATES = ("pending", "running", "finished", "failed")
+SCHEMA = """
+CREATE TABLE IF NOT EXISTS runs (
+    label TEXT PRIMARY KEY,
+    place INTEGER NOT NULL,              -- in the plan
+    state TEXT NOT NULL DEFAULT 'pending',
+    attempts INTEGER NOT NULL DEFAULT 0, -- that ended by themselves or were lost
+    reason TEXT NOT NULL DEFAULT '',     -- of the last failure
+    threads INTEGER NOT NULL DEFAULT 0,
+    began REAL,                          -- seconds since 1970, of the last attempt
+    core_seconds REAL NOT NULL DEFAULT 0 -- of all attempts that ended by themselves
+);
+CREATE TABLE IF NOT EXISTS events (
+    at TEXT NOT NULL, label TEXT NOT NULL, what TEXT NOT NULL, reason TEXT NOT NULL
+);
+"""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A run as the ledger has it.
+
+    Attributes:
+        label: of the run.
+        state: one of ``STATES``.
+        attempts: how often it ended by itself or was lost.
+        reason: why it failed last, "" if it never did.
+        threads: of the last attempt.
+        began: when the last attempt began, seconds since 1970; None before.
+        core_seconds: spent by all attempts that ended by themselves.
+    """
+
+    label: str
+    state: str
+    attempts: int
+    reason: str
+    threads: int
+    began: float | None
+    core_seconds: float
+
+
+class Ledger:
+    """The ledger of a campaign.
+
+    Args:
+        path: its file, made when something is first written.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    def enrol(self, labels: Iterable[str]) -> None:
+        """Add runs that are not in it, in the order of the plan."""
+        with self._writing() as db:
+            db.executemany(
+                "INSERT INTO runs (label, place) VALUES (?, ?) "
+                "ON CONFLICT (label) DO UPDATE SET place = excluded.place",
+                [(label, place) for place, label in enumerate(labels)],
+            )
+
+    def entries(self) -> list[Entry]:
+        """Return all runs in the order of the plan; none if nothing was written yet."""
+        if not self.path.is_file():
+            return []
+        query = (
+            "SELECT label, state, attempts, reason, threads, began, core_seconds "
+            "FROM runs ORDER BY place"
+        )
+        with self._reading() as db:
+            return [Entry(*row) for row in db.execute(query)]
+
+    def begin(self, label: str, threads: int, at: float) -> None:
+        """Say that a worker has begun."""
+        with self._writing() as db:
+            db.execute(
+                "UPDATE runs SET state = 'running', threads = ?, began = ? WHERE label = ?",
+                (threads, at, label),
+            )
+            _note(db, label, "begun", "")
+
+    def end(self, label: str, state: str, reason: str = "", core_seconds: float = 0.0) -> None:
+        """Say how a worker ended: "finished", "failed" or, to be tried again, "pending"."""
+        with self._writing() as db:
+            db.execute(
+                "UPDATE runs SET state = ?, reason = ?, attempts = attempts + 1, "
+                "core_seconds = core_seconds + ? WHERE label = ?",
+                (state, reason, core_seconds, label),
+            )
+            _note(db, label, state, reason)
+
+    def put(self, labels: Iterable[str], state: str, why: str) -> None:
+        """Set the state of runs that no worker is at; those that are made to wait start afresh."""
+        with self._writing() as db:
+            for label in labels:
+                reset = ", attempts = 0, reason = ''" if state == "pending" else ""
+                db.execute(f"UPDATE runs SET state = ?{reset} WHERE label = ?", (state, label))
+                _note(db, label, state, why)
+
+    def release(self) -> None:
+        """Let runs that are said to be running wait: their coordinator has gone."""
+        with self._writing() as db:
+            for (label,) in db.execute("SELECT label FROM runs WHERE state = 'running'").fetchall():
+                _note(db, label, "pending", "the coordinator left")
+            db.execute("UPDATE runs SET state = 'pending' WHERE state = 'running'")
+
+    @contextmanager
+    def _writing(self) -> Iterator[sqlite3.Connection]:
+        with self._open("rwc") as db:
+            db.executescript(SCHEMA)
+            yield db
+
+    @contextmanager
+    def _reading(self) -> Iterator[sqlite3.Connection]:
+        with self._open("ro") as db:
+            yield db
+
+    @contextmanager
+    def _open(self, mode: str) -> Iterator[sqlite3.Connection]:
+        address = f"{self.path.resolve().as_uri()}?mode={mode}"
+        # The default journal: write-ahead logs must not lie on network file systems.
+        try:
+            with closing(sqlite3.connect(address, uri=True, timeout=60)) as db, db:
+                yield db
+        except sqlite3.DatabaseError as error:
+            if isinstance(error, sqlite3.OperationalError):
+                raise EnvironmentFailure(f"cannot use {self.path}: {error}") from error
+            raise UsageError(
+                f"{self.path} is damaged ({error}); remove it and start the campaign again: it is "
+                f"made anew from the runs"
+            ) from error
+
+
+def _note(db: sqlite3.Connection, label: str, what: str, reason: str) -> None:
+    db.execute("INSERT INTO events VALUES (?, ?, ?, ?)", (now(), label, what, reason))

@@ -1,0 +1,248 @@
+"""What a campaign is: factors, levels and seeds, written out as a list of runs.
+
+Every combination of the levels of its factors is a cell, and every cell is run with every seed.
+``plan_file`` says how a plan is written down.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import tomli_w
+
+from conevo.errors import UsageError, unknown_name
+from conevo.runs.config import PRESETS, RunConfig, resolve
+from conevo.runs.shaping import tasks_up_to
+
+__all__ = ["Plan", "PlannedRun", "Where"]
+
+
+@dataclass(frozen=True)
+class PlannedRun:
+    """One run of a campaign, or one shaping.
+
+    Attributes:
+        label: its name in the campaign, and of its directory.
+        world: address of the world and environment; of a shaping the last environment.
+        method, preset, seed: as for any run.
+        variant: levels of all factors but world and method, "gst=0.1"; empty if there are none.
+        overrides: settings over those of the preset.
+        shape: whether the environments before this one are learned first.
+        studies: what is made of it when it is finished.
+        run_ids: of the run, or of every stage.
+    """
+
+    label: str
+    world: str
+    method: str
+    preset: str
+    seed: int
+    variant: str
+    overrides: dict[str, Any]
+    shape: bool
+    studies: tuple[str, ...]
+    run_ids: tuple[str, ...]
+
+    @property
+    def names(self) -> list[str]:
+        """What tables call the run, or every stage."""
+        if not self.shape:
+            return [self.label]
+        return [f"{self.label}/stage-{k}" for k in range(1, len(self.run_ids) + 1)]
+
+    @property
+    def tasks(self) -> list[str]:
+        """World and environment of the run, or of every stage."""
+        return tasks_up_to(self.world) if self.shape else [self.world]
+
+    def configs(self) -> list[RunConfig]:
+        """Return the configuration of the run, or of every stage.
+
+        Raises:
+            UsageError: they are not what they were when the plan was written out.
+        """
+        place = "in the campaign's plan"
+        found = [
+            resolve(
+                task,
+                self.method,
+                self.preset,
+                self.seed,
+                overrides=self.overrides,
+                place=place,
+            )
+            for task in self.tasks
+        ]
+        if tuple(config.run_id for config in found) != self.run_ids:
+            raise UsageError(
+                f"{self.label} was planned with other defaults or presets than this version's; "
+                f"use the version the campaign was started with, or start another campaign"
+            )
+        return found
+
+
+@dataclass(frozen=True)
+class Where:
+    """Settings of some runs.
+
+    Attributes:
+        conditions: "world", "method" or "preset" -> the names for which it holds.
+        settings: key -> value.
+    """
+
+    conditions: dict[str, tuple[str, ...]]
+    settings: dict[str, Any]
+
+    def holds(self, names: Mapping[str, str]) -> bool:
+        """Whether a run with these names is meant."""
+        return all(names[key] in allowed for key, allowed in self.conditions.items())
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Factors, levels and seeds.
+
+    Attributes:
+        name: of the campaign.
+        title: one line for people.
+        produces: tables and figures of the thesis that it is the data of.
+        seeds: of every cell.
+        preset: scale of every run.
+        shape: whether runs are shapings.
+        studies: what is made of finished runs.
+        factors: name -> levels; "world" and "method" are among them.
+        settings: of all runs.
+        where: of some runs.
+        place: where the plan was read, for error messages.
+    """
+
+    name: str
+    title: str
+    produces: tuple[str, ...]
+    seeds: tuple[int, ...]
+    preset: str
+    shape: bool
+    studies: tuple[str, ...]
+    factors: dict[str, tuple[Any, ...]]
+    settings: dict[str, Any]
+    where: tuple[Where, ...] = ()
+    place: str = field(default="in the plan", compare=False)
+
+    def at(
+        self,
+        preset: str | None = None,
+        seeds: int | None = None,
+        settings: Mapping[str, Any] | None = None,
+    ) -> Plan:
+        """Return the plan with another scale, number of seeds or further settings.
+
+        Raises:
+            UsageError: an unknown preset, or fewer than one seed.
+        """
+        if preset is not None and preset not in PRESETS:
+            raise unknown_name("preset", preset, PRESETS)
+        if seeds is not None and seeds < 1:
+            raise UsageError(f"--seeds {seeds}: a campaign needs at least 1 seed")
+        forced = () if not settings else (Where({}, dict(settings)),)
+        return dataclasses.replace(
+            self,
+            preset=preset or self.preset,
+            seeds=self.seeds if seeds is None else tuple(range(1, seeds + 1)),
+            where=self.where + forced,
+        )
+
+    @property
+    def n_runs(self) -> int:
+        """Number of runs."""
+        cells = 1
+        for levels in self.factors.values():
+            cells *= len(levels)
+        return cells * len(self.seeds)
+
+    def write_out(self) -> list[PlannedRun]:
+        """Return every run, checked: seed by seed, so that an early stop leaves equal cells.
+
+        Raises:
+            UsageError: an unknown name or a value that is not allowed in any run.
+        """
+        cells = [
+            dict(zip(self.factors, levels, strict=True))
+            for levels in itertools.product(*self.factors.values())
+        ]
+        written = [self._write_cell(levels) for levels in cells]
+        runs = [run for same_seed in zip(*written, strict=True) for run in same_seed]
+        labels = [run.label for run in runs]
+        if twice := sorted({label for label in labels if labels.count(label) > 1}):
+            raise UsageError(f"{twice[0]} {self.place} is planned twice: a level or seed is double")
+        return runs
+
+    def _write_cell(self, levels: Mapping[str, Any]) -> list[PlannedRun]:
+        """Return the runs of one combination of levels."""
+        world, method = levels["world"], levels["method"]
+        further = {k: v for k, v in levels.items() if k not in ("world", "method")}
+        names = {"world": world, "method": method, "preset": self.preset}
+        overrides = dict(self.settings)
+        for one in self.where:
+            if one.holds(names):
+                overrides |= one.settings
+        overrides |= further
+        tasks = tasks_up_to(world) if self.shape else [world]
+        configs = [
+            resolve(t, method, self.preset, overrides=overrides, place=self.place) for t in tasks
+        ]
+        variant = ", ".join(f"{k.rpartition('.')[2]}={v}" for k, v in further.items())
+        address = configs[-1].address
+        return [
+            PlannedRun(
+                label=_label(configs[-1], variant, seed),
+                world=address,
+                method=method,
+                preset=self.preset,
+                seed=seed,
+                variant=variant,
+                overrides=overrides,
+                shape=self.shape,
+                studies=self.studies,
+                run_ids=tuple(_with_seed(config, seed).run_id for config in configs),
+            )
+            for seed in self.seeds
+        ]
+
+    def to_toml(self) -> str:
+        """Return the text that ``read_plan`` turns back into this plan."""
+        head = {
+            "name": self.name,
+            "title": self.title,
+            "produces": list(self.produces),
+            "seeds": list(self.seeds),
+            "preset": self.preset,
+            "shape": self.shape,
+            "studies": list(self.studies),
+        }
+        where = [
+            {key: list(allowed) for key, allowed in one.conditions.items()}
+            | {"settings": one.settings}
+            for one in self.where
+        ]
+        tables = {
+            "campaign": head,
+            "factors": {name: list(levels) for name, levels in self.factors.items()},
+            "settings": self.settings,
+        }
+        return tomli_w.dumps(tables | ({"where": where} if where else {}))
+
+
+def _with_seed(config: RunConfig, seed: int) -> RunConfig:
+    return dataclasses.replace(config, run=dataclasses.replace(config.run, seed=seed))
+
+
+def _label(config: RunConfig, variant: str, seed: int) -> str:
+    """Return a readable directory name."""
+    parts = [config.task.replace("/", "-"), config.method, *variant.split(", ")]
+    text = "-".join(part for part in [*parts, f"s{seed}"] if part)
+    return re.sub(r"[^A-Za-z0-9._=-]+", "_", text)

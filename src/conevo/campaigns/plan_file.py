@@ -1,0 +1,201 @@
+"""Plans as TOML files, and those that come with conevo: the thesis' experiments.
+
+A plan is a TOML file. Every combination of the levels of its factors is a cell, and every cell is
+run with every seed::
+
+    [campaign]
+    title = "Multi-rover, complex environments"
+    produces = ["figure 5.6"]      # tables and figures of the thesis
+    seeds = 20                     # 1 to 20; or a list of seeds
+    preset = "desk"                # scale; the command line wins
+    shape = false                  # true: every run learns the environments 1 to N in stages
+    studies = ["teams"]            # made of every finished run; [] for none
+
+    [factors]
+    world = ["rover/complex-1..10"]
+    method = ["homcne", "cone"]
+    "method.gst" = [0.1, 0.2]      # any setting may be a factor
+
+    [settings]                     # of all runs, over those of the preset
+    "run.budget_evaluations" = 20000
+
+    [[where]]                      # of the runs that all conditions hold for; later ones win
+    method = ["ccga", "mesp", "cone"]
+    preset = "desk"
+    settings = { "method.fresh_rounds" = true }
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Iterable, Mapping
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from conevo.campaigns.plan import Plan, Where
+from conevo.errors import EnvironmentFailure, UsageError, unknown_name
+from conevo.runs.config import PRESETS
+
+__all__ = ["STUDIES", "preset_names", "read_plan", "read_preset"]
+
+STUDIES = ("teams",)
+TABLES = ("campaign", "factors", "settings", "where")
+HEAD = ("name", "title", "produces", "seeds", "preset", "shape", "studies")
+CONDITIONS = ("world", "method", "preset")
+RANGE = re.compile(r"(.*-)(\d+)\.\.(\d+)")
+
+
+def preset_names() -> list[str]:
+    """Return the names of the plans that come with conevo: the thesis' experiments."""
+    folder = resources.files(__package__) / "presets"
+    return sorted(
+        p.name.removesuffix(".toml") for p in folder.iterdir() if p.name.endswith(".toml")
+    )
+
+
+def read_preset(name: str) -> Plan:
+    """Return a plan that comes with conevo.
+
+    Raises:
+        UsageError: there is none of this name.
+    """
+    if name not in preset_names():
+        raise unknown_name("campaign", name, preset_names())
+    source = resources.files(__package__) / "presets" / f"{name}.toml"
+    return _parse(source.read_text(encoding="utf-8"), f"in campaign {name!r}", name)
+
+
+def read_plan(path: Path) -> Plan:
+    """Return the plan in a file; its name is the file's unless it says another.
+
+    Raises:
+        UsageError: it is no plan; the message names the key and what is allowed.
+        EnvironmentFailure: it cannot be read.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise EnvironmentFailure(f"cannot read {path}: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        raise UsageError(f"{path} is not valid TOML: {error}") from error
+    return _parse(text, f"in {path}", path.stem)
+
+
+def _parse(text: str, place: str, name: str) -> Plan:
+    try:
+        tables = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise UsageError(f"{place.removeprefix('in ')} is not valid TOML: {error}") from error
+    for key in tables:
+        if key not in TABLES:
+            raise unknown_name("section", key, TABLES, place)
+    head = _table(tables, "campaign", place)
+    for key in head:
+        if key not in HEAD:
+            raise unknown_name("key", f"campaign.{key}", [f"campaign.{k}" for k in HEAD], place)
+    preset = _text(head.get("preset", "desk"), "campaign.preset", place)
+    if preset not in PRESETS:
+        raise unknown_name("preset", preset, PRESETS, place)
+    shape = head.get("shape", False)
+    if not isinstance(shape, bool):
+        raise UsageError(f"campaign.shape = {shape!r} {place}: must be true or false")
+    studies = _texts(head.get("studies", list(STUDIES)), "campaign.studies", place)
+    for study in studies:
+        if study not in STUDIES:
+            raise unknown_name("study", study, STUDIES, place)
+    wheres = tables.get("where", [])
+    if not isinstance(wheres, list):
+        raise UsageError(f"where {place} must be written [[where]]")
+    return Plan(
+        name=_name(head.get("name", name), place),
+        title=_text(head.get("title", ""), "campaign.title", place),
+        produces=_texts(head.get("produces", []), "campaign.produces", place),
+        seeds=_seeds(head.get("seeds", 20), place),
+        preset=preset,
+        shape=shape,
+        studies=studies,
+        factors=_factors(_table(tables, "factors", place), place),
+        settings=_table(tables, "settings", place),
+        where=tuple(_where(one, place) for one in wheres),
+        place=place,
+    )
+
+
+def _table(tables: Mapping[str, Any], key: str, place: str) -> dict[str, Any]:
+    found = tables.get(key, {})
+    if not isinstance(found, dict):
+        raise UsageError(f"{key} {place} must be a table: [{key}]")
+    return found
+
+
+def _name(value: Any, place: str) -> str:
+    name = _text(value, "campaign.name", place)
+    if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._-]*", name):
+        raise UsageError(
+            f"campaign.name = {name!r} {place}: letters, digits and . _ - only, it names a folder"
+        )
+    return name
+
+
+def _text(value: Any, key: str, place: str) -> str:
+    if not isinstance(value, str):
+        raise UsageError(f"{key} = {value!r} {place}: must be text")
+    return value
+
+
+def _texts(value: Any, key: str, place: str) -> tuple[str, ...]:
+    if not isinstance(value, list):
+        raise UsageError(f"{key} = {value!r} {place}: must be a list of texts")
+    return tuple(_text(one, key, place) for one in value)
+
+
+def _seeds(value: Any, place: str) -> tuple[int, ...]:
+    if isinstance(value, int) and not isinstance(value, bool) and value >= 1:
+        return tuple(range(1, value + 1))
+    is_list = isinstance(value, list) and value
+    if not is_list or any(type(seed) is not int or seed < 0 for seed in value):
+        raise UsageError(
+            f"campaign.seeds = {value!r} {place}: must be a number from 1, or a list of seeds"
+        )
+    return tuple(value)
+
+
+def _factors(table: Mapping[str, Any], place: str) -> dict[str, tuple[Any, ...]]:
+    factors: dict[str, tuple[Any, ...]] = {}
+    for name, levels in ({"world": [], "method": []} | dict(table)).items():
+        if not isinstance(levels, list) or not levels:
+            raise UsageError(f"factors.{name} {place}: must be a list of at least one level")
+        if name in ("world", "method"):
+            levels = _expand(_texts(levels, f"factors.{name}", place))
+        elif any(isinstance(level, (list, dict)) for level in levels):
+            raise UsageError(f"factors.{name} {place}: levels are numbers, texts, true or false")
+        factors[name] = tuple(levels)
+    return factors
+
+
+def _expand(names: Iterable[str]) -> list[str]:
+    """Turn "rover/complex-1..10" into ten names."""
+    found: list[str] = []
+    for name in names:
+        if match := RANGE.fullmatch(name):
+            stem, first, last = match.groups()
+            found += [f"{stem}{k}" for k in range(int(first), int(last) + 1)]
+        else:
+            found.append(name)
+    return found
+
+
+def _where(table: Any, place: str) -> Where:
+    if not isinstance(table, dict):
+        raise UsageError(f"where {place} must be written [[where]]")
+    conditions: dict[str, tuple[str, ...]] = {}
+    for key, value in table.items():
+        if key == "settings":
+            continue
+        if key not in CONDITIONS:
+            raise unknown_name("condition", f"where.{key}", [*CONDITIONS, "settings"], place)
+        allowed = [value] if isinstance(value, str) else value
+        conditions[key] = tuple(_expand(_texts(allowed, f"where.{key}", place)))
+    return Where(conditions, _table(table, "settings", place))

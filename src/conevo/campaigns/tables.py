@@ -1,0 +1,171 @@
+"""The tables that analysis reads: everything that is finished, as Parquet.
+
+One row per run, score, generation and so on, made by DuckDB from the files of the runs and their
+studies; their columns are ``analysis.frames.SCHEMA``. All are made anew when more is finished.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+import tempfile
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from conevo.analysis.frames import SCHEMA
+from conevo.campaigns.places import Places
+from conevo.campaigns.plan import PlannedRun
+from conevo.runs.config import RunConfig
+from conevo.runs.directory import as_json, read_json
+from conevo.runs.durable import replace_file, sync_directory, writing
+
+__all__ = ["is_sealed", "seal_tables"]
+
+MANIFEST = "tables.json"
+Row = dict[str, Any]
+
+
+def is_sealed(places: Places, finished: Sequence[PlannedRun]) -> bool:
+    """Whether the tables are those of exactly these runs."""
+    path = places.tables / MANIFEST
+    return path.is_file() and read_json(path) == _manifest(finished)
+
+
+def seal_tables(places: Places, finished: Sequence[PlannedRun]) -> None:
+    """Make the tables of these runs, unless they are there.
+
+    A kill leaves the tables that were there before, or none.
+
+    Raises:
+        UsageError: a file of a run is damaged.
+        EnvironmentFailure: they cannot be written.
+    """
+    if is_sealed(places, finished):
+        return
+    import duckdb
+
+    with writing(places.tables):
+        draft = Path(tempfile.mkdtemp(prefix=".tables.", dir=places.root))
+    try:
+        files = {name: (draft / f"{name}.jsonl").open("w", encoding="utf-8") for name in SCHEMA}
+        with writing(places.tables):
+            for planned in finished:
+                for table, row in _rows(places, planned):
+                    files[table].write(json.dumps(row, allow_nan=False) + "\n")
+            for file in files.values():
+                file.close()
+        for table, columns in SCHEMA.items():
+            source, target = draft / f"{table}.jsonl", draft / f"{table}.parquet"
+            duckdb.sql(
+                f"COPY (SELECT * FROM read_json({_quoted(source)}, format='newline_delimited', "
+                f"columns={columns})) TO {_quoted(target)} (FORMAT parquet, COMPRESSION zstd)"
+            )
+            source.unlink()
+        replace_file(draft / MANIFEST, as_json(_manifest(finished)))
+        with writing(places.tables):
+            shutil.rmtree(places.tables, ignore_errors=True)
+            draft.rename(places.tables)
+            sync_directory(places.root)
+    finally:
+        shutil.rmtree(draft, ignore_errors=True)
+
+
+def _manifest(finished: Sequence[PlannedRun]) -> Row:
+    return {"columns": SCHEMA, "runs": {run.label: list(run.run_ids) for run in finished}}
+
+
+def _quoted(path: Path) -> str:
+    return "'" + str(path).replace("'", "''") + "'"
+
+
+def _rows(places: Places, planned: PlannedRun) -> Iterator[tuple[str, Row]]:
+    """Yield every row that a finished run has in any table."""
+    ended = places.ended(planned.label)
+    spent = read_json(ended)["core_seconds"] if ended.is_file() else 0.0
+    names = planned.names
+    for name, config in zip(names, planned.configs(), strict=True):
+        path = places.run(name)
+        provenance = read_json(path / "provenance.json")
+        lines = (path / "generations.jsonl").read_text(encoding="utf-8").splitlines()
+        records = [json.loads(line) for line in lines]
+        test = read_json(path / "test.json")
+        measure = next(iter(test["champion"]["performance"]))
+        yield (
+            "runs",
+            _run_row(planned, config, provenance, records)
+            | {
+                "run": name,
+                "measure": measure,
+                "optimum": getattr(config.build_world(), "optimum", None),
+                "n_robots": len(test["champion"]["labels"]),
+                "core_seconds": spent / len(names),
+            },
+        )
+        for team, title in (("champion", "champion"), ("generation_0", "generation 0")):
+            for one, values in test[team]["performance"].items():
+                about = {"run": name, "study": "test", "team": title, "measure": one}
+                for scenario, value in enumerate(values["values"]):
+                    yield "scores", about | {"scenario": scenario, "value": value}
+        for record in records:
+            yield from _generation_rows(name, record)
+        if places.study(name).is_file():
+            yield from _study_rows(name, read_json(places.study(name)))
+
+
+def _run_row(
+    planned: PlannedRun, config: RunConfig, provenance: Row, records: Sequence[Row]
+) -> Row:
+    family, _, number = config.environment.rpartition("-")
+    is_numbered = bool(family) and number.isdecimal()
+    return {
+        "task": config.task,
+        "world": config.world,
+        "environment": config.environment,
+        "family": family if is_numbered else config.environment,
+        "number": int(number) if is_numbered else 0,
+        "method": config.method,
+        "preset": config.preset,
+        "seed": config.run.seed,
+        "variant": planned.variant,
+        "generations": len(records),
+        "evaluations": records[-1]["team_evaluations"],
+        "team_steps": records[-1]["team_steps"],
+        "seconds": sum(record["seconds"] for record in records),
+        "stopped_by": provenance["stopped_by"],
+        "run_id": provenance["run_id"],
+        "conevo": provenance["conevo"],
+        "warp": provenance["warp"],
+        "kernel_hash": provenance["kernel_hash"],
+    }
+
+
+def _generation_rows(name: str, record: Row) -> Iterator[tuple[str, Row]]:
+    generation = record["generation"]
+    yield (
+        "generations",
+        {
+            "run": name,
+            "generation": generation,
+            "evaluations": record["team_evaluations"],
+            "team_steps": record["team_steps"],
+            "value": next(iter(record["performance"].values())),
+            "fitness": record["team_fitness"],
+            "specialization": record["specialization"],
+            "sst": record["sst"],
+            "gst": record["gst"],
+            "recombinations": record["recombinations"],
+            "hidden": sum(record["n_hidden"]) / len(record["n_hidden"]),
+        },
+    )
+    for caste, robots in record["castes"].items():
+        about = {"run": name, "generation": generation}
+        yield "castes", about | {"caste": caste, "robots": robots}
+
+
+def _study_rows(name: str, study: Row) -> Iterator[tuple[str, Row]]:
+    for metric, value in study["metrics"].items():
+        yield "metrics", {"run": name, "metric": metric, "value": value}
+    for table in ("scores", "robots", "actions", "behaviours"):
+        for row in study[table]:
+            yield table, {"run": name} | row

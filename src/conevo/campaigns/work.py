@@ -1,0 +1,166 @@
+"""One worker: carries one run of a campaign to its end, wherever it stands.
+
+``python -m conevo.campaigns.work CAMPAIGN LABEL THREADS`` is the unit of work of every executor.
+It is idempotent: a finished run is left alone, an interrupted one goes on from its checkpoint, and
+how it ended is a file, ``ended/LABEL.json``, that holds plain data.
+"""
+
+from __future__ import annotations
+
+import _thread
+import json
+import os
+import platform
+import resource
+import sys
+import threading
+import time
+import traceback
+from pathlib import Path
+from typing import Any
+
+from conevo.campaigns.places import Places
+from conevo.campaigns.plan import PlannedRun
+from conevo.errors import ConevoError, EnvironmentFailure, UsageError
+from conevo.runs.directory import as_json, kind_of
+from conevo.runs.durable import replace_file
+from conevo.runs.run import Run, start
+from conevo.runs.shaping import Shaping, start_shaping
+
+__all__ = ["carry_out", "main", "planned_runs"]
+
+PATIENCE = 60.0  # seconds to wait for another worker that is just about to leave a run
+
+
+def planned_runs(root: Path) -> dict[str, PlannedRun]:
+    """Return the runs of a campaign by label, in the order of the plan.
+
+    Raises:
+        UsageError: the list is damaged.
+        EnvironmentFailure: it cannot be read.
+    """
+    path = Places(root).runs
+    try:
+        lines = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
+        runs = [
+            PlannedRun(**{key: _frozen(value) for key, value in line.items()}) for line in lines
+        ]
+    except OSError as error:
+        raise EnvironmentFailure(f"cannot read {path}: {error.strerror}") from error
+    except (ValueError, TypeError, KeyError) as error:
+        raise UsageError(f"{path} is damaged: {error}") from error
+    return {run.label: run for run in runs}
+
+
+def carry_out(root: Path, label: str, threads: int) -> bool:
+    """Carry a run on to its end, study it, and write down how it ended.
+
+    Args:
+        root: the campaign's directory.
+        label: which of its runs.
+        threads: CPU threads; no result depends on it.
+
+    Returns:
+        Whether it is finished. If not, ``ended/LABEL.json`` says why.
+    """
+    began = time.perf_counter()
+    ending: dict[str, Any] = {"status": "finished", "origin": "", "message": "", "traceback": ""}
+    try:
+        places = Places(root)
+        planned = planned_runs(root)
+        if label not in planned:
+            raise UsageError(f"{root} plans no run {label!r}")
+        found = _evolve(places, planned[label], threads)
+        if planned[label].studies:
+            _study(places, planned[label], found, threads)
+    except Exception as error:
+        ending = {"status": "failed", **_describe(error)}
+    spent = resource.getrusage(resource.RUSAGE_SELF)
+    ending |= {
+        "threads": threads,
+        "core_seconds": round(spent.ru_utime + spent.ru_stime, 3),
+        "wall_seconds": round(time.perf_counter() - began, 3),
+        "host": platform.node(),
+    }
+    path = Places(root).ended(label)
+    path.parent.mkdir(exist_ok=True)
+    replace_file(path, as_json(ending))
+    return bool(ending["status"] == "finished")
+
+
+def _describe(error: Exception) -> dict[str, str]:
+    """Return whose fault an error is, what it says, and where a program's own came from."""
+    if isinstance(error, ConevoError):
+        origin = "machine" if isinstance(error, EnvironmentFailure) else "request"
+        return {"origin": origin, "message": str(error), "traceback": ""}
+    trace = traceback.format_exc()
+    return {"origin": "program", "message": repr(error), "traceback": trace}
+
+
+def _evolve(places: Places, planned: PlannedRun, threads: int) -> Run | Shaping:
+    """Return the run, finished by now."""
+    path = places.run(planned.label)
+    configs = planned.configs()
+    if not kind_of(path):
+        command = f"conevo campaign start, run {planned.label}"
+        if planned.shape:
+            start_shaping(
+                planned.tasks,
+                planned.method,
+                planned.preset,
+                planned.seed,
+                path,
+                planned.overrides,
+                threads=threads,
+                command=command,
+            )
+        else:
+            start(configs[0], path, threads=threads, command=command)
+    found = Shaping(path) if kind_of(path) == "shaping" else Run(path)
+    made = found.configs if isinstance(found, Shaping) else [found.config]
+    if tuple(config.run_id for config in made) != planned.run_ids:
+        raise UsageError(f"{path} is not the run that was planned; move it away and retry")
+    deadline = time.monotonic() + PATIENCE
+    while found.status == "running" and time.monotonic() < deadline:
+        time.sleep(0.2)
+    if found.status != "finished":
+        found.resume(threads=threads)
+    return found
+
+
+def _study(places: Places, planned: PlannedRun, found: Run | Shaping, threads: int) -> None:
+    """Study the fittest team of a run, or of every stage, unless that was done."""
+    from conevo.analysis.studies import study
+
+    runs = [found] if isinstance(found, Run) else found.stages
+    for name, run in zip(planned.names, runs, strict=True):
+        path = places.study(name)
+        if not path.is_file():
+            path.parent.mkdir(exist_ok=True)
+            replace_file(path, as_json(study(run, threads=threads)))
+
+
+def _frozen(value: Any) -> Any:
+    return tuple(value) if isinstance(value, list) else value
+
+
+def main() -> None:
+    """Carry out one run; end when the coordinator does, which holds the other end of stdin."""
+    root, label, threads = sys.argv[1:]
+
+    def leave_with_coordinator() -> None:
+        sys.stdin.buffer.read()
+        _thread.interrupt_main()  # as Ctrl-C: the run writes its checkpoint
+
+    if not sys.stdin.isatty():
+        threading.Thread(target=leave_with_coordinator, daemon=True).start()
+    try:
+        is_finished = carry_out(Path(root), label, int(threads))
+    except KeyboardInterrupt:
+        os._exit(130)
+    sys.stdout.flush()
+    os._exit(0 if is_finished else 1)  # the thread that reads stdin never ends by itself
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,169 @@
+"""``conevo campaign``: plans of many runs, carried out to the end."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+if TYPE_CHECKING:
+    from conevo.campaigns.campaign import Campaign
+
+__all__ = ["campaign"]
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+FAILED = 1  # exit code when runs of a campaign have failed
+EXECUTION = (
+    click.option(
+        "--executor", default="processes", show_default=True, metavar="NAME",
+        help="processes, serial or ray.",
+    ),
+    click.option("--cores", type=click.IntRange(1), help="CPU cores to use together (all)."),
+    click.option(
+        "--threads", type=click.IntRange(1), default=1, show_default=True,
+        help="CPU threads of a run; changes no result.",
+    ),
+    click.option("--address", metavar="ADDRESS", help="With ray: of an existing cluster, or auto."),
+    click.option("--json", "as_json", is_flag=True, help="One JSON object per run that ends."),
+    click.option("--quiet", is_flag=True, help="Print only the campaign's directory."),
+)  # fmt: skip
+
+
+def execution_options(function: Function) -> Function:
+    """Add the options that say where and how runs are carried out."""
+    for option in reversed(EXECUTION):
+        function = option(function)
+    return function
+
+
+@click.group("campaign", short_help="Start, watch, stop and retry plans of many runs.")
+def campaign() -> None:
+    """Plans of many runs: methods x environments x seeds, resumable.
+
+    Begin with: conevo campaign start rover-complex --preset smoke --seeds 2
+    """
+
+
+@campaign.command("list", short_help="The thesis' experiments, and the campaigns here.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON value.")
+def list_(as_json: bool) -> None:
+    """List the experiments that come with conevo, and the campaigns in campaigns/."""
+    from conevo.cli.campaign_text import campaigns_here, experiments, print_lists
+
+    found = {"experiments": experiments(), "campaigns": campaigns_here()}
+    if as_json:
+        click.echo(json.dumps(found))
+    else:
+        print_lists(**found)
+
+
+@campaign.command(short_help="Start a campaign, or finish what is missing.")
+@click.argument("name", metavar="NAME|FILE|DIR")
+@click.option("--preset", metavar="NAME", help="smoke, desk (default), night, thesis.")
+@click.option("--seeds", type=int, help="Runs of every cell (default: as the plan says).")
+@click.option(
+    "--set", "settings", metavar="KEY=VALUE", multiple=True,
+    help="A setting of all runs, for example run.budget_evaluations=5000.",
+)  # fmt: skip
+@click.option("--out", metavar="DIR", help="Its directory (default: campaigns/NAME).")
+@click.option("--dry-run", is_flag=True, help="Print the runs; write and start nothing.")
+@execution_options
+def start(
+    name: str,
+    preset: str | None,
+    seeds: int | None,
+    settings: tuple[str, ...],
+    out: str | None,
+    dry_run: bool,
+    **execution: Any,
+) -> int:
+    """Carry out NAME (see: conevo campaign list), a plan in a TOML FILE, or go on in DIR.
+
+    Starting it again finishes only what is missing. Ctrl-C and conevo campaign stop leave runs that
+    go on where they were.
+    """
+    from conevo.cli.campaign_run import carry_on, ready
+    from conevo.cli.campaign_text import print_plan
+
+    execute = ready(**execution)
+    found, plan = _planned(name, preset, seeds, settings, out)
+    if dry_run:
+        print_plan(found.planned.values() if found else plan.write_out(), execution["as_json"])
+        return 0
+    return carry_on(found or _create(plan, name, out), execute)
+
+
+@campaign.command(short_help="How a campaign stands.")
+@click.argument("name", metavar="NAME")
+@click.option("--runs", is_flag=True, help="A line for every run.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON value.")
+def status(name: str, runs: bool, as_json: bool) -> int:
+    """Print how many runs of every cell are finished, and what failed and why; ends with 1 if any.
+
+    It only reads, also while the campaign runs.
+    """
+    from conevo.cli.campaign_text import print_status
+    from conevo.cli.find import find_campaign
+
+    return FAILED if print_status(find_campaign(name), runs, as_json) else 0
+
+
+@campaign.command(short_help="Let a running campaign stop where it is.")
+@click.argument("name", metavar="NAME")
+def stop(name: str) -> None:
+    """Ask the campaign's coordinator, on whatever machine, to stop; runs keep all they have."""
+    from conevo.cli.find import find_campaign
+
+    found = find_campaign(name)
+    found.stop()
+    click.echo(f"asked {found.path} to stop; go on with: conevo campaign start {found.path}")
+
+
+@campaign.command(short_help="Try the failed runs again.")
+@click.argument("name", metavar="NAME")
+@execution_options
+def retry(name: str, **execution: Any) -> int:
+    """Try the failed runs of a campaign again, and finish what is missing."""
+    from conevo.cli.campaign_run import carry_on, ready
+    from conevo.cli.find import find_campaign
+
+    execute = ready(**execution)
+    found = find_campaign(name)
+    found.retry()
+    return carry_on(found, execute)
+
+
+def _planned(
+    name: str, preset: str | None, seeds: int | None, settings: tuple[str, ...], out: str | None
+) -> tuple[Campaign | None, Any]:
+    """Return the campaign that is meant, or else the plan to begin one with."""
+    from pathlib import Path
+
+    from conevo.campaigns.plan_file import read_plan, read_preset
+    from conevo.cli.find import campaign_at
+    from conevo.runs.config import parse_assignment
+
+    wanted = preset is not None or seeds is not None or bool(settings)
+    there = campaign_at(out or name)
+    if there is not None and not wanted:
+        return there, there.plan
+    if there is not None and out is None:
+        plan = there.plan
+    elif name.endswith(".toml"):
+        plan = read_plan(Path(name))
+    else:
+        plan = read_preset(name)
+    return None, plan.at(preset, seeds, dict(parse_assignment(text) for text in settings))
+
+
+def _create(plan: Any, name: str, out: str | None) -> Campaign:
+    """Write the campaign out where it belongs."""
+    from pathlib import Path
+
+    from conevo.campaigns.campaign import CAMPAIGNS, create
+    from conevo.cli.find import campaign_at
+
+    there = campaign_at(name) if out is None else None
+    return create(plan, Path(out) if out else there.path if there else CAMPAIGNS / plan.name)

@@ -1,0 +1,170 @@
+"""Carrying a campaign out while someone watches."""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from contextlib import nullcontext
+from dataclasses import dataclass
+from typing import Any
+
+import click
+
+from conevo.campaigns.campaign import Campaign, Stopped
+from conevo.campaigns.estimate import remaining_seconds
+from conevo.campaigns.executors import Ending, Executor, make_executor
+from conevo.campaigns.ledger import Entry
+from conevo.cli.campaign_text import counts, grid
+from conevo.cli.carry import style_of
+from conevo.cli.text import duration
+from conevo.errors import EnvironmentFailure, UsageError
+
+__all__ = ["Execution", "carry_on", "ready"]
+
+FAILED = 1
+
+
+@dataclass(frozen=True)
+class Execution:
+    """Where and how runs are carried out, and how that is reported."""
+
+    executor: Executor
+    threads: int
+    style: str
+
+
+def ready(
+    executor: str,
+    cores: int | None,
+    threads: int,
+    address: str | None,
+    as_json: bool,
+    quiet: bool,
+) -> Execution:
+    """Return what the options ask for, before anything is written.
+
+    Raises:
+        UsageError: options that do not go together, an unknown executor or one not installed.
+    """
+    made = make_executor(executor, cores, address)
+    if threads > made.cores and executor != "serial":
+        raise UsageError(f"--threads {threads}: there are only {made.cores} cores to use")
+    return Execution(made, threads, style_of(as_json, quiet, False))
+
+
+def carry_on(campaign: Campaign, execution: Execution) -> int:
+    """Finish what is missing, then say what can be done next; returns the exit code."""
+    view = View(campaign, execution)
+    advice = f"conevo campaign start {campaign.path}"
+    try:
+        with view.showing():
+            entries = campaign.carry_on(
+                execution.executor, threads=execution.threads, watch=view.watch
+            )
+    except (KeyboardInterrupt, Stopped) as error:
+        word = "stopped" if isinstance(error, Stopped) else "interrupted"
+        done = counts(campaign.standings())
+        click.echo(f"{word} with {done}; go on with: {advice}", err=True)
+        sys.exit(0 if isinstance(error, Stopped) else 130)
+    except EnvironmentFailure as error:
+        raise EnvironmentFailure(f"{error}; when that is mended: {advice}") from error
+    if execution.style == "quiet":
+        click.echo(str(campaign.path))
+    elif execution.style != "json":
+        view.print_end(entries)
+    return FAILED if any(entry.state == "failed" for entry in entries.values()) else 0
+
+
+class View:
+    """What is shown of a campaign that is being carried out."""
+
+    def __init__(self, campaign: Campaign, execution: Execution) -> None:
+        self.campaign, self.execution = campaign, execution
+        self.began = time.monotonic()
+        self.live: Any = None
+        self.looked = 0.0
+
+    def showing(self) -> Any:
+        """Return the context in which the live table is on the screen."""
+        if self.execution.style == "plain":
+            found = self.campaign
+            click.echo(f"{found.plan.title or found.plan.name}\n{found.path}")
+            click.echo(f"{len(found.planned)} runs, {counts(found.standings())}")
+        if self.execution.style != "live":
+            return nullcontext()
+        from rich.live import Live
+
+        self.live = Live(self.render(self.campaign.standings()), refresh_per_second=4)
+        return self.live
+
+    def watch(self, campaign: Campaign, ending: Ending | None) -> None:
+        """Show how things stand; called after each ending, and now and then."""
+        if ending is None and (self.live is None or time.monotonic() < self.looked + 1):
+            return
+        self.looked = time.monotonic()
+        entries = {entry.label: entry for entry in campaign.ledger.entries()}
+        if self.live is not None:
+            self.live.update(self.render(entries))
+        elif ending is not None and self.execution.style == "json":
+            entry = entries[ending.label]
+            place = str(campaign.places.run(entry.label))
+            about = {"run": entry.label, "state": entry.state, "reason": entry.reason}
+            spent = {"core_seconds": entry.core_seconds, "path": place}
+            click.echo(json.dumps(about | spent | self.progress(entries)))
+        elif ending is not None and self.execution.style == "plain":
+            entry = entries[ending.label]
+            why = f": {entry.reason}" if entry.reason else ""
+            click.echo(f"{entry.state} {entry.label}{why}  ({self.line(entries)})")
+
+    def progress(self, entries: dict[str, Entry]) -> dict[str, Any]:
+        """Return how many runs are finished of how many, and the seconds left, None if unknown."""
+        done = sum(entry.state == "finished" for entry in entries.values())
+        cores = self.execution.executor.cores
+        left = remaining_seconds(self.campaign, entries, cores, time.time())
+        left = None if left is None else round(left, 1)
+        return {"finished": done, "of": len(self.campaign.planned), "seconds_left": left}
+
+    def line(self, entries: dict[str, Entry]) -> str:
+        """Return how many runs are finished, and the time left."""
+        found = self.progress(entries)
+        left = found["seconds_left"]
+        rest = "time left not known yet" if left is None else f"about {duration(left)} left"
+        return f"{found['finished']} of {found['of']} finished, {rest}"
+
+    def render(self, entries: dict[str, Entry]) -> Any:
+        """Return the live table of this moment."""
+        from rich.console import Group
+        from rich.progress_bar import ProgressBar
+        from rich.table import Table
+
+        found = self.progress(entries)
+        bar = Table.grid()
+        bar.add_row(ProgressBar(total=found["of"], completed=found["finished"], width=60))
+        head, rows = grid(self.campaign.planned.values(), entries)
+        table = Table(*head, box=None, padding=(0, 2, 0, 0))
+        for row in rows:
+            table.add_row(*row)
+        at_work = [entry.label for entry in entries.values() if entry.state == "running"]
+        return Group(
+            f"[bold]{self.campaign.plan.title or self.campaign.plan.name}[/bold]\n"
+            f"{self.campaign.path}",
+            bar,
+            f"{self.line(entries)}, {duration(time.monotonic() - self.began)} so far",
+            table,
+            *(f"at work: {label}" for label in at_work[:8]),
+        )
+
+    def print_end(self, entries: dict[str, Entry]) -> None:
+        """Say what there is now and what can be done with it."""
+        path = self.campaign.path
+        click.echo(f"{counts(entries)}")
+        for entry in [entry for entry in entries.values() if entry.state == "failed"]:
+            click.echo(f"  failed {entry.label}: {entry.reason}")
+        if any(entry.state == "failed" for entry in entries.values()):
+            click.echo(f"try them again:  conevo campaign retry {path}")
+        click.echo(f"look at it:      conevo report {path}")
+        click.echo(
+            f"ask anything:    conevo query {path} "
+            '"SELECT task, method, count(*) FROM runs GROUP BY ALL"'
+        )

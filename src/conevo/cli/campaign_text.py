@@ -1,0 +1,143 @@
+"""Campaigns as text: experiments, plans, how runs stand."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import click
+
+from conevo.campaigns.campaign import CAMPAIGNS, Campaign
+from conevo.campaigns.estimate import remaining_seconds
+from conevo.campaigns.executors import usable_cores
+from conevo.campaigns.ledger import STATES, Entry
+from conevo.campaigns.plan import PlannedRun
+from conevo.campaigns.plan_file import preset_names, read_preset
+from conevo.cli.find import campaigns_in
+from conevo.cli.text import duration, table
+from conevo.errors import ConevoError
+
+__all__ = [
+    "campaigns_here",
+    "counts",
+    "experiments",
+    "grid",
+    "print_lists",
+    "print_plan",
+    "print_status",
+]
+
+Rows = list[dict[str, Any]]
+
+
+def experiments() -> Rows:
+    """Return the plans that come with conevo."""
+    plans = [read_preset(name) for name in preset_names()]
+    return [
+        {"name": p.name, "runs": p.n_runs, "title": p.title, "produces": list(p.produces)}
+        for p in plans
+    ]
+
+
+def campaigns_here() -> Rows:
+    """Return the campaigns in campaigns/."""
+    rows: Rows = []
+    for path in campaigns_in(CAMPAIGNS):
+        try:
+            found = Campaign(path)
+            stands = counts(found.standings())
+            rows.append({"campaign": str(path), "preset": found.plan.preset, "runs": stands})
+        except ConevoError as error:
+            rows.append({"campaign": str(path), "preset": "", "runs": f"damaged: {error}"})
+    return rows
+
+
+def print_lists(experiments: Rows, campaigns: Rows) -> None:
+    """Print both lists."""
+    rows = [
+        [row["name"], str(row["runs"]), row["title"], "; ".join(row["produces"])]
+        for row in experiments
+    ]
+    click.echo(table(["experiment", "runs", "what", "of the thesis"], rows))
+    click.echo("\nstart one: conevo campaign start NAME [--preset smoke] [--seeds N]\n")
+    if campaigns:
+        click.echo(table(list(campaigns[0]), [[*row.values()] for row in campaigns]))
+    else:
+        click.echo(f"no campaigns in {CAMPAIGNS}/ yet")
+
+
+def print_plan(runs: Iterable[PlannedRun], as_json: bool) -> None:
+    """Print every run of a plan."""
+    if as_json:
+        for run in runs:
+            click.echo(json.dumps({"run": run.label, "run_ids": run.run_ids, **run.overrides}))
+        return
+    rows = [[run.label, run.preset, " ".join(run.run_ids)] for run in runs]
+    click.echo(table(["run", "preset", "run id"], rows))
+
+
+def print_status(campaign: Campaign, with_runs: bool, as_json: bool) -> bool:
+    """Print how a campaign stands; returns whether runs have failed."""
+    entries = campaign.standings()
+    failed = [entry for entry in entries.values() if entry.state == "failed"]
+    left = None
+    if campaign.is_running:
+        left = remaining_seconds(campaign, entries, usable_cores(), time.time())
+    if as_json:
+        rows = [
+            {"run": e.label, "state": e.state, "attempts": e.attempts, "reason": e.reason}
+            for e in entries.values()
+        ]
+        about = {"campaign": str(campaign.path), "running": campaign.is_running}
+        click.echo(json.dumps(about | {"seconds_left": left, "runs": rows}))
+        return bool(failed)
+    click.echo(f"{campaign.plan.title or campaign.plan.name} (preset {campaign.plan.preset})")
+    running = "running" if campaign.is_running else "not running"
+    rest = f", about {duration(left)} left" if left is not None else ""
+    click.echo(f"{campaign.path}: {running}, {counts(entries)}{rest}\n")
+    if with_runs:
+        rows_of = [[e.label, e.state, str(e.attempts), e.reason] for e in entries.values()]
+        click.echo(table(["run", "state", "attempts", "reason"], rows_of))
+    else:
+        head, cells = grid(campaign.planned.values(), entries)
+        click.echo(table(head, cells))
+    for entry in failed:
+        click.echo(f"failed {entry.label}: {entry.reason}")
+    return bool(failed)
+
+
+def counts(entries: Mapping[str, Entry]) -> str:
+    """Return how many runs are in each state: "12 finished, 2 running, 76 pending"."""
+    found = Counter(entry.state for entry in entries.values())
+    order = ("finished", *(state for state in STATES if state != "finished"))
+    return ", ".join(f"{found[state]} {state}" for state in order if found[state])
+
+
+def grid(
+    planned: Iterable[PlannedRun], entries: Mapping[str, Entry]
+) -> tuple[list[str], list[list[str]]]:
+    """Return a table of finished runs: a row per environment and variant, a column per method."""
+    cells: dict[tuple[str, str], dict[str, list[Entry]]] = {}
+    for run in planned:
+        if run.label in entries:
+            row = cells.setdefault((run.world, run.variant), {})
+            row.setdefault(run.method, []).append(entries[run.label])
+    methods = list(dict.fromkeys(method for row in cells.values() for method in row))
+    lines = [
+        [" ".join(name for name in key if name), *(_cell(row.get(m, [])) for m in methods)]
+        for key, row in cells.items()
+    ]
+    return ["finished", *methods], lines
+
+
+def _cell(entries: list[Entry]) -> str:
+    """Return "3/6", with what is at work ("+1") and what has failed ("!1")."""
+    if not entries:
+        return "-"
+    found = Counter(entry.state for entry in entries)
+    more = f" +{found['running']}" if found["running"] else ""
+    failed = f" !{found['failed']}" if found["failed"] else ""
+    return f"{found['finished']}/{len(entries)}{more}{failed}"

@@ -1,0 +1,48 @@
+"""``conevo query``: SQL over the tables of a campaign."""
+
+from __future__ import annotations
+
+import csv
+import json
+import sys
+
+import click
+
+__all__ = ["query"]
+
+
+@click.command(short_help="Ask the tables of a campaign anything, in SQL.")
+@click.argument("arguments", metavar="[CAMPAIGN] SQL", nargs=-1, required=True)
+@click.option("--csv", "as_csv", is_flag=True, help="Print comma-separated values.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object per row.")
+def query(arguments: tuple[str, ...], as_csv: bool, as_json: bool) -> None:
+    """Print the answer to SQL over the finished runs of CAMPAIGN (the only one here by default).
+
+    Tables: runs, scores, generations, castes, robots, actions, metrics, behaviours; see their
+    columns with "DESCRIBE runs". Nothing can be changed by it.
+    """
+    from conevo.analysis.frames import Tables
+    from conevo.cli.find import find_campaign, only_campaign, sealed
+    from conevo.cli.text import table
+    from conevo.errors import UsageError
+
+    if as_csv and as_json:
+        raise UsageError("--csv and --json exclude each other")
+    if len(arguments) > 2:
+        raise UsageError('query takes a campaign and one SQL text: conevo query NAME "SELECT ..."')
+    found = find_campaign(arguments[0]) if len(arguments) == 2 else only_campaign()
+    columns, rows = Tables(sealed(found).places.tables).query(arguments[-1])
+    if as_json:
+        for row in rows:
+            click.echo(json.dumps(dict(zip(columns, row, strict=True)), default=str))
+    elif as_csv:
+        writer = csv.writer(sys.stdout, lineterminator="\n")
+        writer.writerow(columns)
+        writer.writerows(rows)
+    else:
+        texts = [["-" if value is None else _text(value) for value in row] for row in rows]
+        click.echo(table(columns, texts))
+
+
+def _text(value: object) -> str:
+    return f"{value:.6g}" if isinstance(value, float) else str(value)

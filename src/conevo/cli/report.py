@@ -1,0 +1,26 @@
+"""``conevo report``: everything that a campaign says, as pages, tables, figures and numbers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+__all__ = ["report"]
+
+
+@click.command(short_help="Write what a campaign says: page, tables, figures, numbers.")
+@click.argument("name", metavar="CAMPAIGN")
+@click.option("--out", metavar="DIR", help="Where (default: report/ in the campaign).")
+def report(name: str, out: str | None) -> None:
+    """Write a self-contained page, LaTeX tables, PDF and SVG figures, and their numbers as CSV.
+
+    It is made of all runs that are finished, and says what is missing. A report that was changed
+    by hand is not replaced.
+    """
+    from conevo.analysis.report import write_report
+    from conevo.cli.find import find_campaign, sealed
+
+    found = sealed(find_campaign(name))
+    page = write_report(found.path, Path(out) if out else found.places.report)
+    click.echo(f"open in a browser: {page}")

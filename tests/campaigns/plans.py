@@ -1,0 +1,41 @@
+"""A campaign of tiny runs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from conevo.campaigns.campaign import Campaign, create
+from conevo.campaigns.plan_file import read_plan
+
+TINY = """
+[campaign]
+title = "Tiny"
+seeds = 2
+preset = "smoke"
+{head}
+
+[factors]
+world = ["rover/complex-1"]
+method = ["homcne", "cone"]
+{factors}
+
+[settings]
+"run.generations" = 2
+"run.fittest_epochs" = 1
+"run.n_tests" = 2
+"world.iterations" = 40
+"method.genotypes" = 6
+{more}
+"""
+
+
+def write_plan(folder: Path, head: str = "", factors: str = "", more: str = "") -> Path:
+    """Write the plan of a campaign of four tiny runs, or more."""
+    path = folder / "tiny.toml"
+    path.write_text(TINY.format(head=head, factors=factors, more=more))
+    return path
+
+
+def tiny_campaign(folder: Path, head: str = "studies = []", **parts: str) -> Campaign:
+    """Write out a campaign of four tiny runs; nothing is started."""
+    return create(read_plan(write_plan(folder, head, **parts)), folder / "tiny")

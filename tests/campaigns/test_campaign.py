@@ -1,0 +1,212 @@
+"""What the coordinator does, with an executor that does nothing by itself; see also contracts."""
+
+import json
+import shutil
+
+import pytest
+
+from campaigns.plans import tiny_campaign, write_plan
+from conevo.campaigns.campaign import ATTEMPTS, Campaign, Stopped, create
+from conevo.campaigns.executors import Ending, Job, Serial
+from conevo.campaigns.plan_file import read_plan
+from conevo.campaigns.work import carry_out
+from conevo.errors import UsageError
+from conevo.runs.run import Run
+
+
+class Scripted:
+    """Carries a job out when it is waited for, or does with it what a test says."""
+
+    name = "scripted"
+
+    def __init__(self, cores=2, fate=None):
+        self.cores, self.fate = cores, fate or (lambda job: carry_out(job.root, job.label, 1))
+        self.jobs: list[Job] = []
+        self.begun: list[Job] = []
+        self.most = 0
+        self.stopped = 0
+
+    def submit(self, job):
+        self.jobs.append(job)
+        self.begun.append(job)
+        self.most = max(self.most, sum(one.threads for one in self.jobs))
+
+    def wait(self, seconds):
+        job = self.jobs.pop(0)
+        lost = self.fate(job)
+        return [Ending(job.label, lost if isinstance(lost, str) else "")]
+
+    def stop(self):
+        self.stopped += 1
+
+
+def end_as(campaign, **how):
+    """Return a fate: the worker writes down that it ended so."""
+    about = {"message": "", "origin": "", "traceback": "", "core_seconds": 1.0} | how
+
+    def fate(job):
+        path = campaign.places.ended(job.label)
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(json.dumps(about))
+
+    return fate
+
+
+def test_a_campaign_is_carried_out_and_its_runs_are_as_any_other(tmp_path):
+    campaign = tiny_campaign(tmp_path)
+    executor = Scripted()
+    entries = campaign.carry_on(executor)
+    assert {entry.state for entry in entries.values()} == {"finished"}
+    assert [job.label for job in executor.begun] == list(campaign.planned)
+    for label, planned in campaign.planned.items():
+        run = Run(campaign.places.run(label))
+        assert (run.status, run.config.run_id) == ("finished", planned.run_ids[0])
+    again = Scripted()
+    campaign.carry_on(again)
+    assert again.begun == []
+
+
+def test_serial_runs_have_all_cores_one_after_the_other(tmp_path):
+    campaign = tiny_campaign(tmp_path)
+    assert {e.state for e in campaign.carry_on(Serial(2)).values()} == {"finished"}
+    sessions = [Run(campaign.places.run(x)).provenance["sessions"] for x in campaign.planned]
+    assert [[one["threads"] for one in of_run] for of_run in sessions] == [[2]] * 4
+
+
+def test_cores_are_never_shared_and_none_is_idle_at_the_end(tmp_path):
+    campaign = tiny_campaign(tmp_path)
+    executor = Scripted(cores=6, fate=end_as(campaign, status="failed"))
+    campaign.carry_on(executor)
+    assert executor.most == 6
+    assert [job.threads for job in executor.begun] == [1, 1, 2, 2]
+
+
+def test_a_run_has_the_threads_that_were_asked_for(tmp_path):
+    campaign = tiny_campaign(tmp_path)
+    executor = Scripted(cores=4, fate=end_as(campaign, status="failed"))
+    campaign.carry_on(executor, threads=3)
+    assert {job.threads for job in executor.begun} == {3, 4}
+    assert executor.most <= 4
+
+
+def test_a_lost_worker_is_tried_again_and_then_failed_with_its_reason(tmp_path):
+    campaign = tiny_campaign(tmp_path)
+    entries = campaign.carry_on(Scripted(fate=lambda job: "killed by signal 9"))
+    first = next(iter(entries.values()))
+    assert {entry.attempts for entry in entries.values()} == {ATTEMPTS}
+    assert (first.state, first.reason) == ("failed", "killed by signal 9 (attempt 3 of 3)")
+
+
+def test_a_run_that_fails_by_itself_is_not_tried_again_but_by_request(tmp_path):
+    campaign = tiny_campaign(tmp_path)
+    fate = end_as(campaign, status="failed", origin="request", message="why")
+    executor = Scripted(fate=fate)
+    entries = campaign.carry_on(executor)
+    assert {(e.state, e.attempts, e.reason) for e in entries.values()} == {("failed", 1, "why")}
+    idle = Scripted()
+    campaign.carry_on(idle)
+    assert idle.begun == []
+    assert campaign.retry() == list(campaign.planned)
+    assert {e.state for e in campaign.carry_on(Scripted()).values()} == {"finished"}
+
+
+def test_a_refusal_of_the_machine_is_tried_again(tmp_path):
+    campaign = tiny_campaign(tmp_path)
+    fate = end_as(campaign, status="failed", origin="machine", message="disk full")
+    entries = campaign.carry_on(Scripted(fate=fate))
+    assert {(e.state, e.attempts) for e in entries.values()} == {("failed", ATTEMPTS)}
+
+
+def test_an_old_ending_does_not_speak_for_a_new_worker(tmp_path):
+    campaign = tiny_campaign(tmp_path)
+    for label in campaign.planned:
+        end_as(campaign, status="finished")(Job(tmp_path, label, 1))
+    entries = campaign.carry_on(Scripted(fate=lambda job: None))
+    assert {entry.state for entry in entries.values()} == {"failed"}
+    assert "left without a word" in next(iter(entries.values())).reason
+
+
+def test_what_is_on_the_disk_counts_not_the_ledger(tmp_path):
+    campaign = tiny_campaign(tmp_path)
+    campaign.carry_on(Scripted())
+    first, second, *_ = campaign.planned
+    shutil.rmtree(campaign.places.run(first))
+    assert campaign.standings()[first].state == "pending"
+    campaign.places.ledger.unlink()
+    executor = Scripted()
+    entries = campaign.carry_on(executor)
+    assert [job.label for job in executor.begun] == [first]
+    assert entries[second].state == "finished"
+
+
+def test_an_order_to_stop_is_obeyed_and_what_was_at_work_goes_on_later(tmp_path):
+    campaign = tiny_campaign(tmp_path)
+
+    def fate(job):
+        campaign.stop()
+        carry_out(job.root, job.label, 1)
+
+    executor = Scripted(fate=fate)
+    with pytest.raises(Stopped):
+        campaign.carry_on(executor)
+    states = [entry.state for entry in campaign.standings().values()]
+    assert states == ["finished", "pending", "pending", "pending"]
+    assert executor.stopped == 1
+    assert not campaign.places.stop.exists()
+    assert {e.state for e in campaign.carry_on(Scripted()).values()} == {"finished"}
+    with pytest.raises(UsageError, match="is not running"):
+        campaign.stop()
+
+
+def test_only_one_coordinator_is_at_work(tmp_path):
+    campaign = tiny_campaign(tmp_path)
+
+    def fate(job):
+        with pytest.raises(UsageError, match="in use"):
+            Campaign(campaign.path).carry_on(Scripted())
+        with pytest.raises(UsageError, match="in use"):
+            Campaign(campaign.path).retry()
+        assert Campaign(campaign.path).is_running
+        carry_out(job.root, job.label, 1)
+
+    assert {e.state for e in campaign.carry_on(Scripted(fate=fate)).values()} == {"finished"}
+
+
+def test_more_seeds_extend_a_campaign_and_other_settings_do_not(tmp_path):
+    campaign = tiny_campaign(tmp_path)
+    campaign.carry_on(Scripted())
+    bigger = create(campaign.plan.at(seeds=3), campaign.path)
+    executor = Scripted()
+    bigger.carry_on(executor)
+    assert [job.label[-3:] for job in executor.begun] == ["-s3", "-s3"]
+    with pytest.raises(UsageError, match="this plan does not have"):
+        create(campaign.plan.at(seeds=1), campaign.path)
+    with pytest.raises(UsageError, match="has with other settings"):
+        create(bigger.plan.at(settings={"run.epochs": 2}), campaign.path)
+    assert len(Campaign(campaign.path).planned) == 6
+
+
+def test_nothing_is_written_where_something_else_is_or_for_a_plan_that_cannot_be(tmp_path):
+    plan = read_plan(write_plan(tmp_path))
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "letter.txt").write_text("dear")
+    with pytest.raises(UsageError, match="exists and is no run"):
+        create(plan, tmp_path / "mine")
+    with pytest.raises(UsageError, match="generations = 0"):
+        create(plan.at(settings={"run.generations": 0}), tmp_path / "new")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["mine", "tiny.toml"]
+
+
+def test_a_foreign_run_in_its_place_is_left_alone(tmp_path):
+    campaign = tiny_campaign(tmp_path)
+    first, second, *_ = campaign.planned
+    campaign.carry_on(Scripted())
+    shutil.rmtree(campaign.places.run(first))
+    shutil.copytree(campaign.places.run(second), campaign.places.run(first))
+    shutil.rmtree(campaign.path / "ended")
+    assert not carry_out(campaign.path, first, 1)
+    ended = json.loads(campaign.places.ended(first).read_text())
+    assert (ended["origin"], "not the run that was planned" in ended["message"]) == (
+        "request",
+        True,
+    )

@@ -1,0 +1,123 @@
+import tomllib
+
+import pytest
+
+from campaigns.plans import write_plan
+from conevo.campaigns.plan_file import preset_names, read_plan, read_preset
+from conevo.errors import EnvironmentFailure, UsageError
+from conevo.runs.config import PRESETS
+
+SCALES = ("smoke", "thesis")
+
+
+def test_every_combination_of_levels_is_run_with_every_seed_seed_by_seed(tmp_path):
+    plan = read_plan(write_plan(tmp_path, factors='"world.n_robots" = [3, 4]'))
+    runs = plan.write_out()
+    cells = [(run.method, run.variant) for run in runs if run.seed == 1]
+    assert cells == [
+        ("homcne", "n_robots=3"),
+        ("homcne", "n_robots=4"),
+        ("cone", "n_robots=3"),
+        ("cone", "n_robots=4"),
+    ]
+    assert [run.seed for run in runs] == [1] * 4 + [2] * 4
+    assert len(runs) == plan.n_runs
+    assert len({run.label for run in runs} | {run.run_ids for run in runs}) == 16
+    (config,) = runs[5].configs()
+    assert config.world_params.n_robots == 4
+    assert (config.run.seed, config.run.generations, config.preset) == (2, 2, "smoke")
+    assert config.run_id == runs[5].run_ids[0]
+
+
+def test_conditions_choose_runs_and_later_ones_win_and_factors_win_over_all(tmp_path):
+    path = write_plan(tmp_path, factors='"run.epochs" = [1, 3]')
+    with path.open("a") as file:
+        file.write(
+            '[[where]]\nmethod = ["cone"]\nsettings = { "run.checkpoint_every" = 2 }\n'
+            '[[where]]\nworld = "rover/complex-1..3"\npreset = ["smoke"]\n'
+            'settings = { "run.checkpoint_every" = 3, "run.epochs" = 9 }\n'
+            '[[where]]\nmethod = "homcne"\npreset = "night"\n'
+            'settings = { "run.checkpoint_every" = 4 }\n'
+        )
+    runs = read_plan(path).write_out()
+    assert {run.configs()[0].run.checkpoint_every for run in runs} == {3}
+    assert [run.configs()[0].run.epochs for run in runs] == [1, 3] * 4
+    night = read_plan(path).at("night", 1).write_out()
+    assert [run.configs()[0].run.checkpoint_every for run in night] == [4, 4, 2, 2]
+    forced = read_plan(path).at(settings={"run.checkpoint_every": 7}).write_out()
+    assert {run.configs()[0].run.checkpoint_every for run in forced} == {7}
+
+
+def test_a_plan_is_what_it_was_after_being_written_and_read(tmp_path):
+    path = write_plan(tmp_path, 'produces = ["figure 1"]', '"method.gst" = [0.1]')
+    path.write_text(path.read_text().replace('"homcne", ', ""))
+    plan = read_plan(path).at("desk", 3, {"run.epochs": 2})
+    again = tmp_path / "again.toml"
+    again.write_text(plan.to_toml())
+    assert read_plan(again) == plan
+    assert read_plan(again).write_out() == plan.write_out()
+
+
+def test_a_shaping_is_one_run_with_a_configuration_for_every_stage(tmp_path):
+    path = write_plan(tmp_path, "shape = true")
+    path.write_text(path.read_text().replace("complex-1", "complex-3"))
+    run = read_plan(path).write_out()[0]
+    assert [config.environment for config in run.configs()] == [f"complex-{k}" for k in (1, 2, 3)]
+    assert run.names == [f"{run.label}/stage-{k}" for k in (1, 2, 3)]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ("[settings]", "[setings]", "'setings'.*did you mean 'settings'"),
+        ("title =", "tittle =", "'campaign.tittle'.*'campaign.title'"),
+        ("seeds = 2", "seeds = 0", "campaign.seeds = 0"),
+        ("seeds = 2", "seeds = [1, 1]", "planned twice"),
+        ("seeds = 2", "seeds = [1.5]", "campaign.seeds"),
+        ('"smoke"', '"smok"', "'smok'.*did you mean 'smoke'"),
+        ('"cone"]', '"coen"]', "method 'coen'.*did you mean 'cone'"),
+        ("complex-1", "complx-1", "complx-1"),
+        ('["homcne", "cone"]', "[]", "factors.method.*at least one"),
+        ('["homcne", "cone"]', '"cone"', "factors.method"),
+        ('"run.generations"', '"run.generation"', "run.generation'.*run.generations"),
+        ('"method.genotypes" = 6', '"method.genotypes" = -6', "genotypes = -6"),
+        ('title = "Tiny"', "title = 3", "campaign.title = 3"),
+        ('title = "Tiny"', 'name = "../x"', "names a folder"),
+        ('title = "Tiny"', 'studies = ["team"]', "'team'.*did you mean 'teams'"),
+        ('title = "Tiny"', "shape = 1", "campaign.shape"),
+        ("[settings]", '[[where]]\nmetod = "cone"\n[settings]', "where.metod"),
+        ("[settings]", "[where]\n[settings]", r"\[\[where\]\]"),
+        ("[campaign]", "[campaign", "not valid TOML"),
+    ],
+)
+def test_a_wrong_plan_is_one_clear_line(tmp_path, old, new, says):
+    path = write_plan(tmp_path)
+    assert old in path.read_text()
+    path.write_text(path.read_text().replace(old, new, 1))
+    with pytest.raises(UsageError, match=says) as caught:
+        read_plan(path).write_out()
+    assert "\n" not in str(caught.value)
+
+
+def test_a_plan_that_cannot_be_read_is_the_machine_s_fault(tmp_path):
+    with pytest.raises(EnvironmentFailure, match="No such file"):
+        read_plan(tmp_path / "none.toml")
+
+
+def test_other_defaults_than_those_it_was_planned_with_are_noticed(tmp_path):
+    import dataclasses
+
+    run = read_plan(write_plan(tmp_path)).write_out()[0]
+    with pytest.raises(UsageError, match="planned with other defaults"):
+        dataclasses.replace(run, run_ids=("0" * 12,)).configs()
+
+
+@pytest.mark.parametrize("name", preset_names())
+def test_experiments_of_the_thesis_can_be_written_out_at_every_scale(name):
+    plan = read_preset(name)
+    assert plan.title
+    assert plan.preset in PRESETS
+    for scale in SCALES:
+        runs = plan.at(scale, 1).write_out()
+        assert len(runs) * len(plan.seeds) == plan.n_runs
+    assert tomllib.loads(plan.to_toml())["campaign"]["name"] == name

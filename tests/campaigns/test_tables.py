@@ -1,0 +1,112 @@
+import json
+
+import numpy as np
+import pytest
+
+from campaigns.plans import tiny_campaign
+from conevo.analysis.frames import SCHEMA, Tables
+from conevo.campaigns.executors import Serial
+from conevo.runs.directory import read_json
+from conevo.runs.run import Run
+
+
+@pytest.fixture(scope="module")
+def campaign(tmp_path_factory):
+    """A finished campaign of four tiny runs with studies."""
+    made = tiny_campaign(tmp_path_factory.mktemp("tables"), 'studies = ["teams"]')
+    made.carry_on(Serial(1))
+    return made
+
+
+@pytest.fixture
+def tables(campaign):
+    with Tables(campaign.places.tables) as opened:
+        yield opened
+
+
+def test_every_run_has_its_row_as_it_was(campaign, tables):
+    _, rows = tables.query(
+        "SELECT run, method, seed, generations, evaluations, team_steps, measure, run_id, "
+        "kernel_hash, optimum, n_robots FROM runs ORDER BY run"
+    )
+    assert [row[0] for row in rows] == sorted(campaign.planned)
+    for row in rows:
+        run = Run(campaign.places.run(row[0]))
+        last = run.generations()[-1]
+        assert row[1:] == (
+            run.config.method,
+            run.config.run.seed,
+            2,
+            last["team_evaluations"],
+            last["team_steps"],
+            "value",
+            run.config.run_id,
+            run.provenance["kernel_hash"],
+            5000.0,
+            20,
+        )
+
+
+def test_scores_are_those_of_the_testing_phase(campaign, tables):
+    for label in campaign.planned:
+        tested = Run(campaign.places.run(label)).test_result
+        for team, title in (("champion", "champion"), ("generation_0", "generation 0")):
+            for measure, values in tested[team]["performance"].items():
+                _, rows = tables.query(
+                    f"SELECT value FROM scores WHERE run = '{label}' AND study = 'test' "
+                    f"AND team = '{title}' AND measure = '{measure}' ORDER BY scenario"
+                )
+                assert [value for (value,) in rows] == values["values"]
+
+
+def test_generations_and_castes_are_those_of_the_log(campaign, tables):
+    for label in campaign.planned:
+        for record in Run(campaign.places.run(label)).generations():
+            where = f"WHERE run = '{label}' AND generation = {record['generation']}"
+            _, rows = tables.query(
+                f"SELECT evaluations, value, fitness, specialization, sst, gst, recombinations, "
+                f"hidden FROM generations {where}"
+            )
+            assert rows == [
+                (
+                    record["team_evaluations"],
+                    record["performance"]["value"],
+                    record["team_fitness"],
+                    record["specialization"],
+                    record["sst"],
+                    record["gst"],
+                    record["recombinations"],
+                    np.mean(record["n_hidden"]),
+                )
+            ]
+            _, rows = tables.query(f"SELECT caste, robots FROM castes {where}")
+            assert dict(rows) == record["castes"]
+
+
+def test_studies_are_kept_whole(campaign, tables):
+    for label in campaign.planned:
+        study = read_json(campaign.places.study(label))
+        for table in ("robots", "actions", "behaviours"):
+            columns = [name for name in SCHEMA[table] if name != "run"]
+            _, rows = tables.query(f"SELECT {', '.join(columns)} FROM {table} WHERE run='{label}'")
+            assert rows == [tuple(row[name] for name in columns) for row in study[table]]
+        _, rows = tables.query(f"SELECT metric, value FROM metrics WHERE run = '{label}'")
+        assert dict(rows) == study["metrics"]
+        _, rows = tables.query(
+            f"SELECT count(*) FROM scores WHERE run = '{label}' AND study <> 'test'"
+        )
+        assert rows == [(len(study["scores"]),)]
+
+
+def test_tables_are_made_again_only_when_more_is_finished(campaign):
+    made = (campaign.places.tables / "runs.parquet").stat().st_mtime_ns
+    campaign.seal()
+    assert (campaign.places.tables / "runs.parquet").stat().st_mtime_ns == made
+    manifest = campaign.places.tables / "tables.json"
+    found = json.loads(manifest.read_text())
+    assert sorted(found["runs"]) == sorted(campaign.planned)
+    found["runs"].popitem()
+    manifest.write_text(json.dumps(found))
+    campaign.seal()
+    assert (campaign.places.tables / "runs.parquet").stat().st_mtime_ns != made
+    assert not list(campaign.path.glob(".tables*"))
