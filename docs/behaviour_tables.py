@@ -11,7 +11,7 @@ import pages
 from conevo.analysis.behaviours import BEHAVIOURS
 from conevo.analysis.captures import COLLECTIVES
 from conevo.analysis.pursuit import observe
-from conevo.analysis.tables import composition_table, lesion_table
+from conevo.analysis.pursuit_tables import composition_table, lesion_table
 from conevo.specialization.individual import NON_SPECIALIZED
 from pages import Row
 

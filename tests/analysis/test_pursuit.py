@@ -12,16 +12,21 @@ import numpy as np
 import pytest
 
 import conevo
+from conevo.analysis.behaviour_report import behaviour_report
 from conevo.analysis.behaviours import BEHAVIOURS, Rules
 from conevo.analysis.captures import COLLECTIVES, Capture
 from conevo.analysis.pursuit import Observation, observe, setting_of
-from conevo.analysis.report import report
+from conevo.analysis.pursuit_tables import (
+    composition,
+    composition_table,
+    fittest_runs,
+    lesion_table,
+)
 from conevo.analysis.reproduction import (
     place_together,
     reproduce_collectives,
     reproduce_individuals,
 )
-from conevo.analysis.tables import composition, composition_table, fittest_runs, lesion_table
 from conevo.cli.main import main
 from conevo.errors import UsageError
 from conevo.rng import fold, stream
@@ -127,7 +132,7 @@ def test_sensor_table_of_a_team(seen: Observation) -> None:
 
 def test_a_run_of_another_world_is_refused(tmp_path: Path) -> None:
     run = evolve_tiny(tmp_path / "rovers")
-    for call in (observe, report):
+    for call in (observe, behaviour_report):
         with pytest.raises(UsageError, match=r"run of rover-v1/complex-1.*predators of pursuit-v1"):
             call(run)
     with pytest.raises(UsageError, match="pursuit-v1"):
@@ -384,7 +389,7 @@ def test_the_command_prints_what_the_report_holds(runs, capsys) -> None:
     assert (code, err) == (0, "")
     code, text, err = say(capsys, *words, "--json")
     found = json.loads(text)
-    assert found == json.loads(json.dumps(report(runs[3], 3, threads=2)))
+    assert found == json.loads(json.dumps(behaviour_report(runs[3], 3, threads=2)))
     assert sum(found["captures"].values()) > 0
     for name, n in found["captures"].items():
         assert (f"{name} {n}" in out) == (n > 0)

@@ -31,6 +31,7 @@ method = ["homcne", "cone"]
 
 def write_plan(folder: Path, head: str = "", factors: str = "", more: str = "") -> Path:
     """Write the plan of a campaign of four tiny runs, or more."""
+    folder.mkdir(exist_ok=True)
     path = folder / "tiny.toml"
     path.write_text(TINY.format(head=head, factors=factors, more=more))
     return path

@@ -23,6 +23,7 @@ from conevo.analysis.behaviours import (
     lifetimes,
 )
 from conevo.analysis.captures import Capture, find_captures
+from conevo.analysis.fittest import equip
 from conevo.analysis.sensors import Spell, average, find_spells, profile, sample
 from conevo.errors import UsageError
 from conevo.kernels.khepera import AXLE, RADIUS
@@ -32,7 +33,7 @@ from conevo.runs.lab import Lab
 from conevo.runs.run import Run
 from conevo.worlds.pursuit import PursuitWorld
 
-__all__ = ["N_INSTANCES", "Observation", "lab_of", "observe", "setting_of"]
+__all__ = ["N_INSTANCES", "Observation", "lab_of", "observe", "setting_of", "watch"]
 
 N_INSTANCES = 20  # of each behaviour, appendix B
 Record = dict[str, npt.NDArray[Any]]
@@ -154,7 +155,29 @@ def observe(
     """
     team, lab = lab_of(run, threads)
     root = run.config.run.seed if seed is None else seed
-    keys = tuple(fold(root, "test", k) for k in range(scenarios))
+    return watch(team, lab, scenarios, root, threads=threads, rules=rules)
+
+
+def watch(
+    team: Team,
+    lab: Lab,
+    scenarios: int,
+    seed: int,
+    *,
+    threads: int | None = None,
+    rules: Rules | None = None,
+) -> Observation:
+    """Record a team of predators in the scenarios of the testing phase.
+
+    Args:
+        team: of the lab's world.
+        lab: of a ``pursuit`` run.
+        scenarios: how many.
+        seed: their root.
+        threads: CPU threads for whatever is simulated further, all by default.
+        rules: by which behaviours are told.
+    """
+    keys = tuple(fold(seed, "test", k) for k in range(scenarios))
     world = lab.world
     assert isinstance(world, PursuitWorld)
     genes, (rows,) = team.as_trial()
@@ -162,7 +185,7 @@ def observe(
     return Observation(
         world=world,
         team=team,
-        seed=root,
+        seed=seed,
         keys=keys,
         records=records,
         setting=setting_of(world),
@@ -182,16 +205,7 @@ def lab_of(run: Run, threads: int | None = None) -> tuple[Team, Lab]:
             f"{run.path} is a run of {run.config.task}: behaviours are those of the predators of "
             f"pursuit-v1, as in conevo run pursuit/team-3"
         )
-    team, about = run.champion, run.provenance
-    if team is None:
-        raise UsageError(f"{run.path} has no finished generation yet, so no team to observe")
-    lab = Lab.equip(run.config, threads, about["device"])
-    if lab.rollout.kernel_hash != about["kernel_hash"]:
-        raise UsageError(
-            f"{run.path} was made with other kernels ({about['kernel_hash']}, here "
-            f"{lab.rollout.kernel_hash}): its team would not behave as it did"
-        )
-    return team, lab
+    return equip(run, threads)
 
 
 def setting_of(world: PursuitWorld) -> Setting:

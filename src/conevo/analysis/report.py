@@ -1,50 +1,209 @@
-"""Everything about the behaviours of a run's fittest team, as plain data."""
+"""Everything that a campaign says: one page, its tables as LaTeX, its figures, the numbers.
+
+::
+
+    index.html            one self-contained page: no script, no network
+    tables/NAME.tex       every table, for LaTeX without packages
+    figures/NAME.svg|pdf  every figure
+    numbers/NAME.csv      the numbers behind each of them, unrounded
+    marl-eval.json        raw results for marl-eval
+    manifest.json         digest of every file
+
+All of it is made of the campaign's tables: the same tables give the same bytes.
+"""
 
 from __future__ import annotations
 
-from dataclasses import asdict
-from typing import Any
+import hashlib
+import json
+import re
+import shutil
+import tempfile
+from collections.abc import Iterator, Mapping
+from importlib import resources
+from pathlib import Path
 
-from conevo.analysis.behaviours import Rules
-from conevo.analysis.captures import most_frequent
-from conevo.analysis.pursuit import observe
-from conevo.analysis.reproduction import reproduce_individuals
-from conevo.runs.run import Run
+from conevo.analysis.courses import read_histories
+from conevo.analysis.exhibits import Exhibit, Figure, Section, Table, to_latex
+from conevo.analysis.frames import Tables
+from conevo.analysis.marl_eval import export
+from conevo.analysis.sections.behaviours import behaviours
+from conevo.analysis.sections.castes import castes
+from conevo.analysis.sections.claims import claims
+from conevo.analysis.sections.comparisons import comparisons
+from conevo.analysis.sections.interventions import clones, lesions
+from conevo.analysis.sections.learning import learning
+from conevo.analysis.sections.metrics import definitions, metrics
+from conevo.analysis.sections.overview import Campaign, overview, read_campaign, repetition
+from conevo.analysis.sections.performance import performance
+from conevo.analysis.sections.scope import Scope, scopes
+from conevo.errors import UsageError
+from conevo.runs.durable import writing
 
-__all__ = ["report"]
+__all__ = ["sections_of", "write_report"]
+
+MANIFEST = "manifest.json"
+TEMPLATE = "report.html.j2"
 
 
-def report(
-    run: Run,
-    scenarios: int = 20,
-    seed: int | None = None,
-    *,
-    threads: int | None = None,
-    rules: Rules | None = None,
-) -> dict[str, Any]:
-    """Observe the fittest team of a run and return what ``conevo behaviours`` prints.
+def write_report(campaign: Path, out: Path) -> Path:
+    """Write the report of a campaign and return its page.
 
-    Plain data: run, task, generation (of the team), scenarios, seed, rules, capture_time;
-    predators, each one's shares, windows, switches, specialization and label; collective (the most
-    frequent) and captures (of each name); sensors (averages and profiles) and reproduction (what
-    each predator does with its sensors held at the averages).
+    A report that is there already is replaced as a whole, once the new one is complete.
+
+    Args:
+        campaign: its directory, with sealed tables.
+        out: directory of the report.
 
     Raises:
-        UsageError: another world, no generation has finished yet, or made with other kernels.
+        UsageError: no tables; or ``out`` holds something else than an unchanged report.
+        EnvironmentFailure: it cannot be written.
     """
-    seen = observe(run, scenarios, seed, threads=threads, rules=rules)
-    collective, captures = most_frequent(seen.all_captures)
-    return {
-        "run": str(run.path),
-        "task": run.config.task,
-        "generation": seen.team.generation,
-        "scenarios": scenarios,
-        "seed": seen.seed,
-        "rules": asdict(seen.rules),
-        "capture_time": seen.capture_time,
-        "predators": [asdict(life) for life in seen.lifetimes],
-        "collective": collective,
-        "captures": captures,
-        "sensors": seen.sensor_table(),
-        "reproduction": reproduce_individuals(seen),
+    _refuse_changed(out)
+    about = read_campaign(campaign)
+    with Tables(campaign / "tables") as tables:
+        sections = sections_of(tables, about)
+        files = dict(_files(about, sections))
+        files["marl-eval.json"] = _json(export(tables))
+    digests = {name: _digest(content) for name, content in sorted(files.items())}
+    files[MANIFEST] = _json({"files": digests})
+    with writing(out):
+        out.parent.mkdir(parents=True, exist_ok=True)
+        draft = Path(tempfile.mkdtemp(prefix=f".{out.name}.", dir=out.parent))
+        try:
+            draft.chmod(0o755)
+            for name, content in files.items():
+                path = draft / name
+                path.parent.mkdir(exist_ok=True)
+                path.write_bytes(content)
+            shutil.rmtree(out, ignore_errors=True)
+            draft.rename(out)
+        finally:
+            shutil.rmtree(draft, ignore_errors=True)
+    return out / "index.html"
+
+
+def sections_of(tables: Tables, campaign: Campaign) -> list[Section]:
+    """Return the sections of a report in order."""
+    groups = [_about(scope) for scope in scopes(tables)]
+    return [
+        overview(tables, campaign),
+        *groups,
+        claims(tables),
+        *([definitions()] if groups else []),
+        repetition(tables, campaign),
+    ]
+
+
+def _about(scope: Scope) -> Section:
+    """Return everything about one group of runs."""
+    histories = read_histories(scope.tables, scope.group)
+    world, family, budget = scope.group
+    parts = [
+        performance(scope),
+        comparisons(scope),
+        learning(scope, histories),
+        castes(scope, histories),
+        lesions(scope),
+        clones(scope),
+        metrics(scope),
+        behaviours(scope),
+    ]
+    text = [f"Budget of a run: {budget}."]
+    title = f"{world}, {family}, {budget.partition(',')[0]}"
+    return Section(title, text, (), [part for part in parts if part is not None], name=scope.stem)
+
+
+def _files(campaign: Campaign, sections: list[Section]) -> Iterator[tuple[str, bytes]]:
+    """Yield the name and content of every file but marl-eval's and the manifest."""
+    exhibits = [one for section in sections for one in section.all_exhibits()]
+    for one in exhibits:
+        yield f"numbers/{one.name}.csv", one.to_csv().encode()
+        if isinstance(one, Table):
+            yield f"tables/{one.name}.tex", to_latex(one).encode()
+        if isinstance(one, Figure):
+            yield f"figures/{one.name}.svg", one.drawing.svg
+            yield f"figures/{one.name}.pdf", one.drawing.pdf
+    yield "index.html", _page(campaign, sections).encode()
+
+
+def _page(campaign: Campaign, sections: list[Section]) -> str:
+    """Return the page."""
+    import jinja2
+    from markupsafe import Markup
+
+    def drawn(figure: Figure) -> Markup:
+        return Markup(_inline(figure))
+
+    def number_of() -> Mapping[str, str]:
+        """Return "Table 3", "Figure 2" for every exhibit's name."""
+        counts = {"Table": 0, "Figure": 0}
+        numbers = {}
+        for one in (one for section in sections for one in section.all_exhibits()):
+            kind = "Figure" if isinstance(one, Figure) else "Table"
+            counts[kind] += 1
+            numbers[one.name] = f"{kind} {counts[kind]}"
+        return numbers
+
+    template = resources.files("conevo.analysis").joinpath(TEMPLATE).read_text(encoding="utf-8")
+    environment = jinja2.Environment(
+        autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
+    )
+    environment.tests["figure"] = _is_figure
+    return environment.from_string(template).render(
+        campaign=campaign, sections=sections, drawn=drawn, numbers=number_of()
+    )
+
+
+def _is_figure(one: Exhibit) -> bool:
+    return isinstance(one, Figure)
+
+
+def _inline(figure: Figure) -> str:
+    """Return a drawing for a page with others: its names are its own, the page scales it."""
+    svg = figure.drawing.svg.decode()
+    svg = svg[svg.index("<svg") :]
+    svg = re.sub(r'\bid="', f'id="{figure.name}.', svg)
+    svg = re.sub(r'(url\(#|href="#)', rf"\g<1>{figure.name}.", svg)
+    svg = re.sub(r"\s*<metadata>.*?</metadata>", "", svg, flags=re.DOTALL)
+    wide = float(svg.split('width="', 1)[1].split("pt", 1)[0])
+    about = (
+        f'role="img" aria-labelledby="{figure.name}-caption" style="max-width: {wide / 10:.1f}rem"'
+    )
+    return svg.replace("<svg ", f"<svg {about} ", 1)
+
+
+def _refuse_changed(out: Path) -> None:
+    """Refuse to replace anything but a report as it was written.
+
+    Raises:
+        UsageError: it is something else, or was changed.
+    """
+    if not out.exists() or (out.is_dir() and not any(out.iterdir())):
+        return
+    manifest = out / MANIFEST
+    if not manifest.is_file():
+        raise UsageError(f"{out} is no report, so it is not replaced; choose another --out")
+    try:
+        written = json.loads(manifest.read_text(encoding="utf-8"))["files"]
+    except (ValueError, KeyError, TypeError) as error:
+        raise UsageError(f"{manifest} was changed; move the report away first") from error
+    found = {
+        path.relative_to(out).as_posix(): _digest(path.read_bytes())
+        for path in sorted(out.rglob("*"))
+        if path.is_file() and path != manifest
     }
+    for name in sorted(found.keys() | written.keys()):
+        if found.get(name) != written.get(name):
+            raise UsageError(
+                f"{out / name} was changed since the report was written; move the report away "
+                f"first, or choose another --out"
+            )
+
+
+def _digest(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()
+
+
+def _json(value: object) -> bytes:
+    return (json.dumps(value, indent=1, sort_keys=True, allow_nan=False) + "\n").encode()

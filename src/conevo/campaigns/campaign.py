@@ -80,7 +80,7 @@ def _refuse_other(campaign: Campaign, runs: dict[str, PlannedRun]) -> None:
     for label, planned in campaign.planned.items():
         if label not in runs:
             what = "does not have"
-        elif runs[label] != planned:
+        elif runs[label].run_ids != planned.run_ids:
             what = "has with other settings"
         else:
             continue

@@ -102,17 +102,7 @@ class Processes:
 
     def submit(self, job: Job) -> None:
         """Spawn a worker; it leaves when this process does, since its stdin ends then."""
-        log = Places(job.root).log(job.label)
-        log.parent.mkdir(exist_ok=True)
-        with log.open("ab") as file:
-            self._workers[job.label] = subprocess.Popen(
-                worker_command(job),
-                stdin=subprocess.PIPE,
-                stdout=file,
-                stderr=file,
-                start_new_session=True,  # Ctrl-C is for the coordinator, which ends its workers
-                env=os.environ | dict.fromkeys(ONE_THREAD, "1"),
-            )
+        self._workers[job.label] = spawn(job)
 
     def wait(self, seconds: float) -> list[Ending]:
         """Return the workers that have ended."""
@@ -142,6 +132,21 @@ class Processes:
             worker.stdin.close()
 
 
+def spawn(job: Job) -> subprocess.Popen[bytes]:
+    """Begin a worker, which leaves when its stdin ends; what it says goes to the run's log."""
+    log = Places(job.root).log(job.label)
+    log.parent.mkdir(exist_ok=True)
+    with log.open("ab") as file:
+        return subprocess.Popen(
+            worker_command(job),
+            stdin=subprocess.PIPE,
+            stdout=file,
+            stderr=file,
+            start_new_session=True,  # Ctrl-C is for the coordinator, which ends its workers
+            env=os.environ | dict.fromkeys(ONE_THREAD, "1"),
+        )
+
+
 def worker_command(job: Job) -> list[str]:
     """Return the command that carries a job out."""
     arguments = [str(job.root.resolve()), job.label, str(job.threads)]
@@ -165,13 +170,17 @@ def usable_cores() -> int:
 EXECUTORS = (Processes.name, Serial.name, "ray")
 
 
-def make_executor(name: str, cores: int | None = None, address: str | None = None) -> Executor:
+def make_executor(
+    name: str, cores: int | None = None, address: str | None = None, store: str | None = None
+) -> Executor:
     """Return an executor.
 
     Args:
         name: of ``EXECUTORS``.
         cores: that its jobs may use together; by default all usable ones, of a cluster all it has.
         address: of an existing Ray cluster, or "auto"; by default Ray is started here.
+        store: address of an object store ("s3://BUCKET/PATH") for Ray's nodes, if they do not see
+            the campaign's directory.
 
     Raises:
         UsageError: there is no such executor, what it needs is not installed, or it has no address.
@@ -181,8 +190,9 @@ def make_executor(name: str, cores: int | None = None, address: str | None = Non
     if name == "ray":
         from conevo.campaigns.executors_ray import RayCluster
 
-        return RayCluster(cores, address)
-    if address is not None:
-        raise UsageError(f"--address {address}: only the executor ray has one, not {name}")
+        return RayCluster(cores, address, store or "")
+    for option, value in (("--address", address), ("--store", store)):
+        if value is not None:
+            raise UsageError(f"{option} {value}: only the executor ray has one, not {name}")
     kinds: dict[str, Callable[[int], Executor]] = {k.name: k for k in (Serial, Processes)}
     return kinds[name](cores or usable_cores())

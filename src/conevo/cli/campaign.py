@@ -26,6 +26,10 @@ EXECUTION = (
         help="CPU threads of a run; changes no result.",
     ),
     click.option("--address", metavar="ADDRESS", help="With ray: of an existing cluster, or auto."),
+    click.option(
+        "--store", metavar="URI",
+        help="With ray: object store for nodes that do not see the campaign's directory.",
+    ),
     click.option("--json", "as_json", is_flag=True, help="One JSON object per run that ends."),
     click.option("--quiet", is_flag=True, help="Print only the campaign's directory."),
 )  # fmt: skip

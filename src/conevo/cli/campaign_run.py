@@ -39,6 +39,7 @@ def ready(
     cores: int | None,
     threads: int,
     address: str | None,
+    store: str | None,
     as_json: bool,
     quiet: bool,
 ) -> Execution:
@@ -47,7 +48,7 @@ def ready(
     Raises:
         UsageError: options that do not go together, an unknown executor or one not installed.
     """
-    made = make_executor(executor, cores, address)
+    made = make_executor(executor, cores, address, store)
     if threads > made.cores and executor != "serial":
         raise UsageError(f"--threads {threads}: there are only {made.cores} cores to use")
     return Execution(made, threads, style_of(as_json, quiet, False))

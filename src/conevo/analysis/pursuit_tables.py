@@ -14,6 +14,7 @@ import numpy as np
 
 from conevo.analysis.behaviours import BEHAVIOURS, Rules
 from conevo.analysis.captures import COLLECTIVES, COMPOSITIONS, Capture, most_frequent
+from conevo.analysis.lesions import WHOLE, lesion
 from conevo.analysis.pursuit import lab_of, observe
 from conevo.errors import UsageError
 from conevo.rng import fold
@@ -22,8 +23,6 @@ from conevo.runs.run import Run
 from conevo.specialization.individual import NON_SPECIALIZED
 
 __all__ = ["composition", "composition_table", "fittest_runs", "lesion_table"]
-
-HEURISTIC = 0  # of pursuit-v1: straight at the prey, else to its last place, else a random walk
 
 
 def composition_table(
@@ -100,20 +99,14 @@ def lesion_table(
     rows = []
     for method, run in fittest_runs(runs).items():
         seen = observe(run, scenarios, threads=threads, rules=rules)
-        team, lab = lab_of(run, threads)
-        labels = np.array([life.label for life in seen.lifetimes])
+        labels = [life.label for life in seen.lifetimes]
         lesioned = [behaviour for behaviour in BEHAVIOURS if behaviour in labels]
-        modes = np.full((1 + len(lesioned), len(labels)), -1, dtype=np.int32)
-        for k, behaviour in enumerate(lesioned, start=1):
-            modes[k, labels == behaviour] = HEURISTIC
-        genes, teams = team.as_trial()
+        team, lab = lab_of(run, threads)
         keys = [fold(seen.seed, "lesion", k) for k in range(scenarios)]
-        outcome = lab.rollout.evaluate(
-            genes, np.repeat(teams, len(modes), axis=0), lab.world.scenarios(keys), modes
-        )
-        times = outcome.performance["capture_time"].astype(np.float64).mean(axis=1).tolist()
-        left = dict(zip(lesioned, times[1:], strict=True))
-        whole = times[0]
+        found = lesion(lab.rollout, team, labels, lesioned, lab.world.scenarios(keys))
+        means = found.performance["capture_time"].astype(np.float64).mean(axis=1).tolist()
+        left = dict(zip(found.teams, means, strict=True))
+        whole = left[WHOLE]
         rows.append(
             {"method": method, "run": str(run.path), "task": run.config.task}
             | {"capture_time": whole}

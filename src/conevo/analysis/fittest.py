@@ -1,0 +1,28 @@
+"""The fittest team of a run, together with what simulates it: where every analysis begins."""
+
+from __future__ import annotations
+
+from conevo.errors import UsageError
+from conevo.runs.champions import Team
+from conevo.runs.lab import Lab
+from conevo.runs.run import Run
+
+__all__ = ["equip"]
+
+
+def equip(run: Run, threads: int | None = None) -> tuple[Team, Lab]:
+    """Return the fittest team of a run and what simulates it.
+
+    Raises:
+        UsageError: no generation has finished yet, or made with other kernels.
+    """
+    team, about = run.champion, run.provenance
+    if team is None:
+        raise UsageError(f"{run.path} has no finished generation yet, so no team to observe")
+    lab = Lab.equip(run.config, threads, about["device"])
+    if lab.rollout.kernel_hash != about["kernel_hash"]:
+        raise UsageError(
+            f"{run.path} was made with other kernels ({about['kernel_hash']}, here "
+            f"{lab.rollout.kernel_hash}): its team would not behave as it did"
+        )
+    return team, lab

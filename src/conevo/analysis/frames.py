@@ -1,0 +1,304 @@
+"""The tables of a campaign, opened for questions: DuckDB over sealed Parquet."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from pathlib import Path
+from types import TracebackType
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from conevo.errors import UsageError
+
+__all__ = ["SCHEMA", "Tables", "Value"]
+
+SCHEMA: dict[str, dict[str, str]] = {
+    "runs": {
+        "run": "VARCHAR",
+        "task": "VARCHAR",
+        "world": "VARCHAR",
+        "environment": "VARCHAR",
+        "family": "VARCHAR",
+        "number": "INTEGER",
+        "method": "VARCHAR",
+        "preset": "VARCHAR",
+        "seed": "BIGINT",
+        "variant": "VARCHAR",
+        "generations": "INTEGER",
+        "evaluations": "BIGINT",
+        "team_steps": "BIGINT",
+        "seconds": "DOUBLE",
+        "core_seconds": "DOUBLE",
+        "stopped_by": "VARCHAR",
+        "measure": "VARCHAR",
+        "optimum": "DOUBLE",
+        "n_robots": "INTEGER",
+        "run_id": "VARCHAR",
+        "conevo": "VARCHAR",
+        "warp": "VARCHAR",
+        "kernel_hash": "VARCHAR",
+    },
+    "scores": {
+        "run": "VARCHAR",
+        "study": "VARCHAR",
+        "team": "VARCHAR",
+        "measure": "VARCHAR",
+        "scenario": "INTEGER",
+        "value": "DOUBLE",
+    },
+    "generations": {
+        "run": "VARCHAR",
+        "generation": "INTEGER",
+        "evaluations": "BIGINT",
+        "team_steps": "BIGINT",
+        "value": "DOUBLE",
+        "fitness": "DOUBLE",
+        "specialization": "DOUBLE",
+        "sst": "DOUBLE",
+        "gst": "DOUBLE",
+        "recombinations": "INTEGER",
+        "hidden": "DOUBLE",
+    },
+    "castes": {
+        "run": "VARCHAR",
+        "generation": "INTEGER",
+        "caste": "VARCHAR",
+        "robots": "INTEGER",
+    },
+    "robots": {
+        "run": "VARCHAR",
+        "robot": "INTEGER",
+        "caste": "VARCHAR",
+        "specialization": "DOUBLE",
+        "fitness": "DOUBLE",
+        "hidden": "INTEGER",
+    },
+    "actions": {"run": "VARCHAR", "robot": "INTEGER", "action": "VARCHAR", "count": "BIGINT"},
+    "metrics": {"run": "VARCHAR", "metric": "VARCHAR", "value": "DOUBLE"},
+    "behaviours": {
+        "run": "VARCHAR",
+        "kind": "VARCHAR",
+        "behaviour": "VARCHAR",
+        "count": "INTEGER",
+    },
+}
+"""Columns of each table and their DuckDB types, as written to and read from NAME.parquet."""
+
+
+NEAR = 0.2  # budgets that differ by no more are one
+
+
+class Value(NamedTuple):
+    """What one run reached: the unit of all statistics.
+
+    budget: of the group of runs that may be compared with it, see ``Tables``.
+    measure: which task performance measure ``value`` is; ``optimum``, its largest possible value,
+        is known for a world's main measure only.
+    value: mean over the scenarios of a study.
+    """
+
+    run: str
+    task: str
+    world: str
+    environment: str
+    family: str
+    number: int
+    method: str
+    preset: str
+    variant: str
+    seed: int
+    budget: str
+    measure: str
+    optimum: float | None
+    value: float
+
+
+class Tables:
+    """The tables of a campaign: one connection, the tables of ``SCHEMA``, and ``budgets``.
+
+    Read into memory once: whatever is asked, no file is written or read any more. A table without
+    a file is empty. Runs that are one and the same (the first stages of two
+    shapings that differ later only) count once: the first by name stays in ``runs``.
+
+    ``budgets`` (run, budget) tells which runs may be compared: those of one world, one preset, and
+    about equal numbers of team evaluations and of team-steps per evaluation; stages of shapings
+    apart. Choice: "about equal" is within 20 %, as methods do not divide a budget evenly and CONE
+    spends some on type C. A run that ended at its target counts with those it saved evaluations to.
+
+    Use as a context, or ``close`` it.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        """Open the Parquet files of a folder.
+
+        Raises:
+            UsageError: no runs.parquet there, or a file without one of the columns.
+        """
+        import duckdb
+
+        self.folder = Path(folder)
+        if not (self.folder / "runs.parquet").is_file():
+            raise UsageError(f"no table of runs in {self.folder} (runs.parquet)")
+        # One thread: sums of floats then have one order, so that a report has one text.
+        self._connection = duckdb.connect(":memory:", config={"threads": 1})
+        for table, columns in SCHEMA.items():
+            self._open(table, columns)
+        self._connection.execute("CREATE TABLE budgets (run VARCHAR, budget VARCHAR)")
+        rows = self.query(
+            "SELECT run, world, preset, contains(run, '/stage-'), stopped_by, evaluations,"
+            " team_steps FROM runs ORDER BY ALL"
+        )[1]
+        named = sorted(_budgets(rows).items())
+        self._connection.executemany("INSERT INTO budgets VALUES (?, ?)", named or [("", "")])
+        self._connection.execute("SET enable_external_access = false")
+        self._connection.execute("SET lock_configuration = true")
+
+    def query(self, sql: str) -> tuple[list[str], list[tuple[Any, ...]]]:
+        """Return the column names and the rows that one SQL statement gives.
+
+        Raises:
+            UsageError: what DuckDB says about a statement that it cannot carry out.
+        """
+        import duckdb
+
+        try:
+            result = self._connection.execute(sql)
+            columns = [str(column[0]) for column in result.description or []]
+            return columns, result.fetchall()
+        except duckdb.Error as error:
+            raise _refused(error) from error
+
+    def arrays(self, sql: str) -> dict[str, npt.NDArray[np.float64]]:
+        """Return the columns of numbers that one SQL statement gives, as arrays: NULL is NaN.
+
+        For many rows, where ``query`` would make a Python object of each number.
+
+        Raises:
+            UsageError: as ``query``.
+        """
+        import duckdb
+
+        try:
+            columns = self._connection.execute(sql).fetchnumpy()
+        except duckdb.Error as error:
+            raise _refused(error) from error
+        return {
+            name: np.ma.filled(np.ma.asarray(column).astype(np.float64), np.nan)
+            for name, column in columns.items()
+        }
+
+    def values(
+        self, measure: str | None = None, study: str = "test", team: str | None = "champion"
+    ) -> list[Value]:
+        """Return the mean over scenarios of a measure, a row per run that has it.
+
+        Ordered by task, budget, variant, method, seed and run. Runs whose mean is not a finite
+        number are left out.
+
+        Args:
+            measure: one of the world's task performance measures; None: each world's main one.
+            study: "test" (of the finished run), "lesion" or "clones".
+            team: test: "champion" or "generation 0"; lesion and clones: "whole" or a caste.
+        """
+        rows = self._connection.execute(
+            """
+            SELECT r.run, r.task, r.world, r.environment, r.family, r.number, r.method, r.preset,
+                   r.variant, r.seed, b.budget, s.measure,
+                   if(s.measure = r.measure, r.optimum, NULL) AS optimum, avg(s.value) AS value
+            FROM runs r JOIN budgets b USING (run) JOIN scores s USING (run)
+            WHERE s.study = $study AND s.team = $team AND s.measure = coalesce($measure, r.measure)
+            GROUP BY ALL
+            HAVING isfinite(avg(s.value))
+            ORDER BY r.world, r.family, r.number, r.task, b.budget, r.variant, r.method, r.seed,
+                     r.run
+            """,
+            {"study": study, "team": team, "measure": measure},
+        ).fetchall()
+        return [Value(*row) for row in rows]
+
+    def close(self) -> None:
+        """Let go of the connection."""
+        self._connection.close()
+
+    def __enter__(self) -> Tables:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def _open(self, table: str, columns: dict[str, str]) -> None:
+        """Read one table."""
+        import duckdb
+
+        file = self.folder / f"{table}.parquet"
+        if file.is_file():
+            listed = ", ".join(
+                f'CAST("{name}" AS {kind}) AS "{name}"' for name, kind in columns.items()
+            )
+            quoted = str(file).replace("'", "''")
+            source = f"SELECT {listed} FROM read_parquet('{quoted}')"
+        else:
+            listed = ", ".join(f'NULL::{kind} AS "{name}"' for name, kind in columns.items())
+            source = f"SELECT {listed} WHERE false"
+        if table == "runs":
+            source += (
+                " QUALIFY row_number() OVER (PARTITION BY run_id, task, method, preset, variant,"
+                " seed ORDER BY run) = 1"
+            )
+        try:
+            self._connection.execute(f"CREATE TABLE {table} AS {source}")
+        except duckdb.Error as error:
+            line = " ".join(str(error).split("\n")[0].split())
+            raise UsageError(f"{file} is not a table of {table}: {line}") from error
+
+
+def _refused(error: Exception) -> UsageError:
+    """Return what DuckDB says about a statement, in one line."""
+    return UsageError(f"query: {' '.join(str(error).split('LINE 1:')[0].split())}")
+
+
+def _budgets(rows: list[tuple[Any, ...]]) -> dict[str, str]:
+    """Return the budget of each run in words.
+
+    Args:
+        rows: run, world, preset, whether a stage of a shaping, stopped_by, evaluations, team_steps.
+    """
+    scales = defaultdict(list)
+    for run, world, preset, is_stage, stopped_by, evaluations, steps in rows:
+        one = (stopped_by == "target", evaluations, steps / max(evaluations, 1), run)
+        scales[world, preset, is_stage].append(one)
+    budgets = {}
+    for (_, preset, is_stage), runs in scales.items():
+        for alike in _apart(runs, 2):
+            steps = _rounded(min(one[2] for one in alike))
+            groups = _apart([one for one in alike if not one[0]] or alike, 1)
+            for one in alike:
+                group = next((g for g in groups if one[1] <= g[-1][1]), groups[-1])
+                budgets[one[3]] = (
+                    f"{preset}, about {_rounded(group[0][1]):,} team evaluations"
+                    f"{' a stage' if is_stage else ''} of {steps:,} team-steps"
+                )
+    return budgets
+
+
+def _apart(runs: list[tuple[Any, ...]], column: int) -> list[list[tuple[Any, ...]]]:
+    """Return runs in groups, ascending in a column; neighbours in a group are within 20 %."""
+    ordered = sorted(runs, key=lambda one: (one[column], one))
+    groups = [ordered[:1]]
+    for one in ordered[1:]:
+        if one[column] > (1 + NEAR) * groups[-1][-1][column]:
+            groups.append([])
+        groups[-1].append(one)
+    return groups
+
+
+def _rounded(number: float) -> int:
+    """Return a number with two significant digits."""
+    return int(float(f"{number:.2g}"))

@@ -1,0 +1,104 @@
+"""Teams with one caste replaced, and teams of one robot's clones: what a caste is good for.
+
+Nitschke 2009, sections 4.6.5, 4.6.6, 5.5.3, 5.5.4, 6.5.4 and 6.5.5. Nothing is adapted: the teams
+that are compared meet the same scenarios, and differ in whose controllers their robots have.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from conevo.runs.champions import Team
+from conevo.specialization.individual import NON_SPECIALIZED
+from conevo.worlds.protocol import Scenarios, World
+from conevo.worlds.rollout import Rollout
+
+__all__ = ["WHOLE", "Compared", "clone", "lesion", "replacement"]
+
+WHOLE = "whole"  # the team as it was evolved
+
+
+@dataclass(frozen=True)
+class Compared:
+    """Teams in the same scenarios.
+
+    Attributes:
+        teams: N names, "whole" first, then castes.
+        performance: task performance measures, each [N, E].
+    """
+
+    teams: tuple[str, ...]
+    performance: dict[str, npt.NDArray[np.float32]]
+
+
+def lesion(
+    rollout: Rollout,
+    team: Team,
+    labels: Sequence[str],
+    castes: Sequence[str],
+    scenarios: Scenarios,
+) -> Compared:
+    """Play a team, and it with all robots of each caste replaced by a heuristic controller.
+
+    Args:
+        rollout: of the team's world.
+        team: R controllers.
+        labels: [R] caste of each robot.
+        castes: those to replace, one at a time.
+        scenarios: E scenarios for all the teams.
+    """
+    modes = np.full((1 + len(castes), len(labels)), -1, dtype=np.int32)
+    for k, caste in enumerate(castes, start=1):
+        modes[k, np.asarray(labels) == caste] = replacement(rollout.world, caste)
+    genes, teams = team.as_trial()
+    outcome = rollout.evaluate(genes, np.repeat(teams, len(modes), axis=0), scenarios, modes)
+    return Compared((WHOLE, *castes), outcome.performance)
+
+
+def clone(
+    rollout: Rollout,
+    team: Team,
+    labels: Sequence[str],
+    fitness: npt.ArrayLike,
+    castes: Sequence[str],
+    scenarios: Scenarios,
+) -> Compared:
+    """Play a team, and for each caste one of nothing but clones of its fittest robot.
+
+    Choice: as many clones as the team has robots ("cloned 20 times" of thirty robots, 6.5.5).
+
+    Args:
+        rollout: of the team's world.
+        team: R controllers.
+        labels: [R] caste of each robot.
+        fitness: [R] of each robot; of equals the first is cloned, one that is not finite last.
+        castes: those to clone, each with a robot at least.
+        scenarios: E scenarios for all the teams.
+    """
+    genes, teams = team.as_trial()
+    credit = np.asarray(fitness, dtype=np.float64)
+    credit = np.where(np.isfinite(credit), credit, -np.inf)
+    cloned = [teams]
+    for caste in castes:
+        own = np.flatnonzero(np.asarray(labels) == caste)
+        fittest = own[credit[own].argmax()]
+        cloned.append(np.repeat(teams[:, [fittest]], len(labels), axis=1))
+    outcome = rollout.evaluate(genes, np.concatenate(cloned), scenarios)
+    return Compared((WHOLE, *castes), outcome.performance)
+
+
+def replacement(world: World, caste: str) -> int:
+    """Return which heuristic controller of a world stands in for a caste.
+
+    The one of the caste's name (tables 5.3 and 6.3). Choice: where there is none, as for rovers
+    specialized to moving, the non-specialized one; else the world's first, as for predators, whose
+    only one is non-specialized (section 4.6.6).
+    """
+    for name in (caste, NON_SPECIALIZED):
+        if name in world.heuristics:
+            return world.heuristics.index(name)
+    return 0

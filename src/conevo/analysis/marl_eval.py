@@ -1,0 +1,150 @@
+"""A campaign for marl-eval (Gorsane et al. 2022): raw results in the form its page documents.
+
+::
+
+    {environment: {task: {algorithm: {"run_1": {
+        "step_1": {"step_count": 120, measure: [value]}, ...,
+        "absolute_metrics": {measure: [value, ...]}}}}}}
+
+================  ==============================================================================
+environment       world, family and preset: "rover-v1 complex night" (budgets are never mixed)
+task              "complex-5"
+algorithm         the method, and its variant if it has one
+measure           the main task performance of the world, [1] in a step
+step_count        team-steps, in equal parts of the fewest that a run of the environment spent
+step_k            the fittest team of the last generation that had ended by then
+absolute_metrics  the champion in its test, [scenarios]
+================  ==============================================================================
+
+The library asks for a full rectangle: in an environment the same algorithms in every task, the same
+number of runs of each and of steps in each. Choice: either the tasks that have all algorithms are
+taken, or the algorithms that all tasks have, whichever keeps more runs; of each then as many runs
+as the scarcest has, by seed. ``left_out`` names the rest. Choice: before its first generation has
+ended a run shows that one's value. Choice: "_" becomes "-" in measures and "," becomes ";" in
+algorithms, because the library cuts names there.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from conevo.analysis.frames import Tables
+
+__all__ = ["STEPS", "export", "left_out"]
+
+STEPS = 20
+"""Points of a learning curve."""
+
+
+class _Run(NamedTuple):
+    """What is told about one run: its learning curve and its test."""
+
+    run: str
+    measure: str
+    team_steps: list[int]
+    values: list[float]
+    test: list[float]
+
+
+Cells = dict[str, dict[str, list[_Run]]]  # task -> algorithm -> runs, by seed
+
+
+def export(tables: Tables) -> dict[str, Any]:
+    """Return the raw results of a campaign for marl-eval: plain data for JSON.
+
+    Runs without a test or a generation, or with a value that is not finite, are left out.
+    """
+    data: dict[str, Any] = {}
+    for environment, cells in _environments(tables).items():
+        kept = _rectangle(cells)
+        if not kept:
+            continue
+        fewest = min(one.team_steps[-1] for one in _runs(kept))
+        counts = [fewest * k // STEPS for k in range(1, STEPS + 1)]
+        data[environment] = {
+            task: {
+                algorithm: {f"run_{k}": _result(one, counts) for k, one in enumerate(runs, start=1)}
+                for algorithm, runs in algorithms.items()
+            }
+            for task, algorithms in kept.items()
+        }
+    return data
+
+
+def left_out(tables: Tables) -> list[str]:
+    """Return the runs of a campaign that ``export`` does not tell about, in alphabetical order."""
+    told = {one.run for cells in _environments(tables).values() for one in _runs(_rectangle(cells))}
+    every = tables.query("SELECT run FROM runs ORDER BY run")[1]
+    return [run for (run,) in every if run not in told]
+
+
+def _environments(tables: Tables) -> dict[str, Cells]:
+    """Return all runs that have a test and a curve, by environment."""
+    tests: dict[str, list[float]] = defaultdict(list)
+    rows = tables.query(
+        "SELECT run, s.value FROM scores s JOIN runs r USING (run) WHERE s.study = 'test' AND"
+        " s.team = 'champion' AND s.measure = r.measure ORDER BY run, s.scenario"
+    )[1]
+    for run, value in rows:
+        tests[run].append(value)
+    curves: dict[str, tuple[list[int], list[float]]] = defaultdict(lambda: ([], []))
+    rows = tables.query("SELECT run, team_steps, value FROM generations ORDER BY run, generation")[
+        1
+    ]
+    for run, team_steps, value in rows:
+        curves[run][0].append(team_steps)
+        curves[run][1].append(value)
+    found: dict[str, Cells] = {}
+    rows = tables.query(
+        "SELECT run, world, family, preset, environment, method, variant, measure FROM runs"
+        " ORDER BY world, family, preset, number, environment, method, variant, seed, run"
+    )[1]
+    for run, world, family, preset, task, method, variant, measure in rows:
+        if run not in tests or run not in curves:
+            continue
+        if not np.isfinite(tests[run] + curves[run][1]).all():
+            continue
+        environment = " ".join(part for part in (world, family, preset) if part)
+        algorithm = " ".join(part for part in (method, variant) if part).replace(",", ";")
+        one = _Run(run, measure.replace("_", "-"), *curves[run], tests[run])
+        found.setdefault(environment, {}).setdefault(task, {}).setdefault(algorithm, []).append(one)
+    return found
+
+
+def _rectangle(cells: Cells) -> Cells:
+    """Return the same algorithms of several tasks, the same number of runs of each."""
+    every = {algorithm for algorithms in cells.values() for algorithm in algorithms}
+    common = every.intersection(*cells.values())
+    complete = {task: algorithms for task, algorithms in cells.items() if every <= set(algorithms)}
+    shared = {
+        task: {name: runs for name, runs in algorithms.items() if name in common}
+        for task, algorithms in cells.items()
+        if common
+    }
+    return max(_evened(complete), _evened(shared), key=lambda kept: len(_runs(kept)))
+
+
+def _evened(cells: Cells) -> Cells:
+    """Return the first runs of each cell, as many as the smallest has."""
+    n = min((len(runs) for algorithms in cells.values() for runs in algorithms.values()), default=0)
+    return {
+        task: {name: runs[:n] for name, runs in algorithms.items()}
+        for task, algorithms in cells.items()
+    }
+
+
+def _runs(cells: Cells) -> list[_Run]:
+    return [one for algorithms in cells.values() for runs in algorithms.values() for one in runs]
+
+
+def _result(one: _Run, counts: list[int]) -> dict[str, Any]:
+    """Return the steps and the absolute metrics of one run."""
+    ended = np.searchsorted(one.team_steps, counts, side="right") - 1
+    steps = {
+        f"step_{k}": {"step_count": count, one.measure: [one.values[max(at, 0)]]}
+        for k, (count, at) in enumerate(zip(counts, ended.tolist(), strict=True), start=1)
+    }
+    return steps | {"absolute_metrics": {one.measure: one.test}}

@@ -1,0 +1,209 @@
+"""What the fittest team of a run does, and what becomes of it without one of its castes.
+
+Nitschke 2009, sections 4.6.4 to 4.6.6, 5.5.2 to 5.5.4, 6.5.4 and 6.5.5. One study holds it all as
+plain data: each robot's caste, S and fitness, measures of the team's specialization, caste lesions
+and teams of clones scenario by scenario, and what predators are seen to do.
+
+- Choice: castes are told in the scenarios of the testing phase, lesions and clones are played in
+  others, and all teams of a comparison meet the same ones: so that no caste is told by the luck
+  it is judged by.
+- Choice: the fittest robot of a caste is the one with the highest private fitness in the scenarios
+  that the castes were told in, of the run's own fittest team (5.5.4 takes it from CONE's).
+- Choice: predators begin clones' scenarios close together around the prey (4.6.5), all teams in the
+  same places; at random if obstacles are in the way or they see less far than they are wide.
+- A score that is not a finite number is left out, as in the testing phase; a fitness is None.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from conevo.analysis.behaviours import BEHAVIOURS
+from conevo.analysis.captures import most_frequent
+from conevo.analysis.fittest import equip
+from conevo.analysis.lesions import Compared, clone, lesion
+from conevo.analysis.pursuit import Observation, watch
+from conevo.analysis.reproduction import place_together
+from conevo.rng import fold, stream
+from conevo.runs.champions import Team
+from conevo.runs.evaluation import describe
+from conevo.runs.lab import Lab
+from conevo.runs.run import Run
+from conevo.specialization.individual import NON_SPECIALIZED
+from conevo.specialization.team import Activity, measure
+from conevo.worlds.protocol import Outcome, Scenarios
+from conevo.worlds.pursuit import PursuitWorld
+
+__all__ = ["study"]
+
+# Not cloned: a team that only moves, or idles, does nothing of the task (4.6.5, 5.5.4, 6.5.5).
+NOT_CLONED = ("move", "idle")
+Row = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class _Portrait:
+    """Who is who in a team.
+
+    Attributes:
+        activity: what they did in all scenarios, with S and caste of each robot.
+        fitness: [R] private fitness, mean over the scenarios.
+        castes: those with robots, in the world's order.
+    """
+
+    activity: Activity
+    fitness: npt.NDArray[np.float64]
+    castes: list[str]
+
+    @property
+    def labels(self) -> Sequence[str]:
+        """Caste of each robot."""
+        return self.activity.labels
+
+
+def study(run: Run, scenarios: int = 20, *, threads: int | None = None) -> dict[str, Any]:
+    """Study the fittest team of a run in fresh scenarios; writes nothing.
+
+    The castes of predators are their individual behaviours, and only the specialized ones are
+    replaced or cloned (table 4.5, figure 4.12); in other worlds the non-specialized are a caste.
+
+    Args:
+        run: of any world, finished or not.
+        scenarios: how many for each comparison.
+        threads: CPU threads, all by default; changes no result.
+
+    Returns:
+        Plain data. scores: rows {study, team, measure, scenario, value} of the studies "lesion" and
+        "clones", teams "whole" and castes; the testing phase is the run's own (``test_result``).
+        robots: robot, caste, specialization (S), fitness, hidden. actions: robot, action (of
+        ``World.castes``), count. metrics: those of ``specialization.team``, by what castes are told
+        by. behaviours (predators only): kind, behaviour, count; for the kind "team" its most
+        frequent collective behaviour, and all its captures.
+
+    Raises:
+        UsageError: no generation has finished yet, or made with other kernels.
+    """
+    team, lab = equip(run, threads)
+    seed = run.config.run.seed
+    fresh = lab.world.scenarios([fold(seed, "test", k) for k in range(scenarios)])
+    outcome = lab.rollout.evaluate(*team.as_trial(), fresh)
+    seen = None
+    if isinstance(lab.world, PursuitWorld):
+        seen = watch(team, lab, scenarios, seed, threads=threads)
+    portrait = _portray(lab, outcome, seen)
+    altered = portrait.castes
+    if seen is not None:
+        altered = [caste for caste in altered if caste != NON_SPECIALIZED]
+    others = lab.world.scenarios([fold(seed, "lesion", k) for k in range(scenarios)])
+    lesioned = lesion(lab.rollout, team, portrait.labels, altered, others)
+    cloned = clone(
+        lab.rollout,
+        team,
+        portrait.labels,
+        portrait.fitness,
+        [caste for caste in altered if caste not in NOT_CLONED],
+        _clones_scenarios(lab, seen, seed, scenarios),
+    )
+    return {
+        "scores": _rows("lesion", lesioned) + _rows("clones", cloned),
+        "robots": _robots(team, portrait),
+        "actions": _actions(lab, outcome),
+        "metrics": measure(portrait.activity),
+        "behaviours": [] if seen is None else _behaviours(seen),
+    }
+
+
+def _portray(lab: Lab, outcome: Outcome, seen: Observation | None) -> _Portrait:
+    if seen is None:
+        found, order = describe(outcome, lab.world.castes), lab.world.castes
+        activity = Activity(_counts(outcome), np.array(found.specialization), found.labels)
+    else:
+        lives, order = seen.lifetimes, BEHAVIOURS
+        windows = [[share * life.windows for share in life.shares.values()] for life in lives]
+        activity = Activity(
+            np.rint(windows),
+            np.array([life.specialization for life in lives]),
+            [life.label for life in lives],
+        )
+    named = [name for name in order if name in activity.labels and name != NON_SPECIALIZED]
+    return _Portrait(
+        activity=activity,
+        fitness=outcome.fitness[0].astype(np.float64).mean(axis=0),
+        castes=[*named, *([NON_SPECIALIZED] if NON_SPECIALIZED in activity.labels else [])],
+    )
+
+
+def _counts(outcome: Outcome) -> npt.NDArray[np.int64]:
+    """Return how often each robot of the only team executed what, in all scenarios [R, C]."""
+    counts: npt.NDArray[np.int64] = outcome.counts[0].astype(np.int64).sum(axis=0)
+    return counts
+
+
+def _clones_scenarios(lab: Lab, seen: Observation | None, seed: int, n: int) -> Scenarios:
+    keys = [fold(seed, "clones", k) for k in range(n)]
+    if seen is None or not _fits_together(seen):
+        return lab.world.scenarios(keys)
+    roles = [""] * seen.world.n_robots
+    poses = np.stack(
+        [place_together(stream(key, "places"), seen, roles, at_wall=False) for key in keys]
+    )
+    x, y, heading = (np.ascontiguousarray(poses[..., k]) for k in range(3))
+    return replace(seen.world.scenarios(keys), x=x, y=y, heading=heading)
+
+
+def _fits_together(seen: Observation) -> bool:
+    """Whether all predators find room in sight of one prey."""
+    sees_enough = seen.setting.range_cm >= 2 * seen.setting.radius_cm
+    return sees_enough and not seen.world.params.n_obstacles
+
+
+def _rows(study: str, compared: Compared) -> list[Row]:
+    """Return the finite values of each team and measure as rows."""
+    return [
+        {"study": study, "team": team, "measure": measure, "scenario": k, "value": float(value)}
+        for n, team in enumerate(compared.teams)
+        for measure, values in compared.performance.items()
+        for k, value in enumerate(values[n])
+        if np.isfinite(value)
+    ]
+
+
+def _robots(team: Team, portrait: _Portrait) -> list[Row]:
+    of, hidden = portrait.activity, team.active.sum(axis=1)
+    columns = (of.labels, of.specialization, portrait.fitness, hidden)
+    return [
+        {
+            "robot": robot,
+            "caste": caste,
+            "specialization": float(s),
+            "fitness": float(fitness) if np.isfinite(fitness) else None,
+            "hidden": int(n_hidden),
+        }
+        for robot, (caste, s, fitness, n_hidden) in enumerate(zip(*columns, strict=True))
+    ]
+
+
+def _actions(lab: Lab, outcome: Outcome) -> list[Row]:
+    return [
+        {"robot": robot, "action": action, "count": int(count)}
+        for robot, executed in enumerate(_counts(outcome))
+        for action, count in zip(lab.world.castes, executed, strict=True)
+    ]
+
+
+def _behaviours(seen: Observation) -> list[Row]:
+    """Return how many predators are labelled so, and how many captures are of each kind."""
+    labels = Counter(life.label for life in seen.lifetimes)
+    usual, captures = most_frequent(seen.all_captures)
+    counts = [
+        *(("individual", name, labels[name]) for name in (*BEHAVIOURS, NON_SPECIALIZED)),
+        *(("collective", name, n) for name, n in captures.items()),
+        ("team", usual, len(seen.all_captures)),
+    ]
+    return [{"kind": kind, "behaviour": name, "count": n} for kind, name, n in counts]

@@ -1,0 +1,168 @@
+"""Runs as tasks of a Ray cluster, which carries a task out again where its node was lost.
+
+A task holds the cores of its run and spawns the same worker as the executor "processes", so that a
+run is carried out alike everywhere and one run's threads, memory and end are its own. All that
+comes back through Ray is the worker's exit code. Results are files: in the campaign's directory, if
+all nodes see it, or else in an object store, from where they are fetched.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import tempfile
+import time
+from contextlib import suppress
+from importlib import import_module
+from pathlib import Path
+from typing import Any, ClassVar
+
+from conevo.campaigns.executors import (
+    ONE_THREAD,
+    Ending,
+    Job,
+    usable_cores,
+    why_lost,
+    worker_command,
+)
+from conevo.campaigns.object_store import ObjectStore
+from conevo.campaigns.places import Places
+from conevo.errors import EnvironmentFailure, UsageError
+
+__all__ = ["RayCluster"]
+
+RETRIES = 3  # of a task whose node or Ray worker is lost
+MEMORY = 80 * 2**20  # bytes of Ray's own object store, near the least that Ray allows
+COPY_EVERY = 120.0  # seconds between two copies of a run at work into the object store
+
+
+class RayCluster:
+    """A Ray task per run, here or on a cluster.
+
+    Args:
+        cores: that jobs may use together; None for all that the cluster has.
+        address: of a cluster that is running, "auto" or "HOST:PORT"; None begins one on this
+            machine, which ends with this executor. conevo must be installed on all nodes.
+        store: address of an object store, if the nodes do not see the campaign's directory.
+
+    Raises:
+        UsageError: Ray is not installed, or the object store's address is none.
+        EnvironmentFailure: there is no cluster at the address.
+    """
+
+    name: ClassVar[str] = "ray"
+
+    def __init__(
+        self, cores: int | None = None, address: str | None = None, store: str = ""
+    ) -> None:
+        os.environ["RAY_USAGE_STATS_ENABLED"] = "0"
+        try:
+            self._ray: Any = import_module("ray")
+        except ImportError as error:
+            raise UsageError("executor 'ray' needs Ray: pip install 'conevo[ray]'") from error
+        self._store = ObjectStore(store) if store else None
+        self._tasks: dict[Any, Job] = {}  # by the reference of the exit code to come
+        options: dict[str, Any] = {"log_to_driver": False, "logging_level": "ERROR"}
+        if address is None:
+            options |= {"num_cpus": cores or usable_cores(), "object_store_memory": MEMORY}
+            options |= {"include_dashboard": False}
+        try:
+            self._ray.init(address or "local", **options)
+        except (ConnectionError, RuntimeError, ValueError, OSError) as error:
+            line = " ".join(str(error).split())
+            raise EnvironmentFailure(f"Ray at {address or 'this machine'}: {line}") from error
+        nodes = [int(n["Resources"].get("CPU", 0)) for n in self._ray.nodes() if n["Alive"]]
+        self._widest = max(nodes)
+        self.cores = min(cores or sum(nodes), sum(nodes))
+
+    def submit(self, job: Job) -> None:
+        """Hand a task to the cluster; it never asks for more cores than one node has."""
+        threads = min(job.threads, self._widest)
+        job = Job(job.root.resolve(), job.label, threads)
+        uri = ""
+        if self._store is not None:
+            uri = self._store.uri
+            self._store.put_plan(job.root)
+            if not self._store.has_run(job.label):
+                self._store.put_run(job.root, job.label)
+            self._store.forget_ending(job.root, job.label)
+        task = self._ray.remote(num_cpus=threads, max_retries=RETRIES)(_carry)
+        self._tasks[task.remote(str(job.root), job.label, threads, uri)] = job
+
+    def wait(self, seconds: float) -> list[Ending]:
+        """Return the workers that are gone; their files have been fetched by then."""
+        waiting = list(self._tasks)
+        if not waiting:
+            return []
+        self._ray.wait(waiting, num_returns=1, timeout=seconds)
+        gone, _ = self._ray.wait(waiting, num_returns=len(waiting), timeout=0)
+        return [self._end(task) for task in gone]
+
+    def stop(self) -> None:
+        """Cancel all tasks, wait for what their workers still write, and leave the cluster."""
+        try:
+            for task in self._tasks:
+                self._ray.cancel(task, force=False)
+            for task in list(self._tasks):
+                self._end(task)
+        finally:
+            self._ray.shutdown()
+
+    def _end(self, task: Any) -> Ending:
+        """Return how a task ended, after it has."""
+        job = self._tasks[task]
+        try:
+            lost = why_lost(self._ray.get(task))
+        except self._ray.exceptions.RayError as error:
+            lost = f"lost by Ray: {' '.join(str(error).split())[:300]}"
+        if self._store is not None:
+            self._store.get_run(job.root, job.label)
+        del self._tasks[task]
+        return Ending(job.label, lost)
+
+
+def _carry(root: str, label: str, threads: int, store: str) -> int:
+    """Carry a run on, on the node where this is called, and return the worker's exit code."""
+    if not store:
+        return _supervise(Job(Path(root), label, threads))
+    copies = ObjectStore(store)
+    with tempfile.TemporaryDirectory(prefix="conevo-") as folder:
+        job = Job(Path(folder), label, threads)
+        copies.get_plan(job.root)
+        copies.get_run(job.root, label)
+        Places(job.root).ended(label).unlink(missing_ok=True)
+        code = _supervise(job, copies)
+        copies.put_run(job.root, label)
+    return code
+
+
+def _supervise(job: Job, copies: ObjectStore | None = None) -> int:
+    """Spawn a worker and return its exit code; if the task is cancelled, the worker leaves.
+
+    The worker also leaves when this process is killed: its stdin ends then.
+    """
+    log = Places(job.root).log(job.label)
+    log.parent.mkdir(exist_ok=True)
+    with log.open("ab") as file:
+        worker = subprocess.Popen(
+            worker_command(job),
+            stdin=subprocess.PIPE,
+            stdout=file,
+            stderr=file,
+            start_new_session=True,
+            env=os.environ | dict.fromkeys(ONE_THREAD, "1"),
+        )
+    try:
+        copied = time.monotonic()
+        while worker.poll() is None:
+            time.sleep(0.05)  # not wait: Ray's cancelling does not interrupt that
+            if copies is not None and time.monotonic() - copied > COPY_EVERY:
+                with suppress(EnvironmentFailure):  # the last copy decides
+                    copies.put_run(job.root, job.label)
+                copied = time.monotonic()
+    except KeyboardInterrupt:
+        pass
+    finally:
+        if worker.stdin is not None:
+            worker.stdin.close()
+    return worker.wait()

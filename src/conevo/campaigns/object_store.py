@@ -1,0 +1,151 @@
+"""Runs copied to and from an object store, for machines that share no file system.
+
+An object store has neither locks nor renaming, and copying may break off between any two files. So
+a run's files are stored in an order that leaves a run to resume after each of them: checkpoints
+after what they are about, seals last. They are read the other way round, since the run may be at
+work meanwhile: what is newer than its checkpoint is written again when a run is resumed.
+"""
+
+from __future__ import annotations
+
+import shutil
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from conevo.campaigns.places import Places
+from conevo.campaigns.work import planned_runs
+from conevo.errors import EnvironmentFailure, UsageError
+from conevo.runs.directory import appearing, kind_of
+from conevo.runs.durable import replace_file
+
+__all__ = ["ObjectStore"]
+
+
+class ObjectStore:
+    """Where the files of one campaign are kept, named as in its directory.
+
+    Args:
+        uri: "s3://BUCKET/PATH", "gs://BUCKET/PATH", "file:///PATH": whatever pyarrow.fs knows.
+
+    Raises:
+        UsageError: pyarrow is not installed, or does not know the address.
+    """
+
+    def __init__(self, uri: str) -> None:
+        try:
+            fs: Any = import_module("pyarrow.fs")
+        except ImportError as error:
+            raise UsageError("an object store needs pyarrow: pip install 'conevo[ray]'") from error
+        try:
+            self._files, base = fs.FileSystem.from_uri(uri)
+        except (OSError, ValueError) as error:
+            raise UsageError(f"object store {uri!r}: {error}") from error
+        self._folder = fs.FileSelector
+        self.uri, self._base = uri.rstrip("/"), base.rstrip("/")
+
+    def put_plan(self, root: Path) -> None:
+        """Store the list of a campaign's runs: all of the plan that a worker reads."""
+        self._put(root, Places(root).runs, Places(root).runs.read_bytes())
+
+    def get_plan(self, root: Path) -> None:
+        """Write that list into a directory."""
+        self._get(root, Places(root).runs)
+
+    def put_run(self, root: Path, label: str) -> None:
+        """Store a run as it stands, at work or not, its studies and how it ended."""
+        run = Places(root).run(label)
+        contents: dict[Path, bytes] = {}
+        for path in sorted(_results(run), key=lambda path: (_rank(path), path)):
+            try:
+                contents[path] = path.read_bytes()
+            except FileNotFoundError:  # gone since it was listed
+                continue
+        for path in reversed(contents):
+            self._put(root, path, contents[path])
+        there = {path.relative_to(run).as_posix() for path in contents}
+        for name in set(self._names(f"runs/{label}")) - there if there else ():
+            self._files.delete_file(f"{self._base}/runs/{label}/{name}")
+        for path in _beside(root, label):
+            if path.is_file():
+                self._put(root, path, path.read_bytes())
+
+    def get_run(self, root: Path, label: str) -> None:
+        """Put what is stored of a run into a directory, in place of what is there."""
+        run = Places(root).run(label)
+        if names := self._names(f"runs/{label}"):
+            shutil.rmtree(run, ignore_errors=True)
+            with appearing(run) as draft:
+                for name in names:
+                    path = draft / name
+                    path.parent.mkdir(parents=True, exist_ok=True)
+                    path.write_bytes(self._read(f"runs/{label}/{name}"))
+        for path in _beside(root, label):
+            if path.name in self._names(path.parent.name):
+                self._get(root, path)
+
+    def has_run(self, label: str) -> bool:
+        """Whether anything of a run was stored."""
+        return bool(self._names(f"runs/{label}"))
+
+    def forget_ending(self, root: Path, label: str) -> None:
+        """Remove how a run ended last, since it is tried again."""
+        path = Places(root).ended(label)
+        if path.name in self._names(path.parent.name):
+            self._files.delete_file(f"{self._base}/{path.relative_to(root).as_posix()}")
+
+    def _names(self, folder: str) -> list[str]:
+        """Return the names of all files in a folder, relative to it."""
+        place = f"{self._base}/{folder}"
+        below = self._folder(place, recursive=True, allow_not_found=True)
+        found = self._files.get_file_info(below)
+        return sorted(one.path.rpartition(f"{place}/")[2] for one in found if one.is_file)
+
+    def _put(self, root: Path, path: Path, content: bytes) -> None:
+        name = path.relative_to(root).as_posix()
+        place = f"{self._base}/{name}"
+        try:
+            self._files.create_dir(place.rpartition("/")[0], recursive=True)
+            with self._files.open_output_stream(place) as stream:
+                stream.write(content)
+        except OSError as error:
+            raise EnvironmentFailure(f"cannot write {self.uri}/{name}: {error}") from error
+
+    def _get(self, root: Path, path: Path) -> None:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        replace_file(path, self._read(path.relative_to(root).as_posix()))
+
+    def _read(self, name: str) -> bytes:
+        try:
+            with self._files.open_input_stream(f"{self._base}/{name}") as stream:
+                return bytes(stream.read())
+        except OSError as error:
+            raise EnvironmentFailure(f"cannot read {self.uri}/{name}: {error}") from error
+
+
+def _results(run: Path) -> list[Path]:
+    """Return the files of a run or shaping, without drafts and locks."""
+    if not kind_of(run):
+        return []
+    return [
+        path
+        for path in run.rglob("*")
+        if path.is_file()
+        and path.name != "lock"
+        and path.suffix != ".tmp"
+        and not any(part.startswith(".") for part in path.relative_to(run).parts)
+    ]
+
+
+def _rank(path: Path) -> int:
+    """Return when a file is to be read, lowest first, and written, lowest last."""
+    if path.name == "DONE":
+        return 0
+    return 1 if path.name.startswith("checkpoint-") else 2
+
+
+def _beside(root: Path, label: str) -> list[Path]:
+    """Return where a run's studies, its log and how it ended may be, in this order."""
+    places = Places(root)
+    studies = [places.study(name) for name in planned_runs(root)[label].names]
+    return [*studies, places.log(label), places.ended(label)]

@@ -1,0 +1,126 @@
+"""Measures of a whole team's specialization: those of the thesis, of biology, of robot teams.
+
+``METRICS`` names them for reports and pages; ``measure`` takes them all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from conevo.specialization.diversity import (
+    caste_entropy,
+    differences,
+    hierarchic_social_entropy,
+    system_neural_diversity,
+)
+from conevo.specialization.entropy import activity_entropy, division_of_labour, mutual_information
+from conevo.specialization.individual import NON_SPECIALIZED
+from conevo.specialization.switching import switching_index
+
+__all__ = ["METRICS", "Activity", "Metric", "measure"]
+
+
+@dataclass(frozen=True)
+class Activity:
+    """What the robots of a team did.
+
+    Attributes:
+        counts: [R, A] how often each robot executed each action.
+        specialization: [R] degree of specialization S of each robot.
+        labels: [R] caste of each robot.
+    """
+
+    counts: npt.NDArray[Any]
+    specialization: npt.NDArray[np.floating[Any]]
+    labels: Sequence[str]
+
+
+@dataclass(frozen=True)
+class Metric:
+    """One measure.
+
+    Attributes:
+        function: takes it; None where it is not defined.
+        span: from which value to which, R robots and A actions.
+        what: what it says, and what its extremes mean.
+        source: where it is from.
+    """
+
+    function: Callable[[Activity], float | None]
+    span: str
+    what: str
+    source: str
+
+
+METRICS: dict[str, Metric] = {
+    "specialization": Metric(
+        lambda team: float(np.mean(team.specialization)),
+        "0 to 1",
+        "mean S, switches over possible ones; 0: all are perfect specialists",
+        "Nitschke 2009, eq. 3.4",
+    ),
+    "specialized": Metric(
+        lambda team: float(np.mean([name != NON_SPECIALIZED for name in team.labels])),
+        "0 to 1",
+        "portion of the robots that are specialized to something",
+        "Nitschke 2009, 3.2.3",
+    ),
+    "switching_index": Metric(
+        lambda team: switching_index(team.specialization, team.counts.shape[1]),
+        "-1 / (A - 1) to 1",
+        "1: nobody switches; 0: as often as by chance; below: more often",
+        "Gautrais et al. 2002",
+    ),
+    "activity_entropy": Metric(
+        lambda team: activity_entropy(team.counts),
+        "0 to log2 A bits",
+        "a robot's own entropy of actions, mean; 0: each does one thing only",
+        "O'Donnell and Jeanne 1990",
+    ),
+    "caste_entropy": Metric(
+        lambda team: caste_entropy(team.labels),
+        "0 to log2 R bits",
+        "entropy of castes; 0: one caste",
+        "Balch 1997",
+    ),
+    "mutual_information": Metric(
+        lambda team: mutual_information(team.counts),
+        "0 to log2 min(R, A) bits",
+        "what the robot tells about its actions; 0: all divide their work alike",
+        "Gorelick et al. 2004",
+    ),
+    "division_by_action": Metric(
+        lambda team: division_of_labour(team.counts)[0],
+        "0 to 1",
+        "mutual information over the entropy of actions; 1: one action a robot",
+        "Gorelick et al. 2004",
+    ),
+    "division_by_robot": Metric(
+        lambda team: division_of_labour(team.counts)[1],
+        "0 to 1",
+        "mutual information over the entropy of robots; 1: one robot an action",
+        "Gorelick et al. 2004",
+    ),
+    "hierarchic_social_entropy": Metric(
+        lambda team: hierarchic_social_entropy(differences(team.counts)),
+        "0 to log2 R bits",
+        "entropy of clusters, over all levels of difference; 0: all divide their work alike",
+        "Balch 2000",
+    ),
+    "system_neural_diversity": Metric(
+        lambda team: system_neural_diversity(differences(team.counts)),
+        "0 to 1",
+        "mean difference of two robots; 0: all divide their work alike",
+        "Bettini et al. 2023",
+    ),
+}
+
+
+def measure(team: Activity) -> dict[str, float | None]:
+    """Return every measure of ``METRICS``; None where one is not defined."""
+    return {name: metric.function(team) for name, metric in METRICS.items()}

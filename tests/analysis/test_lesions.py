@@ -1,0 +1,120 @@
+"""Castes replaced and robots cloned: each team played again, one by one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import conevo
+from conevo.analysis.lesions import clone, lesion, replacement
+from conevo.runs.champions import Team
+from conevo.worlds.rollout import Rollout
+
+EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "light.py"
+LABELS = ["low", "hi", "low", "non-specialized", "move", "hi"]
+
+
+@pytest.fixture(scope="module")
+def rollout() -> Rollout:
+    world = conevo.world("rover/complex-5", n_robots=6, iterations=400)
+    return Rollout(world, n_threads=1)
+
+
+@pytest.fixture(scope="module")
+def team(rollout: Rollout) -> Team:
+    """Random controllers, some with more neurons than others."""
+    spec, rng = rollout.world.controller, np.random.default_rng(4)
+    genes = rng.uniform(-1, 1, (6, spec.max_hidden, spec.n_genes)).astype(np.float32)
+    active = np.arange(spec.max_hidden) < rng.integers(5, 12, (6, 1))
+    return Team(0, genes, active, np.zeros(6), np.zeros(6))
+
+
+def play(rollout: Rollout, team: Team, scenarios, modes: list[int] | None = None):
+    """Return the performance [E] of one team."""
+    heuristic = None if modes is None else np.array([modes], dtype=np.int32)
+    outcome = rollout.evaluate(*team.as_trial(), scenarios, heuristic)
+    return {name: values[0].tolist() for name, values in outcome.performance.items()}
+
+
+def of(found, name: str):
+    k = found.teams.index(name)
+    return {measure: values[k].tolist() for measure, values in found.performance.items()}
+
+
+def test_a_lesion_replaces_all_robots_of_a_caste_and_nobody_else(rollout, team) -> None:
+    scenarios = rollout.world.scenarios(range(3))
+    castes = ["low", "hi", "move", "non-specialized"]
+    found = lesion(rollout, team, LABELS, castes, scenarios)
+    assert found.teams == ("whole", *castes)
+    assert of(found, "whole") == play(rollout, team, scenarios)
+    by_hand = {  # heuristics low 0, med 1, hi 2, non-specialized 3
+        "low": [0, -1, 0, -1, -1, -1],
+        "hi": [-1, 2, -1, -1, -1, 2],
+        "move": [-1, -1, -1, -1, 3, -1],
+        "non-specialized": [-1, -1, -1, 3, -1, -1],
+    }
+    for caste, modes in by_hand.items():
+        assert of(found, caste) == play(rollout, team, scenarios, modes), caste
+    assert len({tuple(of(found, caste)["area"]) for caste in found.teams}) == 5
+
+
+def test_clones_are_all_the_fittest_robot_of_their_caste(rollout, team) -> None:
+    scenarios = rollout.world.scenarios(range(3))
+    fitness = [1.0, 5.0, 2.0, 0.0, 9.0, 5.0]
+    found = clone(rollout, team, LABELS, fitness, ["low", "hi", "non-specialized"], scenarios)
+    assert found.teams == ("whole", "low", "hi", "non-specialized")
+    assert of(found, "whole") == play(rollout, team, scenarios)
+    for caste, robot in (("low", 2), ("hi", 1), ("non-specialized", 3)):
+        same = np.full(6, robot)
+        clones = Team(0, team.genes[same], team.active[same], team.fitness, team.specialization)
+        assert of(found, caste) == play(rollout, clones, scenarios), caste
+    assert len({tuple(of(found, caste)["area"]) for caste in found.teams}) == 4
+
+
+def test_a_robot_without_a_finite_fitness_is_cloned_last(rollout, team) -> None:
+    scenarios = rollout.world.scenarios([7])
+    castes = ["low"]
+    expected = clone(rollout, team, LABELS, [0, 0, 1, 0, 0, 0], castes, scenarios)
+    for worst in (np.nan, np.inf, -np.inf):
+        found = clone(rollout, team, LABELS, [worst, 0, -3, 0, 0, 0], castes, scenarios)
+        assert of(found, "low") == of(expected, "low")
+    nobody = clone(rollout, team, LABELS, [np.nan] * 6, castes, scenarios)
+    first = clone(rollout, team, LABELS, [1, 0, 0, 0, 0, 0], castes, scenarios)
+    assert of(nobody, "low") == of(first, "low")
+
+
+def test_without_castes_only_the_whole_team_plays(rollout, team) -> None:
+    scenarios = rollout.world.scenarios([1])
+    for found in (
+        lesion(rollout, team, LABELS, [], scenarios),
+        clone(rollout, team, LABELS, np.zeros(6), [], scenarios),
+    ):
+        assert found.teams == ("whole",)
+        assert of(found, "whole") == play(rollout, team, scenarios)
+
+
+@pytest.mark.parametrize(
+    ("task", "stands_in"),
+    [
+        ("rover/simple-1", {"low": "low", "med": "med", "hi": "hi", "move": "non-specialized"}),
+        ("rover/simple-1", {"non-specialized": "non-specialized"}),
+        ("gacc/complex-1", {"B-detector": "B-detector", "A-constructor": "A-constructor"}),
+        ("gacc/complex-1", {"C-gatherer": "C-gatherer", "non-specialized": "non-specialized"}),
+        ("pursuit/team-3", {"pursuer": "heuristic", "idle": "heuristic"}),
+        (f"{EXAMPLE}:dark-1", {"move": "idler", "rest": "idler"}),
+    ],
+)
+def test_the_heuristic_controller_that_stands_in_for_a_caste(task, stands_in) -> None:
+    world = conevo.world(task)
+    for caste, heuristic in stands_in.items():
+        assert world.heuristics[replacement(world, caste)] == heuristic
+
+
+@pytest.mark.parametrize("task", ["rover/simple-1", "gacc/complex-1"])
+def test_all_castes_of_the_thesis_have_a_heuristic_of_their_own(task: str) -> None:
+    """Tables 5.3 and 6.3 name a controller for every caste that sections 5.5 and 6.5 replace."""
+    world = conevo.world(task)
+    castes = [caste for caste in world.castes if caste != "move"]
+    assert [world.heuristics[replacement(world, caste)] for caste in castes] == castes

@@ -1,0 +1,154 @@
+"""Ray's own promises: lost nodes and workers, clusters by address, results through a store."""
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import conevo
+from campaigns.plans import tiny_campaign
+from campaigns.processes import n_generations, until, workers
+from conevo.campaigns.executors import Job, make_executor
+from conevo.campaigns.executors_ray import RayCluster
+from conevo.errors import EnvironmentFailure
+
+pytest.importorskip("ray")
+pytestmark = pytest.mark.slow
+LONG = """[[where]]
+method = "homcne"
+settings = { "run.generations" = 30, "method.genotypes" = 40, "world.iterations" = 400 }"""
+
+
+def parent(process):
+    return int(Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[1])
+
+
+@pytest.fixture
+def long_run(tmp_path):
+    """A campaign and its first run, which takes some seconds."""
+    campaign = tiny_campaign(tmp_path, more=LONG)
+    return campaign, next(iter(campaign.planned))
+
+
+@pytest.fixture
+def undisturbed(long_run, tmp_path):
+    campaign, label = long_run
+    config = campaign.planned[label].configs()[0]
+    return outcome(conevo.runs.run.start(config, tmp_path / "undisturbed", threads=1).resume())
+
+
+def outcome(run):
+    rows = [{k: v for k, v in row.items() if k != "seconds"} for row in run.generations()]
+    return rows, run.champion.genes.tobytes(), run.test_result
+
+
+def end_of(executor):
+    """Wait for one ending."""
+    return until(lambda: executor.wait(0.1))
+
+
+def test_ray_itself_carries_a_run_on_whose_ray_worker_was_killed(long_run, undisturbed):
+    campaign, label = long_run
+    executor = make_executor("ray", 1)
+    try:
+        executor.submit(Job(campaign.path, label, 1))
+        until(lambda: n_generations(campaign, label) > 2)
+        (worker,) = workers(campaign.path)
+        os.kill(parent(worker), signal.SIGKILL)
+        until(lambda: worker not in workers(campaign.path))  # it leaves when its parent is gone
+        (ending,) = end_of(executor)
+    finally:
+        executor.stop()
+    assert (ending.label, ending.lost) == (label, "")
+    run = conevo.Run(campaign.places.run(label))
+    assert run.provenance["sessions"][1]["from_generation"] > 2
+    assert outcome(run) == undisturbed
+
+
+def test_results_come_through_an_object_store_where_nodes_do_not_see_the_campaign(
+    long_run, undisturbed, tmp_path, monkeypatch
+):
+    campaign, label = long_run
+    scratch = tmp_path / "scratch"
+    scratch.mkdir()
+    monkeypatch.setenv("TMPDIR", str(scratch))  # of the workers
+    uri = f"file://{tmp_path}/bucket"
+    executor = RayCluster(1, store=uri)
+    executor.submit(Job(campaign.path, label, 1))
+    (folder,) = until(lambda: list(scratch.glob("conevo-*")))
+    made = folder / "runs" / label / "generations.jsonl"
+    until(lambda: made.is_file() and made.read_bytes().count(b"\n") > 2)
+    assert not campaign.places.run(label).exists()
+    executor.stop()
+    done = n_generations(campaign, label)
+    assert 2 < done < 30
+    standings = campaign.carry_on(RayCluster(2, store=uri))
+    assert {one.state for one in standings.values()} == {"finished"}
+    assert list(scratch.glob("conevo-*")) == []
+    run = conevo.Run(campaign.places.run(label))
+    assert run.changed_files == []
+    assert run.provenance["sessions"][1]["from_generation"] == done
+    assert outcome(run) == undisturbed
+    for label in campaign.planned:
+        assert campaign.places.log(label).is_file()
+        assert campaign.places.ended(label).is_file()
+
+
+def test_a_cluster_by_address_has_the_cores_of_its_nodes_and_survives_the_loss_of_one(
+    long_run, undisturbed
+):
+    from ray.cluster_utils import Cluster
+
+    campaign, label = long_run
+    least = {"object_store_memory": 80 * 2**20}
+    cluster = Cluster(initialize_head=True, head_node_args={"num_cpus": 0, **least})
+    try:
+        node = cluster.add_node(num_cpus=1, **least)
+        other = cluster.add_node(num_cpus=1, **least)
+        executor = make_executor("ray", address=cluster.address)
+        assert executor.cores == 2
+        executor.submit(Job(campaign.path, label, 2))  # as the last one of a campaign
+        until(lambda: n_generations(campaign, label) > 2)
+        (worker,) = workers(campaign.path)
+        raylet = parent(parent(worker))
+        lost = next(n for n in (node, other) if n.all_processes["raylet"][0].process.pid == raylet)
+        cluster.remove_node(lost, allow_graceful=False)
+        (ending,) = end_of(executor)
+        executor.stop()
+    finally:
+        cluster.shutdown()
+    assert ending.lost == ""
+    run = conevo.Run(campaign.places.run(label))
+    assert [one["threads"] for one in run.provenance["sessions"]] == [1, 1]
+    assert outcome(run) == undisturbed
+
+
+def test_no_cluster_at_an_address_is_one_clear_line(monkeypatch):
+    monkeypatch.delenv("RAY_ADDRESS", raising=False)
+    with pytest.raises(EnvironmentFailure, match="Ray at auto: .*Could not find any running"):
+        make_executor("ray", address="auto")
+
+
+def test_ray_begins_nothing_that_calls_home_and_no_page():
+    executor = make_executor("ray", 1)
+    try:
+        assert os.environ["RAY_USAGE_STATS_ENABLED"] == "0"
+        words = subprocess.run(["ps", "-eo", "args"], capture_output=True, text=True, check=True)
+        mine = [line for line in words.stdout.splitlines() if "dashboard" in line]
+        assert all("--disable-frontend" in line for line in mine if "dashboard.py" in line)
+    finally:
+        executor.stop()
+
+
+def test_what_is_missing_is_said_in_one_line(tmp_path):
+    code = (
+        "import sys; sys.modules['ray'] = None\n"
+        "from conevo.campaigns.executors import make_executor\n"
+        "from conevo.errors import UsageError\n"
+        "try:\n    make_executor('ray')\nexcept UsageError as error:\n    sys.exit(str(error))\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.stderr == "executor 'ray' needs Ray: pip install 'conevo[ray]'\n"

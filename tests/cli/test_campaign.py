@@ -1,0 +1,141 @@
+"""The verbs for campaigns, as a user types them; also what is refused, with nothing written."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from campaigns.plans import tiny_campaign, write_plan
+from conevo.cli.main import main
+
+
+@pytest.fixture
+def conevo(tmp_path, monkeypatch, capsys):
+    """Run a command line in an empty folder; returns exit code, output and errors."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(*arguments):
+        with pytest.raises(SystemExit) as ended:
+            main(arguments)
+        said = capsys.readouterr()
+        return ended.value.code, said.out, said.err
+
+    return run
+
+
+def test_a_campaign_from_start_to_answers(conevo, tmp_path):
+    write_plan(tmp_path, 'studies = ["teams"]')
+    code, out, _ = conevo("campaign", "start", "tiny.toml", "--executor", "serial", "--seeds", "1")
+    assert code == 0
+    assert "campaigns/tiny" in out
+    assert "2 runs, 2 pending" in out
+    assert "(2 of 2 finished" in out
+    code, out, _ = conevo("campaign", "status", "tiny", "--json")
+    status = json.loads(out)
+    assert (code, status["running"]) == (0, False)
+    assert [run["state"] for run in status["runs"]] == ["finished"] * 2
+    code, out, _ = conevo("campaign", "status", "tiny", "--runs")
+    assert "rover-v1-complex-1-cone-s1" in out
+    code, out, _ = conevo("query", "SELECT method, seed FROM runs ORDER BY method", "--json")
+    assert [json.loads(line) for line in out.splitlines()] == [
+        {"method": "cone", "seed": 1},
+        {"method": "homcne", "seed": 1},
+    ]
+    code, out, _ = conevo("query", "tiny", "SELECT method AS m FROM runs ORDER BY m", "--csv")
+    assert out == "m\ncone\nhomcne\n"
+    code, out, _ = conevo("campaign", "list", "--json")
+    assert json.loads(out)["campaigns"] == [
+        {"campaign": "campaigns/tiny", "preset": "smoke", "runs": "2 finished"}
+    ]
+    code, out, _ = conevo("report", "tiny")
+    assert code == 0
+    assert Path(out.split(": ")[1].strip()).is_file()
+
+
+def test_a_started_campaign_needs_no_plan_and_more_seeds_extend_it(conevo, tmp_path):
+    tiny_campaign(tmp_path / "campaigns")
+    code, out, _ = conevo("campaign", "start", "tiny", "--executor", "serial", "--json")
+    lines = [json.loads(line) for line in out.splitlines()]
+    assert (code, lines[-1]["finished"], lines[-1]["of"]) == (0, 4, 4)
+    code, out, _ = conevo(
+        "campaign", "start", "tiny", "--executor", "serial", "--json", "--seeds", "3"
+    )
+    lines = [json.loads(line) for line in out.splitlines()]
+    assert [line["run"][-2:] for line in lines] == ["s3", "s3"]
+    code, out, _ = conevo("campaign", "start", "tiny", "--executor", "serial", "--quiet")
+    assert (code, out) == (0, "campaigns/tiny\n")
+
+
+def test_failures_are_said_with_their_reason_and_can_be_tried_again(conevo, tmp_path):
+    path = write_plan(tmp_path, "studies = []")
+    with path.open("a") as file:
+        file.write('[[where]]\nmethod = "cone"\nsettings = { "run.budget_evaluations" = 1 }\n')
+    code, out, _ = conevo("campaign", "start", "tiny.toml", "--executor", "serial")
+    assert code == 1
+    assert "2 finished, 2 failed" in out
+    assert "does not pay for one generation" in out
+    code, out, _ = conevo("campaign", "status", "tiny")
+    assert code == 1
+    assert "failed rover-v1-complex-1-cone-s1: run.budget_evaluations = 1" in out
+    code, out, _ = conevo("campaign", "retry", "tiny", "--executor", "serial", "--json")
+    assert code == 1
+    assert [json.loads(line)["state"] for line in out.splitlines()] == ["failed"] * 2
+
+
+def test_a_dry_run_prints_every_run_and_writes_nothing(conevo, tmp_path):
+    code, out, _ = conevo("campaign", "start", "rover-complex", "--seeds", "2", "--dry-run")
+    assert code == 0
+    assert len(out.splitlines()) == 1 + 2 * 50
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        ("campaign start rover-complx", "did you mean 'rover-complex'"),
+        ("campaign start none.toml", "cannot read none.toml"),
+        ("campaign start rover-complex --preset smok", "did you mean 'smoke'"),
+        ("campaign start rover-complex --seeds 0", "--seeds 0"),
+        ("campaign start rover-complex --set epochs=x", "run.epochs"),
+        ("campaign start rover-complex --executor proceses", "did you mean 'processes'"),
+        ("campaign start rover-complex --address auto", "only the executor ray"),
+        ("campaign start rover-complex --store s3://x", "only the executor ray"),
+        ("campaign start rover-complex --cores 1 --threads 2", "--threads 2"),
+        ("campaign start rover-complex --json --quiet", "exclude each other"),
+        ("campaign status tin", "unknown campaign 'tin' in campaigns/; did you mean 'tiny'"),
+        ("campaign stop tiny", "is not running"),
+        ("campaign stpo tiny", "stpo"),
+        ("report tin", "did you mean 'tiny'"),
+        ("report tiny", "no finished run yet"),
+        ("query tin SELECT", "did you mean 'tiny'"),
+        ("query tiny SELECT", "no finished run yet"),
+        ("query a b c", "a campaign and one SQL text"),
+        ("query tiny SELECT --csv --json", "exclude each other"),
+        ("show campaigns/tiny", "is a campaign"),
+        ("run rover/complex-1 --out campaigns/tiny", "already holds a campaign"),
+    ],
+)
+def test_a_wrong_word_is_one_clear_line_and_nothing_is_written(conevo, tmp_path, words, says):
+    tiny_campaign(tmp_path / "campaigns")
+    before = sorted(tmp_path.rglob("*"))
+    code, out, err = conevo(*words.split())
+    assert code == (3 if "cannot read" in says else 2)
+    assert out == ""
+    assert says in err
+    assert len(err.splitlines()) == 1
+    locks = {"lock", "ledger.sqlite"}  # taken to look, and left
+    assert [path for path in sorted(tmp_path.rglob("*")) if path.name not in locks] == before
+
+
+def test_an_interrupted_campaign_says_how_to_go_on(conevo, tmp_path, monkeypatch):
+    from conevo.campaigns.executors import Serial
+
+    tiny_campaign(tmp_path / "campaigns")
+
+    def interrupt(self, job):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Serial, "submit", interrupt)
+    code, _, err = conevo("campaign", "start", "tiny", "--executor", "serial")
+    assert code == 130
+    assert "interrupted with 4 pending; go on with: conevo campaign start campaigns/tiny" in err

@@ -1,0 +1,264 @@
+"""What every executor promises, with the coordinator over it; a registry entry enrols it.
+
+Nothing is lost and nothing is run twice, whoever is killed; failures are listed with their reason;
+no more threads are at work than there are cores.
+"""
+
+import importlib.util
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+import conevo
+from campaigns.processes import n_generations, until, workers
+from conevo.campaigns.campaign import create
+from conevo.campaigns.executors import EXECUTORS, Job, make_executor
+from conevo.campaigns.plan_file import read_plan
+from conevo.runs.directory import read_json
+
+SLOW = {
+    "ray": [
+        pytest.mark.slow,
+        pytest.mark.skipif(not importlib.util.find_spec("ray"), reason="Ray is not installed"),
+    ]
+}
+NAMES = [pytest.param(name, marks=SLOW.get(name, [])) for name in EXECUTORS]
+every_executor = pytest.mark.parametrize("name", NAMES)
+every_with_workers = pytest.mark.parametrize(
+    "name", [one for one in NAMES if one.values != ("serial",)]
+)  # "serial" has none: who kills its run kills the coordinator
+QUICK = {"run.generations": 2, "method.genotypes": 10, "world.iterations": 100}
+LONG = {"run.generations": 10, "method.genotypes": 20, "world.iterations": 1000}
+ENDLESS = LONG | {"run.generations": 100_000}
+FEW = {"run.fittest_epochs": 1, "run.n_tests": 2}
+PLAN = """
+[campaign]
+seeds = {seeds}
+preset = "smoke"
+studies = []
+[factors]
+world = ["rover/complex-1"]
+method = {methods}
+[settings]
+{settings}
+[[where]]  # a budget that pays for nothing: such a run always fails
+method = "hetcne"
+settings = {{ "method.genotypes" = 20, "run.budget_evaluations" = 1 }}
+"""
+
+
+@pytest.fixture
+def campaign(tmp_path):
+    """Return a function that writes out a campaign of small runs."""
+
+    def make(settings, seeds=1, methods=("homcne",)):
+        path = tmp_path / "plan.toml"
+        lines = [f'"{key}" = {value}' for key, value in (settings | FEW).items()]
+        path.write_text(PLAN.format(seeds=seeds, methods=list(methods), settings="\n".join(lines)))
+        return create(read_plan(path), tmp_path / "campaign")
+
+    return make
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory):
+    """Return a function that returns what a planned run comes to if nobody disturbs it."""
+    known = {}
+
+    def make(planned):
+        if planned.run_ids not in known:
+            path = tmp_path_factory.mktemp("undisturbed") / "run"
+            run = conevo.evolve(
+                planned.world, planned.method, planned.preset, planned.seed, path,
+                overrides=planned.overrides, threads=1,
+            )  # fmt: skip
+            known[planned.run_ids] = outcome(run)
+        return known[planned.run_ids]
+
+    return make
+
+
+def outcome(run):
+    """Return all that a run found, without times and sessions."""
+    rows = [{k: v for k, v in row.items() if k != "seconds"} for row in run.generations()]
+    return rows, run.champion.genes.tobytes(), run.test_result
+
+
+def run_of(campaign, label):
+    return conevo.Run(campaign.places.run(label))
+
+
+def assert_finished(campaign, undisturbed):
+    """All runs are finished and to the bit what they are when nobody disturbs them."""
+    for label, planned in campaign.planned.items():
+        run = run_of(campaign, label)
+        assert (run.status, run.changed_files) == ("finished", [])
+        assert outcome(run) == undisturbed(planned)
+
+
+@every_executor
+def test_every_run_is_carried_out_once(name, campaign, undisturbed):
+    made = campaign(QUICK, seeds=3)
+    endings = []
+    standings = made.carry_on(
+        make_executor(name, 2), watch=lambda _, one: endings.append(one) if one else None
+    )
+    assert sorted(one.label for one in endings) == sorted(made.planned)
+    assert {(one.state, one.attempts) for one in standings.values()} == {("finished", 1)}
+    assert_finished(made, undisturbed)
+    for label in made.planned:
+        assert len(run_of(made, label).provenance["sessions"]) == 1
+        ended = read_json(made.places.ended(label))
+        assert ended["status"] == "finished"
+        assert 0 < ended["core_seconds"] < 60
+    assert workers(made.path) == {}
+
+
+@every_executor
+def test_a_finished_campaign_is_left_alone(name, campaign):
+    made = campaign(QUICK)
+    made.carry_on(make_executor("serial", 1))
+    before = {path: path.stat().st_mtime_ns for path in made.path.glob("runs/**/*")}
+    made.carry_on(make_executor(name, 2), watch=lambda _, one: pytest.fail(f"ran {one}"))
+    assert {path: path.stat().st_mtime_ns for path in made.path.glob("runs/**/*")} == before
+
+
+@every_executor
+def test_a_run_that_always_fails_is_listed_with_its_reason_and_stops_no_other(name, campaign):
+    made = campaign(QUICK, seeds=2, methods=("hetcne", "homcne"))
+    standings = made.carry_on(make_executor(name, 2))
+    for label, planned in made.planned.items():
+        failed = planned.method == "hetcne"
+        assert standings[label].state == ("failed" if failed else "finished")
+        assert ("does not pay for one generation" in standings[label].reason) == failed
+    assert made.retry() == [label for label in made.planned if "hetcne" in label]
+    assert {one.state for one in made.carry_on(make_executor(name, 2)).values()} == {
+        "failed",
+        "finished",
+    }
+
+
+@every_with_workers
+def test_a_killed_worker_costs_an_attempt_and_no_result(name, campaign, undisturbed):
+    made = campaign(LONG)
+    (label,) = made.planned
+    killed = []
+
+    def kill_once(campaign, ending):
+        if ending is not None and not killed:
+            pytest.fail(f"{ending} before anybody was killed")
+        if not killed and n_generations(campaign, label) > 2:
+            (worker,) = workers(campaign.path)
+            killed.append(worker)
+            os.kill(worker, signal.SIGKILL)
+
+    standings = made.carry_on(make_executor(name, 1), watch=kill_once)
+    assert killed
+    assert (standings[label].state, standings[label].attempts) == ("finished", 2)
+    first, second = run_of(made, label).provenance["sessions"]
+    assert second["from_generation"] >= 2 > first["from_generation"] == 0
+    assert_finished(made, undisturbed)
+
+
+@every_with_workers
+def test_a_worker_that_is_killed_every_time_fails_with_that_reason(name, campaign):
+    made = campaign(ENDLESS, seeds=2)
+    lost = next(iter(made.planned))
+    other = [label for label in made.planned if label != lost]
+
+    def kill(campaign, _):
+        for worker, words in workers(campaign.path).items():
+            if lost in words or n_generations(campaign, other[0]) == 0:
+                os.kill(worker, signal.SIGKILL)
+
+    standings = made.carry_on(make_executor(name, 1), watch=kill)
+    for one in standings.values():
+        assert (one.state, one.attempts) == ("failed", 3)
+        assert one.reason == "killed by signal 9 (attempt 3 of 3)"
+
+
+@every_with_workers
+def test_workers_that_are_stopped_write_their_checkpoint_and_are_gone(name, campaign, undisturbed):
+    made = campaign(LONG)
+    (label,) = made.planned
+    executor = make_executor(name, 1)
+    executor.submit(Job(made.path, label, 1))
+    until(lambda: n_generations(made, label) > 2)
+    executor.stop()
+    assert workers(made.path) == {}
+    run = run_of(made, label)
+    assert run.status == "interrupted"
+    done = len(run.generations())
+    made.carry_on(make_executor("serial", 1))
+    assert run.provenance["sessions"][1]["from_generation"] == done
+    assert_finished(made, undisturbed)
+
+
+@every_executor
+def test_a_killed_coordinator_loses_nothing_and_nothing_is_run_twice(name, campaign, undisturbed):
+    made = campaign(LONG, seeds=2)
+    first, second = made.planned
+    code = (
+        "from conevo.campaigns.campaign import Campaign\n"
+        "from conevo.campaigns.executors import make_executor\n"
+        f"Campaign({str(made.path)!r}).carry_on(make_executor({name!r}, 1))\n"
+    )
+    coordinator = subprocess.Popen([sys.executable, "-c", code], start_new_session=True)
+    until(lambda: n_generations(made, second) > 2)
+    coordinator.kill()
+    coordinator.wait()
+    until(lambda: not workers(made.path))
+    assert not made.is_running
+    assert [one.state for one in made.standings().values()] == ["finished", "pending"]
+    made.carry_on(make_executor(name, 1))
+    sessions = [run_of(made, label).provenance["sessions"] for label in (first, second)]
+    assert [len(some) for some in sessions] == [1, 2]
+    assert sessions[1][1]["from_generation"] >= 2
+    assert_finished(made, undisturbed)
+
+
+@every_executor
+def test_no_more_threads_are_at_work_than_cores(name, campaign):
+    made = campaign(LONG | {"run.generations": 4}, seeds=3)
+    seen = []
+
+    def count(campaign, _):
+        threads = [int(words[-1]) for words in workers(campaign.path).values()]
+        seen.append(sum(threads))
+
+    executor = make_executor(name, 2)
+    assert executor.cores == (1 if name == "serial" else 2)
+    made.carry_on(executor, threads=1, watch=count)
+    assert max(seen) == (0 if name == "serial" else 2)
+    used = [run_of(made, label).provenance["sessions"][0]["threads"] for label in made.planned]
+    assert used == ([2, 2, 2] if name == "serial" else [1, 1, used[2]])
+    assert used[2] in (1, 2)  # the last has both cores if both are free by then
+
+
+@every_with_workers
+def test_libraries_of_a_worker_begin_no_threads_of_their_own(name, campaign):
+    made = campaign(ENDLESS)
+    (label,) = made.planned
+    executor = make_executor(name, 1)
+    executor.submit(Job(made.path, label, 1))
+    try:
+        until(lambda: n_generations(made, label) > 0)
+        (worker,) = workers(made.path)
+        variables = Path(f"/proc/{worker}/environ").read_text().split("\0")
+        begun = time.monotonic(), _core_seconds(worker)
+        until(lambda: time.monotonic() > begun[0] + 1)
+        spent = _core_seconds(worker) - begun[1]
+        assert spent < 1.2 * (time.monotonic() - begun[0])
+    finally:
+        executor.stop()
+    assert {f"{library}_NUM_THREADS=1" for library in ("OMP", "OPENBLAS", "MKL")} <= set(variables)
+
+
+def _core_seconds(process):
+    fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
