@@ -1,9 +1,11 @@
 """Ray's own promises: lost nodes and workers, clusters by address, results through a store."""
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 import pytest
@@ -23,7 +25,11 @@ settings = { "run.generations" = 30, "method.genotypes" = 40, "world.iterations"
 
 
 def parent(process):
-    return int(Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[1])
+    """Return the number of a process' parent, 0 if it has gone."""
+    try:
+        return int(Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[1])
+    except OSError:
+        return 0
 
 
 @pytest.fixture
@@ -72,8 +78,7 @@ def test_results_come_through_an_object_store_where_nodes_do_not_see_the_campaig
     long_run, undisturbed, tmp_path, monkeypatch
 ):
     campaign, label = long_run
-    scratch = tmp_path / "scratch"
-    scratch.mkdir()
+    scratch = Path(tempfile.mkdtemp())  # short, since Ray makes sockets below it
     monkeypatch.setenv("TMPDIR", str(scratch))  # of the workers
     uri = f"file://{tmp_path}/bucket"
     executor = RayCluster(1, store=uri)
@@ -92,6 +97,7 @@ def test_results_come_through_an_object_store_where_nodes_do_not_see_the_campaig
     assert run.changed_files == []
     assert run.provenance["sessions"][1]["from_generation"] == done
     assert outcome(run) == undisturbed
+    shutil.rmtree(scratch)
     for label in campaign.planned:
         assert campaign.places.log(label).is_file()
         assert campaign.places.ended(label).is_file()
@@ -106,6 +112,8 @@ def test_a_cluster_by_address_has_the_cores_of_its_nodes_and_survives_the_loss_o
     least = {"object_store_memory": 80 * 2**20}
     cluster = Cluster(initialize_head=True, head_node_args={"num_cpus": 0, **least})
     try:
+        with pytest.raises(EnvironmentFailure, match="no node has CPU cores"):
+            make_executor("ray", address=cluster.address)
         node = cluster.add_node(num_cpus=1, **least)
         other = cluster.add_node(num_cpus=1, **least)
         executor = make_executor("ray", address=cluster.address)
@@ -128,17 +136,20 @@ def test_a_cluster_by_address_has_the_cores_of_its_nodes_and_survives_the_loss_o
 
 def test_no_cluster_at_an_address_is_one_clear_line(monkeypatch):
     monkeypatch.delenv("RAY_ADDRESS", raising=False)
-    with pytest.raises(EnvironmentFailure, match="Ray at auto: .*Could not find any running"):
+    with pytest.raises(EnvironmentFailure, match=r"Ray at auto: .*Could not find any running"):
         make_executor("ray", address="auto")
 
 
 def test_ray_begins_nothing_that_calls_home_and_no_page():
     executor = make_executor("ray", 1)
     try:
-        assert os.environ["RAY_USAGE_STATS_ENABLED"] == "0"
-        words = subprocess.run(["ps", "-eo", "args"], capture_output=True, text=True, check=True)
-        mine = [line for line in words.stdout.splitlines() if "dashboard" in line]
-        assert all("--disable-frontend" in line for line in mine if "dashboard.py" in line)
+        mine = [one for one in Path("/proc").glob("[0-9]*") if parent(one.name) == os.getpid()]
+        texts = {one: (one / "cmdline").read_text() for one in mine}
+        ray = [one for one in mine if "gcs_server" in texts[one] or "dashboard.py" in texts[one]]
+        assert ray
+        for one in ray:
+            assert "RAY_USAGE_STATS_ENABLED=0" in (one / "environ").read_text().split("\0")
+            assert "dashboard.py" not in texts[one] or "--disable-frontend" in texts[one]
     finally:
         executor.stop()
 

@@ -103,6 +103,7 @@ def test_a_dry_run_prints_every_run_and_writes_nothing(conevo, tmp_path):
         ("campaign start rover-complex --cores 1 --threads 2", "--threads 2"),
         ("campaign start rover-complex --json --quiet", "exclude each other"),
         ("campaign status tin", "unknown campaign 'tin' in campaigns/; did you mean 'tiny'"),
+        ("campaign slurm rover-complex --hours 0.01", "0.01 is not in the range"),
         ("campaign stop tiny", "is not running"),
         ("campaign stpo tiny", "stpo"),
         ("report tin", "did you mean 'tiny'"),
@@ -139,3 +140,16 @@ def test_an_interrupted_campaign_says_how_to_go_on(conevo, tmp_path, monkeypatch
     code, _, err = conevo("campaign", "start", "tiny", "--executor", "serial")
     assert code == 130
     assert "interrupted with 4 pending; go on with: conevo campaign start campaigns/tiny" in err
+
+
+def test_a_job_array_has_the_runs_that_are_not_finished(conevo, tmp_path):
+    tiny_campaign(tmp_path / "campaigns")
+    code, out, _ = conevo("campaign", "slurm", "tiny", "--threads", "3", "--at-once", "2")
+    assert code == 0
+    assert "4 runs; submit them with: sbatch " in out
+    script = (tmp_path / "campaigns" / "tiny" / "slurm.sh").read_text()
+    assert "--cpus-per-task=3" in script
+    assert "--array=0-3%2" in script
+    conevo("campaign", "start", "tiny", "--executor", "serial", "--quiet")
+    code, _, err = conevo("campaign", "slurm", "tiny")
+    assert (code, "no run left" in err) == (2, True)

@@ -93,6 +93,18 @@ def run_of(campaign, label):
     return conevo.Run(campaign.places.run(label))
 
 
+def coordinate(campaign, name):
+    """Begin a process that carries a campaign on, one core for all."""
+    code = (
+        "from conevo.campaigns.campaign import Campaign\n"
+        "from conevo.campaigns.executors import make_executor\n"
+        f"Campaign({str(campaign.path)!r}).carry_on(make_executor({name!r}, 1))\n"
+    )
+    return subprocess.Popen(
+        [sys.executable, "-c", code], start_new_session=True, stderr=subprocess.PIPE, text=True
+    )
+
+
 def assert_finished(campaign, undisturbed):
     """All runs are finished and to the bit what they are when nobody disturbs them."""
     for label, planned in campaign.planned.items():
@@ -183,32 +195,29 @@ def test_a_worker_that_is_killed_every_time_fails_with_that_reason(name, campaig
 
 
 @every_with_workers
-def test_workers_that_are_stopped_write_their_checkpoint_and_are_gone(name, campaign, undisturbed):
-    made = campaign(LONG)
+def test_workers_that_are_stopped_write_their_checkpoint_and_are_gone(name, campaign):
+    made = campaign(ENDLESS)
     (label,) = made.planned
     executor = make_executor(name, 1)
     executor.submit(Job(made.path, label, 1))
-    until(lambda: n_generations(made, label) > 2)
+    until(lambda: n_generations(made, label) > 0)
     executor.stop()
     assert workers(made.path) == {}
     run = run_of(made, label)
     assert run.status == "interrupted"
     done = len(run.generations())
-    made.carry_on(make_executor("serial", 1))
+    executor = make_executor("processes", 1)
+    executor.submit(Job(made.path, label, 1))
+    until(lambda: n_generations(made, label) > done)
+    executor.stop()
     assert run.provenance["sessions"][1]["from_generation"] == done
-    assert_finished(made, undisturbed)
 
 
 @every_executor
 def test_a_killed_coordinator_loses_nothing_and_nothing_is_run_twice(name, campaign, undisturbed):
     made = campaign(LONG, seeds=2)
     first, second = made.planned
-    code = (
-        "from conevo.campaigns.campaign import Campaign\n"
-        "from conevo.campaigns.executors import make_executor\n"
-        f"Campaign({str(made.path)!r}).carry_on(make_executor({name!r}, 1))\n"
-    )
-    coordinator = subprocess.Popen([sys.executable, "-c", code], start_new_session=True)
+    coordinator = coordinate(made, name)
     until(lambda: n_generations(made, second) > 2)
     coordinator.kill()
     coordinator.wait()
@@ -220,6 +229,26 @@ def test_a_killed_coordinator_loses_nothing_and_nothing_is_run_twice(name, campa
     assert [len(some) for some in sessions] == [1, 2]
     assert sessions[1][1]["from_generation"] >= 2
     assert_finished(made, undisturbed)
+
+
+@every_executor
+def test_ctrl_c_lets_all_write_their_checkpoints_and_leave(name, campaign):
+    made = campaign(ENDLESS)
+    (label,) = made.planned
+    coordinator = coordinate(made, name)
+    until(lambda: n_generations(made, label) > 2)
+    os.killpg(coordinator.pid, signal.SIGINT)  # as a terminal does: to the whole group
+    assert "KeyboardInterrupt" in coordinator.communicate(timeout=90)[1]
+    assert workers(made.path) == {}
+    run = run_of(made, label)
+    assert run.status == "interrupted"
+    assert [one.state for one in made.standings().values()] == ["pending"]
+    done = len(run.generations())
+    executor = make_executor("processes", 1)
+    executor.submit(Job(made.path, label, 1))
+    until(lambda: n_generations(made, label) > done)
+    executor.stop()
+    assert run.provenance["sessions"][1]["from_generation"] == done
 
 
 @every_executor

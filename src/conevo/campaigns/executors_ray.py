@@ -72,6 +72,9 @@ class RayCluster:
             line = " ".join(str(error).split())
             raise EnvironmentFailure(f"Ray at {address or 'this machine'}: {line}") from error
         nodes = [int(n["Resources"].get("CPU", 0)) for n in self._ray.nodes() if n["Alive"]]
+        if not any(nodes):
+            self._ray.shutdown()
+            raise EnvironmentFailure(f"Ray at {address or 'this machine'}: no node has CPU cores")
         self._widest = max(nodes)
         self.cores = min(cores or sum(nodes), sum(nodes))
 

@@ -33,6 +33,23 @@ EXECUTION = (
     click.option("--json", "as_json", is_flag=True, help="One JSON object per run that ends."),
     click.option("--quiet", is_flag=True, help="Print only the campaign's directory."),
 )  # fmt: skip
+PLAN = (
+    click.argument("name", metavar="NAME|FILE|DIR"),
+    click.option("--preset", metavar="NAME", help="smoke, desk (default), night, thesis."),
+    click.option("--seeds", type=int, help="Runs of every cell (default: as the plan says)."),
+    click.option(
+        "--set", "settings", metavar="KEY=VALUE", multiple=True,
+        help="A setting of all runs, for example run.budget_evaluations=5000.",
+    ),
+    click.option("--out", metavar="DIR", help="Its directory (default: campaigns/NAME)."),
+)  # fmt: skip
+
+
+def plan_options(function: Function) -> Function:
+    """Add what says which campaign is meant, and at which scale."""
+    for option in reversed(PLAN):
+        function = option(function)
+    return function
 
 
 def execution_options(function: Function) -> Function:
@@ -64,14 +81,7 @@ def list_(as_json: bool) -> None:
 
 
 @campaign.command(short_help="Start a campaign, or finish what is missing.")
-@click.argument("name", metavar="NAME|FILE|DIR")
-@click.option("--preset", metavar="NAME", help="smoke, desk (default), night, thesis.")
-@click.option("--seeds", type=int, help="Runs of every cell (default: as the plan says).")
-@click.option(
-    "--set", "settings", metavar="KEY=VALUE", multiple=True,
-    help="A setting of all runs, for example run.budget_evaluations=5000.",
-)  # fmt: skip
-@click.option("--out", metavar="DIR", help="Its directory (default: campaigns/NAME).")
+@plan_options
 @click.option("--dry-run", is_flag=True, help="Print the runs; write and start nothing.")
 @execution_options
 def start(
@@ -97,6 +107,41 @@ def start(
         print_plan(found.planned.values() if found else plan.write_out(), execution["as_json"])
         return 0
     return carry_on(found or _create(plan, name, out), execute)
+
+
+@campaign.command(short_help="Write a campaign's runs as a SLURM job array.")
+@plan_options
+@click.option(
+    "--threads", type=click.IntRange(1), default=1, show_default=True,
+    help="CPU threads of a run; changes no result.",
+)  # fmt: skip
+@click.option(
+    "--hours", type=click.FloatRange(min=0.1), default=24.0, show_default=True,
+    help="Time limit of a task; what takes longer is put into the queue again.",
+)  # fmt: skip
+@click.option("--at-once", type=click.IntRange(1), help="Tasks at work together (default: any).")
+def slurm(
+    name: str,
+    preset: str | None,
+    seeds: int | None,
+    settings: tuple[str, ...],
+    out: str | None,
+    threads: int,
+    hours: float,
+    at_once: int | None,
+) -> None:
+    """Write a script that carries out all runs that are not finished; submit it with sbatch.
+
+    All nodes must see the campaign's directory. conevo campaign status tells how it stands, and
+    conevo campaign start finishes what is missing.
+    """
+    from conevo.campaigns.slurm import write_array
+
+    found, plan = _planned(name, preset, seeds, settings, out)
+    found = found or _create(plan, name, out)
+    left = [label for label in found.planned if not found.is_finished(label)]
+    path = write_array(found.path, left, threads=threads, hours=hours, at_once=at_once)
+    click.echo(f"{len(left)} runs; submit them with: sbatch {path}")
 
 
 @campaign.command(short_help="How a campaign stands.")
