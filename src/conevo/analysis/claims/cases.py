@@ -1,0 +1,110 @@
+"""What claims are about: the methods, the environments, and statements that several claims make.
+
+- Choice: "in about 80 % of runs" is a share between 70 and 90 %, and a share "of the optimum" is
+  given to 0.1 as well.
+"""
+
+from __future__ import annotations
+
+from conevo.analysis.claims.statements import Compare, Part, Sample, within
+
+__all__ = [
+    "CNE",
+    "COEVOLUTION",
+    "COMPLEX",
+    "COMPLEX_9",
+    "EXTENDED",
+    "ISOLATED",
+    "METHODS",
+    "ONE_PREY",
+    "OTHERS",
+    "SIMPLE",
+    "TEAMS",
+    "TWO_PREY",
+    "VARIANTS",
+    "about",
+    "cloned",
+    "has_castes",
+    "lesioned",
+    "teams",
+]
+
+CNE = ("homcne", "hetcne")
+ISOLATED = ("ccga", "mesp")  # populations that never share genes
+COEVOLUTION = (*ISOLATED, "cone")
+OTHERS = (*CNE, *ISOLATED)
+METHODS = (*OTHERS, "cone")
+VARIANTS = ("cone-1", "cone-2", "cone-3")
+
+ABOUT = 0.1  # how far from a published share a share may be
+MOST = 0.5  # of the runs
+
+
+def _named(family: str) -> tuple[str, ...]:
+    return tuple(f"{family}-{n}" for n in range(1, 11))
+
+
+def teams(*numbers: int) -> tuple[str, ...]:
+    """Return team types of pursuit-evasion by number."""
+    return tuple(f"team-{n}" for n in numbers)
+
+
+SIMPLE = _named("simple")
+COMPLEX = _named("complex")
+EXTENDED = _named("extended")
+COMPLEX_9 = COMPLEX[:9]  # of gathering and collective construction
+ONE_PREY = teams(1, 2, 3, 4, 5)
+TWO_PREY = teams(6, 7, 8, 9, 10)  # with as many predators, in the same order
+TEAMS = ONE_PREY + TWO_PREY
+
+
+def about(
+    quantity: str, environments: tuple[str, ...], shares: dict[str, float]
+) -> tuple[Part, ...]:
+    """Return: each method's quantity over all environments together is about its share."""
+    return tuple(
+        Part((within(quantity, method, environments, share - ABOUT, share + ABOUT),))
+        for method, share in shares.items()
+    )
+
+
+def lesioned(environments: tuple[str, ...]) -> tuple[Compare, ...]:
+    """Return: in each environment each method's teams lose by a caste's replacement."""
+    return tuple(
+        Compare(
+            "above", Sample("whole", (method,), (place,)), Sample("lesioned", (method,), (place,))
+        )
+        for place in environments
+        for method in METHODS
+    )
+
+
+def cloned(
+    clones: str, environments: tuple[str, ...], methods: tuple[str, ...]
+) -> tuple[Compare, ...]:
+    """Return: in each environment each method's teams are above clones of CONE's robots."""
+    return tuple(
+        Compare(
+            "above", Sample("evolved", (method,), (place,)), Sample(clones, ("cone",), (place,))
+        )
+        for place in environments
+        for method in methods
+    )
+
+
+def has_castes(
+    castes: str, environments: tuple[str, ...], methods: tuple[str, ...]
+) -> tuple[Part, ...]:
+    """Return: in each environment most champions of each method have these castes.
+
+    Choice: "the fittest teams" have them if the champions of more than half of the runs do.
+    """
+    return (
+        Part(
+            tuple(
+                within(castes, method, (place,), MOST, 1)
+                for place in environments
+                for method in methods
+            )
+        ),
+    )

@@ -1,0 +1,158 @@
+"""The words that a claim is written in: samples of runs, comparisons of two, shares of one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Literal
+
+__all__ = [
+    "Claim",
+    "Compare",
+    "Part",
+    "Sample",
+    "Statement",
+    "Within",
+    "above",
+    "across",
+    "alike",
+    "within",
+]
+
+
+@dataclass(frozen=True)
+class Sample:
+    """Runs: one value each.
+
+    Attributes:
+        quantity: what of a run, a name in ``evidence.QUANTITIES``.
+        methods: the runs of these are pooled.
+        environments: and of these.
+    """
+
+    quantity: str
+    methods: tuple[str, ...]
+    environments: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Compare:
+    """One sample is above another, or alike.
+
+    Environments of the two correspond: either they are the same, or the runs of one environment
+    are compared with those of another.
+    """
+
+    expect: Literal["above", "alike"]
+    a: Sample
+    b: Sample
+
+    @property
+    def samples(self) -> tuple[Sample, ...]:
+        """What is compared."""
+        return (self.a, self.b)
+
+    @property
+    def environments(self) -> tuple[str, ...]:
+        """All that it is about, each once."""
+        return tuple(dict.fromkeys((*self.a.environments, *self.b.environments)))
+
+
+@dataclass(frozen=True)
+class Within:
+    """The share of runs in which something was seen, or the mean of runs, is in [low, high]."""
+
+    sample: Sample
+    low: float
+    high: float
+
+    @property
+    def samples(self) -> tuple[Sample, ...]:
+        """What is measured."""
+        return (self.sample,)
+
+    @property
+    def environments(self) -> tuple[str, ...]:
+        """All that it is about."""
+        return self.sample.environments
+
+
+Statement = Compare | Within
+
+
+@dataclass(frozen=True)
+class Part:
+    """Statements that belong together.
+
+    Attributes:
+        statements: of one or more environments.
+        need: in how many environments (or groups of environments that a statement pools) all must
+            hold; None is in every one.
+    """
+
+    statements: tuple[Statement, ...]
+    need: int | None = None
+
+
+@dataclass(frozen=True)
+class Claim:
+    """One claim of the thesis; it is reproduced if all its parts are.
+
+    Attributes:
+        id: letter of the world (R, P, G) and number.
+        text: what is claimed.
+        source: section of the thesis.
+        world: name without version.
+        parts: what has to hold.
+    """
+
+    id: str
+    text: str
+    source: str
+    world: str
+    parts: tuple[Part, ...]
+
+
+def above(
+    quantity: str, environments: Iterable[str], methods: Iterable[str], others: Iterable[str]
+) -> tuple[Compare, ...]:
+    """Return: in each environment each of the methods is above each of the others."""
+    return _pairs("above", quantity, environments, [(a, b) for a in methods for b in others])
+
+
+def alike(
+    quantity: str, environments: Iterable[str], pairs: Iterable[tuple[str, str]]
+) -> tuple[Compare, ...]:
+    """Return: in each environment the two methods of each pair are alike."""
+    return _pairs("alike", quantity, environments, list(pairs))
+
+
+def across(
+    quantity: str, methods: Iterable[str], pairs: Iterable[tuple[str, str]]
+) -> tuple[Compare, ...]:
+    """Return: each method reaches more in the first environment of each pair than in the second."""
+    return tuple(
+        Compare("above", Sample(quantity, (method,), (a,)), Sample(quantity, (method,), (b,)))
+        for a, b in pairs
+        for method in methods
+    )
+
+
+def within(
+    quantity: str, method: str, environments: Iterable[str], low: float, high: float
+) -> Within:
+    """Return: over the environments together the method's quantity is in [low, high]."""
+    return Within(Sample(quantity, (method,), tuple(environments)), low, high)
+
+
+def _pairs(
+    expect: Literal["above", "alike"],
+    quantity: str,
+    environments: Iterable[str],
+    pairs: list[tuple[str, str]],
+) -> tuple[Compare, ...]:
+    return tuple(
+        Compare(expect, Sample(quantity, (a,), (place,)), Sample(quantity, (b,), (place,)))
+        for place in environments
+        for a, b in pairs
+    )

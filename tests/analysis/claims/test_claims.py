@@ -1,0 +1,212 @@
+"""Each of the 32 claims against tables whose truth is known: held, turned round, cut short."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+import pytest
+
+from analysis.claims.known_truth import METHODS, TRUTHS, Truth, write_tables
+from conevo.analysis.claims import CLAIMS, Claim, Verdict, verdicts
+from conevo.analysis.frames import Tables
+
+BY_ID = {claim.id: claim for claim in CLAIMS}
+Change = Callable[[Truth], None]
+
+
+def change(
+    environments: Iterable[str], methods: str | Iterable[str], /, **values: object
+) -> Change:
+    """Return what sets attributes of the cells of these environments and methods."""
+    names = methods.split() if isinstance(methods, str) else list(methods)
+    places = list(environments)
+
+    def apply(truth: Truth) -> None:
+        for environment in places:
+            for method in names:
+                cell = truth[environment, method]
+                truth[environment, method] = dataclasses.replace(cell, **values)  # type: ignore[arg-type]
+
+    return apply
+
+
+def teams(*numbers: int) -> list[str]:
+    return [f"team-{n}" for n in numbers]
+
+
+ALL_TEAMS = teams(*range(1, 11))
+COMPLEX_9 = [f"complex-{n}" for n in range(1, 10)]
+SIMPLE = [f"simple-{n}" for n in range(1, 11)]
+
+# One change that makes the claim wrong, and what is left to be found in it.
+WRONG: dict[str, tuple[Change, str]] = {
+    "R1": (change(["complex-3"], "mesp", value=4000), "complex-3 value, CONE - MESP"),
+    "R2": (change(["complex-3", "complex-8"], "mesp", value=3400), "complex-8 value, CCGA - MESP"),
+    "R3": (change(["complex-10"], "hetcne", value=2600), "complex-10 value, CCGA - HetCNE"),
+    "R4": (change(["simple-7"], "homcne", value=1600), "simple-7 value, HomCNE - HetCNE"),
+    "R5": (change(["simple-2"], "ccga", value=2500), "complex-2 - simple-2 value, CCGA"),
+    "R6": (change(SIMPLE, "cone", area=0.6), "simple-1 area, HomCNE - CONE"),
+    "R7": (change(["extended-5"], "ccga", value=3500), "extended-5 value, CONE - CCGA"),
+    "R8": (change(["extended-9"], "mesp", value=1000), "extended-9 value, MESP - HomCNE"),
+    "R9": (change(["complex-4"], "cone", several=0.0), "complex-4 several castes, CONE"),
+    "R10": (change(["simple-6"], "hetcne", several=0.9), "simple-6 one caste, HetCNE"),
+    "R11": (change(["complex-1"], "mesp", loss=0.6), "complex-1 loss, CONE - MESP"),
+    "R12": (
+        change(["complex-7"], "cone", clones=0.8),
+        "complex-7 evolved, CCGA - clones of a spec",
+    ),
+    "R13": (change(["complex-2"], "cone-2", value=3500), "complex-2 value, CONE - CONE-2"),
+    "P1": (change(["team-9"], "ccga", value=300), "team-9 capture_time, CONE - CCGA"),
+    "P2": (change(["team-6"], "cone", value=300), "team-6 capture_time, CONE - HomCNE"),
+    "P3": (change(["team-10"], "hetcne", value=500), "team-5 - team-10 capture_time, HetCNE"),
+    "P4": (change(["team-2"], "cone-3", value=400), "team-2 capture_time, CONE - CONE-3"),
+    "P5": (change(ALL_TEAMS, "hetcne", seen={"entrapment": 0.5}), "entrapment, HetCNE"),
+    "P6": (change(ALL_TEAMS, "mesp", seen={"pursuer-blocker": 1.0}), "pursuer-blocker, MESP"),
+    "P7": (change(ALL_TEAMS, "cone", seen={"spiders-fly": 0.8}), "spiders-fly, CONE"),
+    "P8": (change(["team-3"], "cone", idle=0.9), "team-3 idle predators, CONE"),
+    "P9": (change(["team-4"], METHODS, clones=1.2), "team-4 complementary, all methods - clones"),
+    "P10": (change(ALL_TEAMS, "ccga", loss=0.6), "loss, CONE - CCGA"),
+    "G1": (change(["complex-9"], "ccga", value=0.95), "complex-9 delivered, CONE - CCGA"),
+    "G2": (
+        change(["simple-4"], "mesp", value=0.9),
+        "complex-4 - simple-4 share of the optimum, MESP",
+    ),
+    "G3": (change(["complex-5"], "homcne", value=0.4), "complex-5 delivered, HomCNE - HetCNE"),
+    "G4": (change(COMPLEX_9, "cone", value=0.8), "complex-1 to complex-9 share of the opt"),
+    "G5": (change(SIMPLE, "hetcne", value=0.3), "simple-1 to simple-10 share of the opt"),
+    "G6": (change(["complex-8"], "cone", several=0.0), "complex-8 several castes, CONE"),
+    "G7": (change(["complex-6"], "mesp", loss=0.5), "complex-6 loss, CONE - MESP"),
+    "G8": (change(["complex-3"], "cone", mixed=0.4), "complex-3 evolved, HomCNE - clones, CONE"),
+    "G9": (change(["complex-1"], "cone-1", value=0.93), "complex-1 delivered, CONE - CONE-1"),
+}
+
+
+def truth_of(claim: Claim) -> tuple[str, Truth]:
+    """Return the world of a claim and the true cells that it is about."""
+    world, make = TRUTHS[claim.id[0]]
+    about = {
+        (environment, method)
+        for part in claim.parts
+        for statement in part.statements
+        for sample in statement.samples
+        for environment in sample.environments
+        for method in sample.methods
+    }
+    return world, {key: cell for key, cell in make().items() if key in about}
+
+
+def judged(folder: Path, claim: Claim) -> Verdict:
+    with Tables(folder) as tables:
+        (verdict,) = verdicts(tables, [claim])
+    return verdict
+
+
+@pytest.fixture(scope="module", params=["R", "P", "G"])
+def as_claimed(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    world, make = TRUTHS[request.param]
+    n = 20 if request.param == "P" else 10
+    return write_tables(tmp_path_factory.mktemp("claims") / request.param, world, make(), n)
+
+
+def test_there_are_32_claims_each_with_its_source() -> None:
+    ids = [
+        f"{world}{n}"
+        for world, last in (("R", 13), ("P", 10), ("G", 9))
+        for n in range(1, last + 1)
+    ]
+    assert [claim.id for claim in CLAIMS] == ids == list(WRONG)
+    chapters = {"R": "5.", "P": "4.", "G": "6."}
+    assert all(claim.source.startswith(chapters[claim.id[0]]) for claim in CLAIMS)
+    assert len({claim.text for claim in CLAIMS}) == 32
+
+
+def test_all_are_reproduced_where_all_are_true(as_claimed: Path) -> None:
+    with Tables(as_claimed) as tables:
+        found = verdicts(tables, [c for c in CLAIMS if c.id[0] == as_claimed.name])
+    assert {one.id: one.verdict for one in found} == {one.id: "reproduced" for one in found}
+    for one in found:
+        assert one.effect
+        assert one.low is not None
+        assert one.high is not None
+        assert one.low <= one.high
+        assert one.budget.startswith("smoke, about 50,000 team evaluations")
+        held = len(one.cells)
+        assert one.why == f"{held} of {held} hold"
+
+
+@pytest.mark.parametrize("identity", WRONG)
+def test_not_reproduced_where_one_thing_is_turned_round(identity: str, tmp_path: Path) -> None:
+    world, truth = truth_of(BY_ID[identity])
+    apply, told = WRONG[identity]
+    apply(truth)
+    verdict = judged(
+        write_tables(tmp_path, world, truth, n=20 if world == "pursuit-v1" else 10), BY_ID[identity]
+    )
+    assert verdict.verdict == "not reproduced"
+    assert told in verdict.why
+
+
+FURTHER = [
+    ("R2", change(["complex-8"], "mesp", value=3400), "reproduced"),  # nine of ten are enough
+    ("R6", change(SIMPLE[:9], "cone", area=0.6), "reproduced"),  # eleven of twenty are most
+    ("R8", change(["extended-1"], "mesp", value=3000), "reproduced"),
+    ("R8", change(["extended-1", "extended-2"], "mesp", value=3000), "not reproduced"),
+    ("R11", change(["complex-5"], "homcne", loss=0.0), "not reproduced"),
+    ("R11", change(["complex-2"], "hetcne", loss=0.4), "not reproduced"),
+    ("P8", change(ALL_TEAMS, "cone", seen={"role-switcher": 0.4}), "not reproduced"),
+    ("P8", change(["team-8"], "cone", idle=0.0), "not reproduced"),
+]
+
+
+@pytest.mark.parametrize(("identity", "apply", "expected"), FURTHER)
+def test_each_part_counts(identity: str, apply: Change, expected: str, tmp_path: Path) -> None:
+    world, truth = truth_of(BY_ID[identity])
+    apply(truth)
+    n = 20 if world == "pursuit-v1" else 10
+    assert judged(write_tables(tmp_path, world, truth, n), BY_ID[identity]).verdict == expected
+
+
+@pytest.mark.parametrize("identity", WRONG)
+def test_undecided_where_environments_are_missing(identity: str, tmp_path: Path) -> None:
+    claim = BY_ID[identity]
+    world, truth = truth_of(claim)
+    statement = claim.parts[0].statements[0]
+    is_pair = len(statement.samples) == 2 and len({s.environments for s in statement.samples}) == 2
+    kept = statement.environments if is_pair else statement.environments[:1]
+    all_places = {e for p in claim.parts for s in p.statements for e in s.environments}
+    few = {key: cell for key, cell in truth.items() if key[0] in kept}
+    verdict = judged(
+        write_tables(tmp_path, world, few, n=20 if world == "pursuit-v1" else 10), claim
+    )
+    assert verdict.verdict == f"undecided: {len(kept)} of {len(all_places)} environments"
+    assert "no runs of" in verdict.why
+
+
+@pytest.mark.parametrize("letter", TRUTHS)
+def test_undecided_where_two_runs_scatter_widely(letter: str, tmp_path: Path) -> None:
+    world, truth = TRUTHS[letter][0], TRUTHS[letter][1]()
+    if letter == "P":  # those that pool environments have more runs: so let them differ less
+        change(ALL_TEAMS, "cone", loss=0.35)(truth)
+        change(ALL_TEAMS, METHODS, clones=0.9)(truth)
+    with Tables(write_tables(tmp_path, world, truth, n=2, noise=0.8)) as tables:
+        found = verdicts(tables, [c for c in CLAIMS if c.id[0] == letter])
+    assert {one.id: one.verdict for one in found} == {
+        one.id: "undecided: n too small" for one in found
+    }
+    compared = [one for one in found if one.tests.startswith("t-test") and one.n == "2"]
+    assert all("Mann-Whitney tests can become significant" in one.why for one in compared)
+    assert len(compared) == {"R": 11, "P": 4, "G": 6}[letter]
+
+
+def test_undecided_without_a_run(tmp_path: Path) -> None:
+    world, make = TRUTHS["P"]
+    write_tables(tmp_path, world, {key: make()[key] for key in [("team-1", "homcne")]}, n=1)
+    with Tables(tmp_path) as tables:
+        found = verdicts(tables)
+    without = [one for one in found if one.id[0] != "P" or one.id in ("P1", "P4", "P6", "P7", "P8")]
+    assert len(without) == 27
+    for one in without:
+        assert one.verdict == "undecided: no such runs"
+        assert (one.effect, one.n, one.budget, one.low) == ("", "0", "", None)
