@@ -66,6 +66,20 @@ def test_a_shaping_is_one_run_with_a_configuration_for_every_stage(tmp_path):
     assert run.names == [f"{run.label}/stage-{k}" for k in (1, 2, 3)]
 
 
+def test_some_runs_of_a_plan_may_be_shapings(tmp_path):
+    path = write_plan(tmp_path)
+    path.write_text(
+        path.read_text().replace('"rover/complex-1"', '"rover/complex-1", "rover/complex-3"')
+        + '[[where]]\nworld = "rover/complex-3"\nshape = true\n'
+    )
+    plan = read_plan(path)
+    stages = {(run.world[-1], run.shape): len(run.configs()) for run in plan.write_out()}
+    assert stages == {("1", False): 1, ("3", True): 3}
+    again = tmp_path / "again.toml"
+    again.write_text(plan.to_toml())
+    assert read_plan(again) == plan
+
+
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [
@@ -86,6 +100,7 @@ def test_a_shaping_is_one_run_with_a_configuration_for_every_stage(tmp_path):
         ('title = "Tiny"', 'studies = ["team"]', "'team'.*did you mean 'teams'"),
         ('title = "Tiny"', "shape = 1", "campaign.shape"),
         ("[settings]", '[[where]]\nmetod = "cone"\n[settings]', "where.metod"),
+        ("[settings]", "[[where]]\nshape = 2\n[settings]", "where.shape = 2"),
         ("[settings]", "[where]\n[settings]", r"\[\[where\]\]"),
         ("[campaign]", "[campaign", "not valid TOML"),
     ],

@@ -93,10 +93,12 @@ class Where:
     Attributes:
         conditions: "world", "method" or "preset" -> the names for which it holds.
         settings: key -> value.
+        shape: whether they are shapings; None leaves it.
     """
 
     conditions: dict[str, tuple[str, ...]]
     settings: dict[str, Any]
+    shape: bool | None = None
 
     def holds(self, names: Mapping[str, str]) -> bool:
         """Whether a run with these names is meant."""
@@ -113,7 +115,7 @@ class Plan:
         produces: tables and figures of the thesis that it is the data of.
         seeds: of every cell.
         preset: scale of every run.
-        shape: whether runs are shapings.
+        shape: whether runs are shapings, unless ``where`` says otherwise.
         studies: what is made of finished runs.
         factors: name -> levels; "world" and "method" are among them.
         settings: of all runs.
@@ -186,12 +188,13 @@ class Plan:
         world, method = levels["world"], levels["method"]
         further = {k: v for k, v in levels.items() if k not in ("world", "method")}
         names = {"world": world, "method": method, "preset": self.preset}
-        overrides = dict(self.settings)
+        overrides, shape = dict(self.settings), self.shape
         for one in self.where:
             if one.holds(names):
                 overrides |= one.settings
+                shape = shape if one.shape is None else one.shape
         overrides |= further
-        tasks = tasks_up_to(world) if self.shape else [world]
+        tasks = tasks_up_to(world) if shape else [world]
         configs = [
             resolve(t, method, self.preset, overrides=overrides, place=self.place) for t in tasks
         ]
@@ -206,7 +209,7 @@ class Plan:
                 seed=seed,
                 variant=variant,
                 overrides=overrides,
-                shape=self.shape,
+                shape=shape,
                 studies=self.studies,
                 run_ids=tuple(_with_seed(config, seed).run_id for config in configs),
             )
@@ -226,6 +229,7 @@ class Plan:
         }
         where = [
             {key: list(allowed) for key, allowed in one.conditions.items()}
+            | ({} if one.shape is None else {"shape": one.shape})
             | {"settings": one.settings}
             for one in self.where
         ]

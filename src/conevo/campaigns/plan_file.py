@@ -23,6 +23,7 @@ run with every seed::
     method = ["ccga", "mesp", "cone"]
     preset = "desk"
     settings = { "method.fresh_rounds" = true }
+    # shape = true                 # also here, for some of the runs
 """
 
 from __future__ import annotations
@@ -44,6 +45,7 @@ STUDIES = ("teams",)
 TABLES = ("campaign", "factors", "settings", "where")
 HEAD = ("name", "title", "produces", "seeds", "preset", "shape", "studies")
 CONDITIONS = ("world", "method", "preset")
+EFFECTS = ("settings", "shape")
 RANGE = re.compile(r"(.*-)(\d+)\.\.(\d+)")
 
 
@@ -98,9 +100,7 @@ def _parse(text: str, place: str, name: str) -> Plan:
     preset = _text(head.get("preset", "desk"), "campaign.preset", place)
     if preset not in PRESETS:
         raise unknown_name("preset", preset, PRESETS, place)
-    shape = head.get("shape", False)
-    if not isinstance(shape, bool):
-        raise UsageError(f"campaign.shape = {shape!r} {place}: must be true or false")
+    shape = _truth(head.get("shape", False), "campaign.shape", place)
     studies = _texts(head.get("studies", list(STUDIES)), "campaign.studies", place)
     for study in studies:
         if study not in STUDIES:
@@ -142,6 +142,12 @@ def _name(value: Any, place: str) -> str:
 def _text(value: Any, key: str, place: str) -> str:
     if not isinstance(value, str):
         raise UsageError(f"{key} = {value!r} {place}: must be text")
+    return value
+
+
+def _truth(value: Any, key: str, place: str) -> bool:
+    if not isinstance(value, bool):
+        raise UsageError(f"{key} = {value!r} {place}: must be true or false")
     return value
 
 
@@ -192,10 +198,11 @@ def _where(table: Any, place: str) -> Where:
         raise UsageError(f"where {place} must be written [[where]]")
     conditions: dict[str, tuple[str, ...]] = {}
     for key, value in table.items():
-        if key == "settings":
+        if key in EFFECTS:
             continue
         if key not in CONDITIONS:
-            raise unknown_name("condition", f"where.{key}", [*CONDITIONS, "settings"], place)
+            raise unknown_name("condition", f"where.{key}", [*CONDITIONS, *EFFECTS], place)
         allowed = [value] if isinstance(value, str) else value
         conditions[key] = tuple(_expand(_texts(allowed, f"where.{key}", place)))
-    return Where(conditions, _table(table, "settings", place))
+    shape = _truth(table["shape"], "where.shape", place) if "shape" in table else None
+    return Where(conditions, _table(table, "settings", place), shape)
