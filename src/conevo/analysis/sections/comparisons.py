@@ -1,0 +1,140 @@
+"""Every two treatments of a group compared."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from conevo.analysis import figures
+from conevo.analysis.comparison import (
+    Pair,
+    compare_all,
+)
+from conevo.analysis.exhibits import (
+    Column,
+    Exhibit,
+    Figure,
+    Section,
+    Table,
+    interval,
+    p_value,
+    plain,
+)
+from conevo.analysis.sections.scope import Scope, place_names, sizes
+from conevo.analysis.statistics import ALPHA
+
+__all__ = ["comparisons"]
+
+TESTS = (
+    "p (t): Student's independent t-test, two-sided, uncorrected, as in the thesis; p (Welch): the "
+    "same without equal variances; p (MW): Mann-Whitney, exact; p (MW, Holm): the same, corrected "
+    "by Holm for all {n} pairs of this table; A12: probability that a run of the first is "
+    "above one of the second (Vargha and Delaney)."
+)
+
+
+def comparisons(scope: Scope) -> Section:
+    """Return every two treatments of each environment compared."""
+    pairs = compare_all(scope.cells)
+    if not pairs:
+        return Section("Comparisons", ["There is one method only, so nothing to compare."])
+    names = {pair: f"{pair.a.title} − {pair.b.title}" for pair in pairs}
+    places = dict(zip(scope.environments, place_names(scope.environments), strict=True))
+    cells = {
+        (names[pair], places[pair.environment]): figures.Shade(
+            (0.25 if pair.by_thesis else 0) + (0.5 if pair.by_ranks else 0), _cell_text(pair)
+        )
+        for pair in pairs
+    }
+    legend = [
+        (0, "neither test below 0.05"),
+        (0.25, "t-test only (uncorrected)"),
+        (0.5, "Mann-Whitney only (Holm)"),
+        (0.75, "both"),
+    ]
+    size = sizes(n for pair in pairs for n in (pair.result.n_a, pair.result.n_b))
+    text = []
+    few = [pair for pair in pairs if pair.too_few]
+    if few:
+        text.append(
+            f"Too few runs: with these sizes Mann-Whitney with Holm's correction over {len(pairs)} "
+            f"pairs could not fall below {ALPHA} in {len(few)} of them, whatever the runs were."
+        )
+    exhibits: list[Exhibit] = [
+        Figure(
+            f"{scope.stem}-significance",
+            f"Significant differences in task performance ({scope.unit})",
+            f"+: the first reached more, −: less; the number is Mann-Whitney's p after Holm's "
+            f"correction over {pairs[0].n_tests} pairs. {size} per sample.",
+            (),
+            [_pair_row(scope, pair) for pair in pairs],
+            drawing=figures.heat_map(
+                list(dict.fromkeys(names.values())),
+                list(places.values()),
+                cells,
+                legend,
+                x_label=scope.axis,
+            ),
+        ),
+        _pair_table(scope, pairs, scope.stem, scope.unit, is_open=len(pairs) <= 12),
+    ]
+    for measure, others in scope.others.items():
+        made = compare_all(others)
+        unit = measure.replace("_", " ")
+        exhibits.append(_pair_table(scope, made, f"{scope.stem}-{measure}", unit, is_open=False))
+    return Section("Comparisons", text, exhibits)
+
+
+def _cell_text(pair: Pair) -> str:
+    sign = "+" if (pair.result.difference or 0) > 0 else "−"
+    p = p_value(pair.p_holm)
+    return f"{sign} {p.removeprefix('0')}" if p[0] in "0" else f"{sign} {p}"
+
+
+def _pair_row(scope: Scope, pair: Pair) -> dict[str, Any]:
+    result = pair.result
+    return {
+        "environment": pair.environment,
+        "first": pair.a.title,
+        "second": pair.b.title,
+        "n_first": result.n_a,
+        "n_second": result.n_b,
+        "n": f"{result.n_a}, {result.n_b}",
+        "difference": result.difference,
+        "interval": (result.low, result.high),
+        "p_t": result.p_t,
+        "p_welch": result.p_welch,
+        "p_mann_whitney": result.p_mann_whitney,
+        "p_holm": pair.p_holm,
+        "a12": result.a12,
+        "smallest_p": result.smallest_p,
+        "verdict": pair.verdict,
+    }
+
+
+def _pair_table(
+    scope: Scope, pairs: Sequence[Pair], stem: str, unit: str, *, is_open: bool
+) -> Table:
+    columns = [
+        Column("environment", "environment", plain),
+        Column("first", "first", plain),
+        Column("second", "second", plain),
+        Column("n", "n", plain),
+        Column("difference", "difference"),
+        Column("interval", "95 % interval", interval),
+        Column("p_t", "p (t)", p_value),
+        Column("p_welch", "p (Welch)", p_value),
+        Column("p_mann_whitney", "p (MW)", p_value),
+        Column("p_holm", "p (MW, Holm)", p_value),
+        Column("a12", "A12"),
+        Column("verdict", "tests say", plain),
+    ]
+    tests = TESTS.format(n=pairs[0].n_tests if pairs else 0)
+    note = (
+        f"Difference: mean of the first less that of the second; 95 % interval: Welch; {tests} "
+        "Alike: no test below 0.05 and the interval inside ±15 % of the larger mean."
+    )
+    rows = [_pair_row(scope, pair) for pair in pairs]
+    return Table(
+        f"{stem}-comparisons", f"Every two methods compared: {unit}", note, columns, rows, is_open
+    )

@@ -1,0 +1,191 @@
+"""What teams of a group lose without a caste, and what clones of its fittest specialist do.
+
+Nitschke 2009, sections 4.6.5, 4.6.6, 5.5.3, 5.5.4, 6.5.4, 6.5.5.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from typing import Any, NamedTuple
+
+from conevo.analysis import figures
+from conevo.analysis.comparison import Cell
+from conevo.analysis.exhibits import Column, Figure, Section, Table, interval, p_value, plain
+from conevo.analysis.sections.scope import Scope, named, place_names, sizes
+from conevo.analysis.statistics import compare, holm, mean_interval
+
+__all__ = ["clones", "lesions"]
+
+
+class _Team(NamedTuple):
+    """A changed team of a run: its main measure, and that of the team unchanged."""
+
+    run: str
+    caste: str
+    whole: float
+    value: float
+
+    @property
+    def percent(self) -> float:
+        """What it reached of the unchanged team's, in percent."""
+        return 100 * self.value / self.whole
+
+
+def lesions(scope: Scope) -> Section:
+    """Return what is left when all robots of a caste are replaced by heuristic ones."""
+    return _section(
+        scope,
+        "lesion",
+        "Lesions",
+        "replaced by heuristic robots",
+        "All robots of a caste replaced by the heuristic controller that matches it; percent of "
+        "the same team unlesioned in the same fresh scenarios.",
+    )
+
+
+def clones(scope: Scope) -> Section:
+    """Return what teams of clones of a caste's fittest robot reach."""
+    return _section(
+        scope,
+        "clones",
+        "Behavioural validation: clones",
+        "cloned",
+        "A team of clones of the caste's fittest robot; percent of the evolved team in the same "
+        "fresh scenarios.",
+    )
+
+
+def _section(scope: Scope, study: str, title: str, what: str, note: str) -> Section:
+    cells, lost = _teams(scope, study)
+    text = []
+    if lost:
+        text.append(
+            f"{lost} runs are left out: their unchanged team reached nothing, so that there is no "
+            "percentage."
+        )
+    if not cells:
+        return Section(title, text or ["No team of these runs was studied so."])
+    rows = _rows(scope, cells)
+    figure, table = _figure(scope, study, what, note, cells), _table(scope, study, what, note, rows)
+    return Section(title, text, [figure, table])
+
+
+def _teams(scope: Scope, study: str) -> tuple[dict[Cell, list[_Team]], int]:
+    """Return the changed teams of each cell by run, and how many runs have no percentage."""
+    found = scope.tables.query(
+        f"""
+        SELECT s.run, s.team, avg(s.value) FROM scores s JOIN runs r USING (run)
+        WHERE s.study = '{study}' AND s.measure = r.measure GROUP BY ALL ORDER BY ALL
+        """
+    )[1]
+    values: dict[str, dict[str, float]] = defaultdict(dict)
+    for run, team, value in found:
+        values[run][team] = value
+    cells: dict[Cell, list[_Team]] = {}
+    lost = 0
+    for cell, runs in scope.cells.items():
+        teams = []
+        for one in runs:
+            of = dict(values.get(one.run, {}))
+            whole = of.pop("whole", None)
+            if whole is not None and not whole > 0:
+                lost += 1
+            elif whole is not None:
+                teams += [_Team(one.run, caste, whole, value) for caste, value in of.items()]
+        if teams:
+            cells[cell] = teams
+    return cells, lost
+
+
+def _figure(
+    scope: Scope, study: str, what: str, note: str, cells: dict[Cell, list[_Team]]
+) -> Figure:
+    """Draw a point per run: the mean over its castes."""
+    means: dict[Cell, list[float]] = {}
+    for cell, teams in cells.items():
+        of_run = defaultdict(list)
+        for team in teams:
+            of_run[team.run].append(team.percent)
+        means[cell] = [sum(values) / len(values) for values in of_run.values()]
+    names = named(scope.treatments, means)
+    environments = [e for e in scope.environments if any(cell.environment == e for cell in means)]
+    grid = {
+        name: [means.get(Cell(e, treatment), []) for e in environments]
+        for treatment, name in names.items()
+    }
+    estimates = {name: [mean_interval(values) for values in of] for name, of in grid.items()}
+    rows = [
+        scope.key(cell.environment, cell.treatment)
+        | {"run": team.run, "caste": team.caste, "whole": team.whole, scope.measure: team.value}
+        | {"percent": team.percent}
+        for cell, teams in cells.items()
+        for team in teams
+    ]
+    size = sizes(len(values) for values in means.values())
+    return Figure(
+        f"{scope.stem}-{study}",
+        f"Task performance ({scope.unit}) with a caste {what}, percent of the team as it was",
+        f"{note} A point per run: the mean over its castes; beside them the mean with Student's "
+        f"95 % interval. {size} per cell.",
+        (),
+        rows,
+        drawing=figures.points(
+            place_names(environments),
+            grid,
+            {
+                name: [
+                    (one.value, one.low, one.high)
+                    if one.value is not None and one.low is not None and one.high is not None
+                    else None
+                    for one in of
+                ]
+                for name, of in estimates.items()
+            },
+            x_label=scope.axis,
+            y_label="% of the unchanged team",
+            reference=100.0,
+        ),
+    )
+
+
+def _rows(scope: Scope, cells: dict[Cell, list[_Team]]) -> list[dict[str, Any]]:
+    rows: list[dict[str, Any]] = []
+    for cell, teams in cells.items():
+        for caste in sorted({team.caste for team in teams}):
+            with_it = [team for team in teams if team.caste == caste]
+            result = compare([team.value for team in with_it], [team.whole for team in with_it])
+            percent = mean_interval([team.percent for team in with_it])
+            rows.append(
+                scope.key(cell.environment, cell.treatment)
+                | {"caste": caste, "n": len(with_it)}
+                | {"whole": result.mean_b, "changed": result.mean_a, "percent": percent.value}
+                | {"interval": (percent.low, percent.high)}
+                | {"p_t": result.p_t, "p_mann_whitney": result.p_mann_whitney}
+            )
+    corrected = holm([row["p_mann_whitney"] for row in rows])
+    return [row | {"p_holm": p} for row, p in zip(rows, corrected, strict=True)]
+
+
+def _table(scope: Scope, study: str, what: str, note: str, rows: list[dict[str, Any]]) -> Table:
+    columns = [
+        Column("environment", "environment", plain),
+        Column("treatment", "method", plain),
+        Column("caste", "caste", plain),
+        Column("n", "n"),
+        Column("whole", "unchanged"),
+        Column("changed", what.split()[0]),
+        Column("percent", "%"),
+        Column("interval", "95 % interval of %", interval),
+        Column("p_t", "p (t)", p_value),
+        Column("p_holm", "p (MW, Holm)", p_value),
+    ]
+    return Table(
+        f"{scope.stem}-{study}-castes",
+        f"Task performance ({scope.unit}) with a caste {what}",
+        f"{note} n: runs that have the caste; 95 % interval: Student's t. p (t): Student's "
+        "independent t-test of changed and unchanged teams, uncorrected, as in the thesis; p (MW, "
+        f"Holm): Mann-Whitney, corrected by Holm for the {len(rows)} rows.",
+        columns,
+        rows,
+        is_open=len(rows) <= 12,
+    )

@@ -1,0 +1,175 @@
+"""What was run: the plan, its cost, what failed, and with which versions."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from conevo.analysis.exhibits import Column, Section, Table, number, plain
+from conevo.analysis.frames import Tables
+
+__all__ = ["Campaign", "overview", "read_campaign", "repetition"]
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """What the directory of a campaign says beside its tables.
+
+    Attributes:
+        name: of the campaign.
+        title: one line, or the name.
+        produces: tables and figures of the thesis.
+        plan: text of the plan, empty without one.
+        planned: label of every run -> what the plan says of it.
+        failed: label -> origin and message of runs that ended without a result.
+    """
+
+    name: str
+    title: str
+    produces: tuple[str, ...]
+    plan: str
+    planned: dict[str, dict[str, Any]]
+    failed: dict[str, dict[str, Any]]
+
+
+def read_campaign(root: Path) -> Campaign:
+    """Return what a campaign's directory says beside its tables; missing files say nothing."""
+    plan = _text(root / "plan.toml")
+    head = tomllib.loads(plan).get("campaign", {})
+    lines = [json.loads(line) for line in _text(root / "runs.jsonl").splitlines()]
+    endings = {
+        path.stem: json.loads(_text(path)) for path in sorted((root / "ended").glob("*.json"))
+    }
+    name = str(head.get("name", root.resolve().name))
+    return Campaign(
+        name=name,
+        title=str(head.get("title") or name),
+        produces=tuple(map(str, head.get("produces", ()))),
+        plan=plan,
+        planned={str(line["label"]): line for line in lines},
+        failed={k: v for k, v in endings.items() if v.get("status") != "finished"},
+    )
+
+
+def overview(tables: Tables, campaign: Campaign) -> Section:
+    """Return what was run, what it cost, what is missing, and with which versions."""
+    runs = [run for (run,) in tables.query("SELECT run FROM runs ORDER BY run")[1]]
+    finished = {run.partition("/")[0] for run in runs}
+    failed = {label: why for label, why in campaign.failed.items() if label not in finished}
+    waiting = [x for x in campaign.planned if x not in finished and x not in failed]
+    text = []
+    if campaign.produces:
+        text.append(f"Data of the thesis' {', '.join(campaign.produces)}.")
+    planned = f" of {len(campaign.planned):,} planned" if campaign.planned else ""
+    stages = f" ({len(runs):,} stages)" if len(runs) > len(finished) else ""
+    text.append(
+        f"{len(finished):,}{planned} runs are finished{stages}, {len(failed):,} failed, "
+        f"{len(waiting):,} have not ended. Only finished runs count below. Runs of different "
+        "presets or budgets never stand in one table or figure."
+    )
+    exhibits = [_cost(tables), _versions(tables)]
+    if failed:
+        exhibits.insert(1, _failures(failed, campaign))
+    return Section("What was run", text, exhibits)
+
+
+def repetition(tables: Tables, campaign: Campaign) -> Section:
+    """Return the commands that repeat the campaign, and its plan."""
+    versions = tables.query("SELECT DISTINCT conevo FROM runs ORDER BY 1")[1]
+    presets = tables.query("SELECT DISTINCT preset FROM runs ORDER BY 1")[1]
+    text = [
+        "Save the plan below as plan.toml; with conevo "
+        + " or ".join(version for (version,) in versions)
+        + " the same commands give the same runs, bit for bit on the same kind of processor, and "
+        "from the same runs the same report, byte for byte.",
+    ]
+    if any(preset != "night" for (preset,) in presets):
+        text.append("For more scale: conevo campaign start plan.toml --preset night")
+    commands = f"conevo campaign start plan.toml\nconevo report {campaign.name}\n\n# plan.toml\n"
+    return Section("How to repeat it", text, preformatted=commands + campaign.plan)
+
+
+def _text(path: Path) -> str:
+    return path.read_text(encoding="utf-8") if path.is_file() else ""
+
+
+def _cost(tables: Tables) -> Table:
+    columns, found = tables.query(
+        """
+        SELECT r.world, r.family, b.budget, count(DISTINCT environment) AS environments,
+               count(DISTINCT method || variant) AS methods, count(DISTINCT seed) AS seeds,
+               count(*) AS runs, min(r.generations) AS least_generations,
+               max(r.generations) AS most_generations, min(evaluations) AS least_evaluations,
+               max(evaluations) AS most_evaluations, sum(team_steps) / 1e6 AS million_team_steps,
+               sum(core_seconds) / 3600 AS core_hours
+        FROM runs r JOIN budgets b USING (run) GROUP BY ALL ORDER BY ALL
+        """
+    )
+    rows = [dict(zip(columns, row, strict=True)) for row in found]
+    for row in rows:
+        for what in ("generations", "evaluations"):
+            row[what] = (row.pop(f"least_{what}"), row.pop(f"most_{what}"))
+    shown = [
+        Column("world", "world", plain),
+        Column("family", "environments", plain),
+        Column("budget", "budget", plain, is_wide=True),
+        Column("environments", "how many"),
+        Column("methods", "methods"),
+        Column("seeds", "seeds"),
+        Column("runs", "runs"),
+        Column("generations", "generations", _span),
+        Column("evaluations", "team evaluations", _span),
+        Column("million_team_steps", "team-steps, million"),
+        Column("core_hours", "core hours"),
+    ]
+    note = "Generations and team evaluations of a run, lowest to highest; the rest of all runs."
+    return Table("runs", "Runs and what they cost", note, shown, rows)
+
+
+def _span(value: tuple[int, int]) -> str:
+    low, high = value
+    return number(low) if low == high else f"{low:,} to {high:,}"
+
+
+def _failures(failed: dict[str, dict[str, Any]], campaign: Campaign) -> Table:
+    rows = [
+        {
+            "run": label,
+            "method": campaign.planned.get(label, {}).get("method"),
+            "seed": campaign.planned.get(label, {}).get("seed"),
+            "origin": why.get("origin"),
+            "message": why.get("message"),
+        }
+        for label, why in failed.items()
+    ]
+    columns = [
+        Column("run", "run", plain),
+        Column("method", "method", plain),
+        Column("seed", "seed", plain),
+        Column("origin", "origin", plain),
+        Column("message", "reason", plain, is_wide=True),
+    ]
+    note = (
+        "Origin: the machine refused, the request could not be carried out, or the program failed."
+    )
+    return Table("failures", "Runs that failed", note, columns, rows, is_open=len(rows) <= 12)
+
+
+def _versions(tables: Tables) -> Table:
+    columns, found = tables.query(
+        "SELECT conevo, warp, world, kernel_hash, count(*) AS runs FROM runs"
+        " GROUP BY ALL ORDER BY ALL"
+    )
+    shown = [
+        Column("conevo", "conevo", plain),
+        Column("warp", "Warp", plain),
+        Column("world", "world", plain),
+        Column("kernel_hash", "kernels", plain),
+        Column("runs", "runs"),
+    ]
+    note = "Kernels: digest of the simulation's program; runs with the same one are comparable."
+    rows = [dict(zip(columns, row, strict=True)) for row in found]
+    return Table("versions", "Versions", note, shown, rows)

@@ -1,0 +1,224 @@
+"""What the treatments of a group reached."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from conevo.analysis import figures
+from conevo.analysis.comparison import (
+    Aggregate,
+    Cell,
+    Summary,
+    aggregate,
+    summarize,
+)
+from conevo.analysis.exhibits import (
+    Column,
+    Exhibit,
+    Figure,
+    Section,
+    Table,
+    interval,
+    number,
+    p_value,
+    plain,
+)
+from conevo.analysis.sections.scope import Scope, named, place_names, sizes, span
+
+__all__ = ["performance"]
+
+
+def performance(scope: Scope) -> Section:
+    """Return what every cell reached."""
+    found = summarize(scope.cells)
+    by_cell = {Cell(one.environment, one.treatment): one for one in found}
+    names = named(scope.treatments, scope.cells)
+    places = place_names(scope.environments)
+    grid = [
+        (name, [by_cell.get(Cell(e, treatment)) for e in scope.environments])
+        for treatment, name in names.items()
+    ]
+    rows = [scope.key(one.environment, one.treatment) | _summary_row(one, scope) for one in found]
+    size = sizes(len(one.values) for one in found)
+    exhibits: list[Exhibit] = [
+        Figure(
+            f"{scope.stem}-bars",
+            f"Task performance ({scope.unit}) by environment and method",
+            "Mean over runs of the fittest team in fresh scenarios; error bars: standard deviation "
+            f"of the runs. {size} per bar.",
+            (),
+            rows,
+            drawing=figures.bars(
+                places,
+                {name: [one.mean.value if one else None for one in of] for name, of in grid},
+                {name: [one.sd if one else None for one in of] for name, of in grid},
+                x_label=scope.axis,
+                y_label=f"{scope.unit} (mean, sd)",
+            ),
+        ),
+        Figure(
+            f"{scope.stem}-runs",
+            f"Task performance ({scope.unit}) of every run",
+            f"A point per run; beside them the mean with Student's 95 % interval. {size} per cell.",
+            (),
+            [
+                scope.key(cell.environment, cell.treatment)
+                | {"seed": one.seed, "run": one.run, scope.measure: one.value}
+                for cell, values in scope.cells.items()
+                for one in values
+            ],
+            drawing=figures.points(
+                places,
+                {name: [one.values if one else () for one in of] for name, of in grid},
+                {name: [_ends(one) if one else None for one in of] for name, of in grid},
+                x_label=scope.axis,
+                y_label=f"{scope.unit} (runs, mean, 95 % interval)",
+            ),
+        ),
+        Table(
+            f"{scope.stem}-performance",
+            f"Task performance ({scope.unit}) by environment and method",
+            "Mean over runs of the mean over fresh scenarios; n: runs; 95 % interval: Student's t; "
+            "generation 0: the fittest team of the first generation in the same scenarios; p (KS): "
+            "Kolmogorov-Smirnov against the normal fitted to the runs, as in the thesis, which is "
+            "too large; p (Lilliefors): the same distance, judged correctly.",
+            _performance_columns(rows),
+            rows,
+            is_open=len(rows) <= 12,
+        ),
+    ]
+    exhibits += [*_pooled(scope), *_others(scope)]
+    return Section(f"Task performance: {scope.unit}", _warnings(scope), exhibits)
+
+
+def _ends(one: Summary) -> tuple[float, float, float] | None:
+    mean = one.mean
+    if mean.value is None or mean.low is None or mean.high is None:
+        return None
+    return mean.value, mean.low, mean.high
+
+
+def _summary_row(one: Summary, scope: Scope) -> dict[str, Any]:
+    cell = Cell(one.environment, one.treatment)
+    begun = [value.value for value in scope.first.get(cell, ())]
+    optima = {value.optimum for value in scope.cells[cell]}
+    optimum = optima.pop() if len(optima) == 1 else None
+    mean = one.mean.value
+    return {
+        "n": len(one.values),
+        "mean": mean,
+        "sd": one.sd,
+        "interval": (one.mean.low, one.mean.high),
+        "range": (min(one.values), max(one.values)),
+        "generation_0": sum(begun) / len(begun) if begun else None,
+        "share": mean / optimum if optimum and mean is not None else None,
+        "p_ks": one.normal.p_ks,
+        "p_lilliefors": one.normal.p_lilliefors,
+    }
+
+
+def _performance_columns(rows: Sequence[Mapping[str, Any]]) -> list[Column]:
+    columns = [
+        Column("environment", "environment", plain),
+        Column("treatment", "method", plain),
+        Column("n", "n"),
+        Column("mean", "mean"),
+        Column("sd", "sd"),
+        Column("interval", "95 % interval", interval),
+        Column("range", "lowest to highest", interval),
+        Column("generation_0", "generation 0"),
+        Column("share", "share of optimum"),
+        Column("p_ks", "p (KS)", p_value),
+        Column("p_lilliefors", "p (Lilliefors)", p_value),
+    ]
+    optional = ("share", "generation_0")
+    return [c for c in columns if c.key not in optional or any(r[c.key] is not None for r in rows)]
+
+
+def _warnings(scope: Scope) -> list[str]:
+    counts = [len(of) for of in scope.cells.values()]
+    text = []
+    if min(counts) < 2:
+        text.append("Cells with a single run have no deviation, no interval and no t-test.")
+    if max(counts) < 20:
+        text.append(
+            f"The thesis has 20 runs per cell; here are {span(counts).removeprefix('n = ')}."
+        )
+    missing = len(scope.environments) * len(scope.treatments) - len(scope.cells)
+    if missing:
+        text.append(f"{missing} of the cells of this table have no finished run.")
+    return text
+
+
+def _pooled(scope: Scope) -> list[Exhibit]:
+    """Return the table over all environments, if there is something to pool."""
+    found = aggregate(scope.cells)
+    if len(found) < 2 or (found[0].environments < 2 and len(scope.environments) > 1):
+        return []
+    optima = {one.optimum for of in scope.cells.values() for one in of}
+    scale = scope.unit if None in optima else f"share of the optimal {scope.unit}"
+    others = [one.treatment for one in found[:-1]]
+    columns = [
+        Column("treatment", "method", plain),
+        Column("n", "n"),
+        Column("iqm", "IQM"),
+        Column("interval", "95 % interval", interval),
+        *(Column(f"above {t.title}", f"P(above {t.title})", plain) for t in others),
+    ]
+    return [
+        Table(
+            f"{scope.stem}-aggregate",
+            f"All environments together: {scale}",
+            f"Environments: {found[0].environments}; n: runs; IQM: "
+            "interquartile mean of the runs; P(above X): probability of improvement, that a run is "
+            "above one of X in the same environment; 95 % intervals: stratified bootstrap, 2000 "
+            "resamples.",
+            columns,
+            [_aggregate_row(one) for one in found],
+        )
+    ]
+
+
+def _aggregate_row(one: Aggregate) -> dict[str, Any]:
+    return {
+        "treatment": one.treatment.title,
+        "n": one.iqm.n,
+        "iqm": one.iqm.value,
+        "interval": (one.iqm.low, one.iqm.high),
+    } | {
+        f"above {other.title}": f"{number(p.value)}"
+        + (f" ({interval((p.low, p.high))})" if p.low is not None else "")
+        for other, p in one.improvement.items()
+    }
+
+
+def _others(scope: Scope) -> list[Exhibit]:
+    """Return a table of the measures beside the main one."""
+    rows = [
+        scope.key(environment, treatment)
+        | {"measure": measure.replace("_", " "), "n": len(values)}
+        | _mean_and_sd([one.value for one in values])
+        for measure, cells in scope.others.items()
+        for (environment, treatment), values in cells.items()
+    ]
+    if not rows:
+        return []
+    columns = [
+        Column("environment", "environment", plain),
+        Column("measure", "measure", plain),
+        Column("treatment", "method", plain),
+        Column("n", "n"),
+        Column("mean", "mean"),
+        Column("sd", "sd"),
+    ]
+    note = "Mean over runs of the mean over fresh scenarios; sd: of the runs; n: runs."
+    name, title = f"{scope.stem}-measures", "Other measures of task performance"
+    return [Table(name, title, note, columns, rows, is_open=False)]
+
+
+def _mean_and_sd(values: Sequence[float]) -> dict[str, float | None]:
+    n, mean = len(values), sum(values) / len(values)
+    squares = sum((value - mean) ** 2 for value in values)
+    return {"mean": mean, "sd": math.sqrt(squares / (n - 1)) if n > 1 else None}

@@ -1,0 +1,130 @@
+"""What all sections about a group of runs share: cells, treatments, names on axes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from conevo.analysis.comparison import Cell, Group, Treatment, group_values, treatments_of
+from conevo.analysis.exhibits import slug
+from conevo.analysis.frames import Tables, Value
+
+__all__ = ["Scope", "named", "place_names", "scopes", "sizes", "span"]
+
+
+Cells = Mapping[Cell, Sequence[Value]]
+
+
+@dataclass(frozen=True)
+class Scope:
+    """What all sections about a group share.
+
+    Attributes:
+        tables: the campaign's.
+        group: which tasks, at which budget.
+        stem: begins the names of the group's files.
+        cells: every run's champion in the main measure.
+        first: every run's fittest team of generation 0 in the main measure.
+        others: the champions in the world's other measures.
+    """
+
+    tables: Tables
+    group: Group
+    stem: str
+    cells: Cells
+    first: Cells
+    others: Mapping[str, Cells]
+
+    @property
+    def treatments(self) -> list[Treatment]:
+        """Treatments in order."""
+        return treatments_of(treatment for _, treatment in self.cells)
+
+    @property
+    def environments(self) -> list[str]:
+        """Environments in order."""
+        return list(dict.fromkeys(environment for environment, _ in self.cells))
+
+    @property
+    def measure(self) -> str:
+        """The world's main measure."""
+        return next(iter(self.cells.values()))[0].measure
+
+    @property
+    def unit(self) -> str:
+        """The main measure as axes call it."""
+        return self.measure.replace("_", " ")
+
+    @property
+    def axis(self) -> str:
+        """What stands under an axis of environments."""
+        short = self.group.world.rpartition("-v")[0] or self.group.world
+        if place_names(self.environments) == self.environments:
+            return f"{short} environment"
+        return f"{short}/{self.group.family}-N, N ="
+
+    def key(self, environment: str, treatment: Treatment) -> dict[str, str]:
+        """Return how rows of numbers name a cell."""
+        return {
+            "environment": environment,
+            "method": treatment.method,
+            "variant": treatment.variant,
+            "treatment": treatment.title,
+        }
+
+
+def scopes(tables: Tables) -> list[Scope]:
+    """Return the groups of a campaign's runs, in the order of worlds and environments."""
+    main = group_values(tables.values())
+    first = group_values(tables.values(team="generation 0"))
+    measures = [
+        measure
+        for (measure,) in tables.query(
+            "SELECT DISTINCT measure FROM scores WHERE study = 'test' ORDER BY measure"
+        )[1]
+    ]
+    by_measure = {measure: group_values(tables.values(measure)) for measure in measures}
+    found: list[Scope] = []
+    for group, cells in main.items():
+        stem = slug(f"{group.world.rpartition('-v')[0] or group.world}-{group.family}")
+        same = sum(one.stem.startswith(stem) for one in found)
+        own = next(iter(cells.values()))[0].measure
+        others = {
+            measure: groups[group]
+            for measure, groups in by_measure.items()
+            if group in groups and measure != own
+        }
+        stem = f"{stem}-budget-{same + 1}" if same else stem
+        found.append(Scope(tables, group, stem, cells, first.get(group, {}), others))
+    return found
+
+
+def named(
+    treatments: Iterable[Treatment], cells: Mapping[Cell, Sequence[Any]]
+) -> dict[Treatment, str]:
+    """Return the name of each treatment in legends, with the number of its runs per cell."""
+    return {
+        treatment: f"{treatment.title} ({span(counts)})"
+        for treatment in treatments
+        if (counts := [len(of) for cell, of in cells.items() if cell.treatment == treatment])
+    }
+
+
+def place_names(environments: Sequence[str]) -> list[str]:
+    """Return the names of environments under an axis: numbers alone if there are many."""
+    stems = {name.rpartition("-")[0] for name in environments}
+    if len(environments) <= 6 or len(stems) > 1:
+        return list(environments)
+    return [name.rpartition("-")[2] for name in environments]
+
+
+def sizes(counts: Iterable[int]) -> str:
+    """Return the number of runs in words."""
+    return f"{span(list(counts))} runs"
+
+
+def span(counts: Sequence[int]) -> str:
+    """Return "n = 20", or "n = 3 to 20"."""
+    low, high = min(counts, default=0), max(counts, default=0)
+    return f"n = {low}" if low == high else f"n = {low} to {high}"

@@ -1,0 +1,151 @@
+"""Tables of a campaign: what counts as a run, as its value, and as the same budget."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import duckdb
+import numpy as np
+import pytest
+
+from analysis.finished_runs import Cell, cells, write_campaign
+from conevo.analysis.frames import SCHEMA, Tables
+from conevo.errors import UsageError
+
+
+def tables_of(folder: Path, of: list[Cell], **further: object) -> Tables:
+    return Tables(write_campaign(folder / "campaign", of, **further) / "tables")  # type: ignore[arg-type]
+
+
+def edit(folder: Path, sql: str, table: str = "runs") -> None:
+    """Replace a table by what a query over it (as ``old``) gives."""
+    file = folder / "campaign" / "tables" / f"{table}.parquet"
+    with duckdb.connect() as connection:
+        connection.execute(f"CREATE TABLE old AS FROM read_parquet('{file}')")
+        connection.execute(f"COPY ({sql}) TO '{file}' (FORMAT parquet)")
+
+
+def test_a_value_is_the_mean_over_scenarios_of_one_run(tmp_path) -> None:
+    with tables_of(tmp_path, cells(["rover/complex-2"], ["ccga", "cone"]), seeds=3) as tables:
+        found = tables.values()
+        assert [(one.method, one.seed) for one in found] == [
+            (method, seed) for method in ("ccga", "cone") for seed in (1, 2, 3)
+        ]
+        first = found[0]
+        scores = tables.query(
+            f"SELECT value FROM scores WHERE run = '{first.run}' AND study = 'test' AND"
+            " team = 'champion' AND measure = 'value'"
+        )[1]
+        assert len(scores) == 20
+        assert first.value == pytest.approx(np.mean(scores), rel=1e-12)
+        assert (first.measure, first.optimum) == ("value", 5000.0)
+
+
+def test_other_measures_studies_and_teams_are_asked_for_by_name(tmp_path) -> None:
+    with tables_of(tmp_path, cells(["rover/complex-2"], ["cone"]), seeds=2) as tables:
+        area = tables.values("area")
+        assert {one.measure for one in area} == {"area"}
+        assert all(one.optimum is None and one.value < 1 for one in area)
+        begun = tables.values(team="generation 0")
+        assert all(a.value < b.value / 5 for a, b in zip(begun, tables.values(), strict=True))
+        whole = tables.values(study="lesion", team="whole")
+        assert len(whole) == 2
+        assert tables.values("no such measure") == []
+
+
+def test_a_run_without_a_finite_mean_has_no_value(tmp_path) -> None:
+    write_campaign(tmp_path / "campaign", cells(["rover/complex-2"], ["cone"]), seeds=2)
+    spoilt = "if(run LIKE '%s1' AND scenario = 3, 'nan'::DOUBLE, value)"
+    edit(tmp_path, f"SELECT * REPLACE ({spoilt} AS value) FROM old", "scores")
+    with Tables(tmp_path / "campaign" / "tables") as tables:
+        assert [one.seed for one in tables.values()] == [2]
+
+
+def test_budgets_join_near_numbers_of_evaluations_and_keep_others_apart(tmp_path) -> None:
+    one = "rover/complex-1"
+    of = [
+        *cells([one], ["homcne"], budget=49848),
+        *cells([one], ["cone"], budget=58000),  # within a fifth of the one before
+        *cells([one], ["mesp"], budget=70001),  # not
+        *cells([one], ["ccga"], budget=49848, preset="desk"),
+    ]
+    with tables_of(tmp_path, of, seeds=1) as tables:
+        found = {value.method: value.budget for value in tables.values()}
+    assert found == {
+        "homcne": "smoke, about 50,000 team evaluations of 500 team-steps",
+        "cone": "smoke, about 50,000 team evaluations of 500 team-steps",
+        "mesp": "smoke, about 70,000 team evaluations of 500 team-steps",
+        "ccga": "desk, about 50,000 team evaluations of 500 team-steps",
+    }
+
+
+def test_longer_evaluations_are_another_budget(tmp_path) -> None:
+    write_campaign(tmp_path / "campaign", cells(["rover/complex-1"], ["ccga", "cone"]), seeds=1)
+    edit(
+        tmp_path,
+        "SELECT * REPLACE (if(method = 'cone', 2, 1) * team_steps AS team_steps) FROM old",
+    )
+    with Tables(tmp_path / "campaign" / "tables") as tables:
+        assert len({one.budget for one in tables.values()}) == 2
+
+
+def test_a_run_that_ended_at_its_target_counts_with_the_budget_it_had(tmp_path) -> None:
+    of = [Cell("rover", "complex-1", "ccga"), Cell("rover", "complex-1", "cone", budget=300)]
+    write_campaign(tmp_path / "campaign", of, seeds=1)
+    with Tables(tmp_path / "campaign" / "tables") as tables:
+        assert len({one.budget for one in tables.values()}) == 2
+    edit(
+        tmp_path,
+        "SELECT * REPLACE (if(method = 'cone', 'target', 'budget') AS stopped_by) FROM old",
+    )
+    with Tables(tmp_path / "campaign" / "tables") as tables:
+        assert len({one.budget for one in tables.values()}) == 1
+
+
+def test_stages_of_shapings_stand_apart_and_equal_ones_count_once(tmp_path) -> None:
+    of = [Cell("gacc", "complex-1", "cone"), Cell("gacc", "complex-1", "cone", stage=1)]
+    write_campaign(tmp_path / "campaign", of, seeds=2)
+    with Tables(tmp_path / "campaign" / "tables") as tables:
+        budgets = {"/stage-" in one.run: one.budget for one in tables.values()}
+    assert "a stage" in budgets[True]
+    assert "a stage" not in budgets[False]
+    twin = "SELECT * REPLACE ('another' || run AS run) FROM old WHERE run LIKE '%/stage-1'"
+    edit(tmp_path, f"FROM old UNION ALL ({twin})")
+    with Tables(tmp_path / "campaign" / "tables") as tables:
+        assert tables.query("SELECT count(*) FROM runs")[1] == [(4,)]
+
+
+def test_a_table_without_a_file_is_empty(tmp_path) -> None:
+    with tables_of(tmp_path, cells(["rover/complex-1"]), without=["behaviours"]) as tables:
+        columns, rows = tables.query("FROM behaviours")
+        assert columns == list(SCHEMA["behaviours"])
+        assert rows == []
+
+
+def test_a_folder_without_runs_and_a_foreign_file_are_refused(tmp_path) -> None:
+    with pytest.raises(UsageError, match="no table of runs"):
+        Tables(tmp_path)
+    with duckdb.connect() as connection:
+        connection.execute(f"COPY (SELECT 1 AS one) TO '{tmp_path}/runs.parquet'")
+    with pytest.raises(UsageError, match=r"runs\.parquet is not a table of runs.*"):
+        Tables(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("sql", "says"),
+    [
+        ("SELECT nothing FROM runs", "nothing"),
+        ("COPY runs TO 'stolen.csv'", "disabled by configuration"),
+        ("SELECT * FROM read_text('/etc/hostname')", "disabled by configuration"),
+        ("SET enable_external_access = true", "locked"),
+    ],
+)
+def test_a_query_only_asks_and_says_no_in_one_line(tmp_path, monkeypatch, sql, says) -> None:
+    monkeypatch.chdir(tmp_path)
+    with (
+        tables_of(tmp_path, cells(["rover/complex-1"], ["cone"]), seeds=1) as tables,
+        pytest.raises(UsageError, match=says) as refused,
+    ):
+        tables.query(sql)
+    assert "\n" not in str(refused.value)
+    assert not (tmp_path / "stolen.csv").exists()

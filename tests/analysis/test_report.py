@@ -1,0 +1,253 @@
+"""A report: complete, self-contained, the same bytes again, and never over somebody's changes."""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+
+import duckdb
+import numpy as np
+import pytest
+
+from analysis.finished_runs import Cell, cells, mean_of, write_campaign
+from conevo.analysis.frames import Tables
+from conevo.analysis.report import sections_of, write_report
+from conevo.analysis.sections.overview import read_campaign
+from conevo.errors import UsageError
+
+PLACES = ["rover/complex-1", "rover/complex-2", "pursuit/team-4"]
+
+
+@pytest.fixture(scope="module")
+def campaign(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Three environments of two worlds, three methods, four seeds; a run that failed."""
+    of = cells(PLACES, ["homcne", "mesp", "cone"])
+    failed = ["the disk is <full> & lost"]
+    return write_campaign(tmp_path_factory.mktemp("c") / "camp", of, 4, 6, failed=failed)
+
+
+@pytest.fixture(scope="module")
+def report(campaign: Path) -> Path:
+    return write_report(campaign, campaign / "report").parent
+
+
+def rows_of(path: Path) -> list[dict[str, str]]:
+    with path.open() as file:
+        return list(csv.DictReader(file))
+
+
+class Page(HTMLParser):
+    """Collects ids, links, text and whatever a page would load."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.ids: list[str] = []
+        self.links: list[str] = []
+        self.loads: list[str] = []
+        self.tags: set[str] = set()
+        self.feed(text)
+
+    def handle_starttag(self, tag, attrs) -> None:
+        found = dict(attrs)
+        self.tags.add(tag)
+        if "id" in found:
+            self.ids.append(found["id"])
+        if tag == "a":
+            self.links.append(found["href"])
+        elif "src" in found or (tag == "link"):
+            self.loads.append(tag)
+
+
+def test_the_page_stands_alone_and_its_links_lead_somewhere(report) -> None:
+    text = (report / "index.html").read_text()
+    page = Page(text)
+    assert page.loads == []
+    assert not {"script", "img", "iframe", "object"} & page.tags
+    assert not re.search(r"url\((?!#)", text)
+    assert len(page.ids) == len(set(page.ids))
+    for link in page.links:
+        found = link[1:] in page.ids if link.startswith("#") else (report / link).is_file()
+        assert found, link
+    for used in re.findall(r'(?:url\(#|href="#)([^)"]+)', text):
+        assert used in page.ids, used
+
+
+def test_every_section_is_there_and_says_n_and_tests(report) -> None:
+    text = (report / "index.html").read_text()
+    for title in ("What was run", "Task performance: value", "Comparisons", "Learning", "Castes",
+                  "Lesions", "Behavioural validation: clones", "Measures of specialization",
+                  "Behaviours", "Claims of the thesis", "How to repeat it"):  # fmt: skip
+        assert re.search(rf"<h[23]>{title}</h[23]>", text), title
+    captions = re.findall(r"<figcaption.*?</figcaption>", text, re.DOTALL)
+    drawn = [one for one in captions if "<b>Figure" in one]
+    assert len(drawn) == 2 * 9 + 1
+    assert all("n = 4" in one or "n = 2 to 4" in one for one in drawn)
+    for test in ("Student", "Welch", "Mann-Whitney", "Holm", "Kolmogorov-Smirnov", "Lilliefors"):
+        assert test in text
+    assert "The thesis has 20 runs per cell; here are 4." in text
+
+
+def test_what_failed_is_listed_and_escaped(report) -> None:
+    text = (report / "index.html").read_text()
+    assert "36 of 37 planned runs are finished, 1 failed, 0 have not ended." in text
+    assert "the disk is &lt;full&gt; &amp; lost" in text
+    assert rows_of(report / "numbers/failures.csv")[0]["message"] == "the disk is <full> & lost"
+    assert r"the disk is $<$full$>$ \& lost" in (report / "tables/failures.tex").read_text()
+
+
+def test_the_numbers_are_those_of_the_tables(report, campaign) -> None:
+    with Tables(campaign / "tables") as tables:
+        values = tables.values()
+    for row in rows_of(report / "numbers/rover-complex-performance.csv"):
+        runs = [
+            one.value
+            for one in values
+            if (one.environment, one.method) == (row["environment"], row["method"])
+        ]
+        assert int(row["n"]) == len(runs) == 4
+        assert float(row["mean"]) == pytest.approx(np.mean(runs), rel=1e-9)
+        assert float(row["sd"]) == pytest.approx(np.std(runs, ddof=1), rel=1e-9)
+    points = rows_of(report / "numbers/rover-complex-runs.csv")
+    assert len(points) == 24
+    assert {row["run"]: float(row["value"]) for row in points} == pytest.approx(
+        {one.run: one.value for one in values if one.world == "rover-v1"}, rel=1e-9
+    )
+
+
+def test_lesions_are_percent_of_the_same_run(report, campaign) -> None:
+    with Tables(campaign / "tables") as tables:
+        changed = tables.values(study="lesion", team="non-specialized")
+        whole = {one.run: one.value for one in tables.values(study="lesion", team="whole")}
+    expected = {one.run: 100 * one.value / whole[one.run] for one in changed}
+    found = {
+        row["run"]: float(row["percent"])
+        for world in ("rover-complex", "pursuit-team")
+        for row in rows_of(report / f"numbers/{world}-lesion.csv")
+        if row["caste"] == "non-specialized"
+    }
+    assert found == pytest.approx(expected, rel=1e-9)
+    table = rows_of(report / "numbers/rover-complex-lesion-castes.csv")
+    hom = next(r for r in table if (r["environment"], r["method"]) == ("complex-1", "homcne"))
+    mine = [expected[run] for run in expected if run.startswith("rover-complex-1-homcne-")]
+    assert float(hom["percent"]) == pytest.approx(np.mean(mine), rel=1e-9)
+
+
+def test_every_exhibit_has_its_numbers_and_every_table_its_latex(report) -> None:
+    files = {path.relative_to(report).as_posix() for path in report.rglob("*.*")}
+    manifest = json.loads((report / "manifest.json").read_text())["files"]
+    assert set(manifest) == files - {"manifest.json"}
+    for name in files:
+        stem = Path(name).stem
+        if name.startswith("figures/"):
+            assert {f"figures/{stem}.svg", f"figures/{stem}.pdf", f"numbers/{stem}.csv"} <= files
+        if name.startswith("tables/"):
+            assert f"numbers/{stem}.csv" in files
+    for name in ("rover-complex", "pursuit-team"):
+        for what in ("bars", "runs", "significance", "learning", "specialization", "thresholds",
+                     "castes", "lesion", "clones"):  # fmt: skip
+            assert f"figures/{name}-{what}.pdf" in files
+    assert "figures/pursuit-team-captures.svg" in files
+    assert json.loads((report / "marl-eval.json").read_text())
+
+
+def test_the_same_tables_give_the_same_bytes(report, campaign, tmp_path) -> None:
+    again = write_report(campaign, tmp_path / "again").parent
+    for path in report.rglob("*.*"):
+        assert path.read_bytes() == (again / path.relative_to(report)).read_bytes(), path.name
+
+
+def empty(folder: Path) -> Path:
+    """Return a campaign of which no run is finished: a report of few pages."""
+    root = write_campaign(folder / "camp", cells(["rover/complex-1"], ["mesp", "cone"]), 2, 3)
+    with duckdb.connect() as connection:
+        for path in (root / "tables").glob("*.parquet"):
+            connection.execute(f"CREATE OR REPLACE TABLE t AS FROM read_parquet('{path}') LIMIT 0")
+            connection.execute(f"COPY t TO '{path}' (FORMAT parquet)")
+    return root
+
+
+def test_only_an_unchanged_report_is_replaced(tmp_path) -> None:
+    root = empty(tmp_path)
+    out = tmp_path / "out"
+    page = write_report(root, out)
+    assert write_report(root, out) == page
+    page.write_text(page.read_text() + "<!-- mine -->")
+    with pytest.raises(UsageError, match=r"index\.html was changed"):
+        write_report(root, out)
+    assert page.read_text().endswith("<!-- mine -->")
+    write_report(root, tmp_path / "other")
+    (tmp_path / "other" / "notes.txt").write_text("mine")
+    with pytest.raises(UsageError, match=r"notes\.txt was changed"):
+        write_report(root, tmp_path / "other")
+    (tmp_path / "own").mkdir()
+    (tmp_path / "own" / "thesis.tex").write_text("mine")
+    with pytest.raises(UsageError, match="is no report"):
+        write_report(root, tmp_path / "own")
+    assert (tmp_path / "own" / "thesis.tex").read_text() == "mine"
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["camp", "other", "out", "own"]
+
+
+def test_budgets_stand_apart(tmp_path) -> None:
+    of = [
+        *cells(["rover/complex-1"], ["mesp", "cone"], budget=1000),
+        *cells(["rover/complex-1"], ["mesp", "cone"], budget=5000),
+    ]
+    root = write_campaign(tmp_path / "c", of, 2, 3)
+    with Tables(root / "tables") as tables:
+        sections = sections_of(tables, read_campaign(root))
+    groups = [section for section in sections if section.sections]
+    assert [section.name for section in groups] == ["rover-complex", "rover-complex-budget-2"]
+    assert [section.text[0] for section in groups] == [
+        f"Budget of a run: smoke, about {budget} team evaluations of 500 team-steps."
+        for budget in ("1,000", "5,000")
+    ]
+    names = [one.name for section in sections for one in section.all_exhibits()]
+    assert len(names) == len(set(names))
+    for section in groups:
+        (table,) = [e for e in section.all_exhibits() if e.name == f"{section.name}-performance"]
+        assert [row["n"] for row in table.rows] == [2, 2]
+
+
+@pytest.mark.parametrize(
+    "of",
+    [
+        [Cell("rover", "complex-1", "cone")],
+        [Cell("gacc", "complex-1", m, variant=v) for m in ("mesp", "cone") for v in ("a=1", "a=2")],
+        [Cell("rover", "complex-1", "cone"), Cell("rover", "complex-2", "own_method")],
+    ],
+    ids=["one run", "variants", "cells missing, a method of one's own"],
+)
+def test_odd_campaigns_have_a_report_too(of, tmp_path) -> None:
+    root = write_campaign(tmp_path / "c", of, 1, 2, without=["behaviours", "robots", "castes"])
+    text = write_report(root, tmp_path / "out").read_text()
+    assert "Cells with a single run have no deviation" in text
+
+
+def test_a_world_where_nothing_was_achieved_has_no_percentages(tmp_path) -> None:
+    of = cells(["rover/complex-1"], ["mesp", "cone"])
+    root = write_campaign(tmp_path / "c", of, 2, 3, mean=lambda cell: -1e6)
+    text = write_report(root, tmp_path / "out").read_text()
+    assert text.count("4 runs are left out: their unchanged team reached nothing") == 2
+
+
+def test_a_campaign_without_a_finished_run_says_so(tmp_path) -> None:
+    root = empty(tmp_path)
+    text = write_report(root, tmp_path / "out").read_text()
+    assert "0 of 4 planned runs are finished, 0 failed, 4 have not ended." in text
+
+
+def test_the_best_method_is_found_best(report) -> None:
+    """What the runs were made of comes out: each method 80 above the one before."""
+    rows = rows_of(report / "numbers/rover-complex-comparisons.csv")
+    pair = next(
+        r for r in rows if (r["environment"], r["first"], r["second"]) ==
+        ("complex-1", "CONE", "HomCNE")
+    )  # fmt: skip
+    truth = mean_of(Cell("rover", "complex-1", "cone")) - mean_of(
+        Cell("rover", "complex-1", "homcne")
+    )
+    assert float(pair["interval_low"]) < truth < float(pair["interval_high"])
+    assert pair["verdict"] == "above (t-test only)"
