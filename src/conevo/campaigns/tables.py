@@ -50,8 +50,9 @@ def seal_tables(places: Places, finished: Sequence[PlannedRun]) -> None:
     try:
         files = {name: (draft / f"{name}.jsonl").open("w", encoding="utf-8") for name in SCHEMA}
         with writing(places.tables):
+            cells: dict[str, list[RunConfig]] = {}
             for planned in finished:
-                for table, row in _rows(places, planned):
+                for table, row in _rows(places, planned, _configs(planned, cells)):
                     files[table].write(json.dumps(row, allow_nan=False) + "\n")
             for file in files.values():
                 file.close()
@@ -79,12 +80,22 @@ def _quoted(path: Path) -> str:
     return "'" + str(path).replace("'", "''") + "'"
 
 
-def _rows(places: Places, planned: PlannedRun) -> Iterator[tuple[str, Row]]:
+def _configs(planned: PlannedRun, cells: dict[str, list[RunConfig]]) -> list[RunConfig]:
+    """Return the configurations of a run of the same cell: all but the seed is the run's own."""
+    cell = json.dumps([planned.tasks, planned.method, planned.preset, planned.overrides])
+    if cell not in cells:
+        cells[cell] = planned.configs()
+    return cells[cell]
+
+
+def _rows(
+    places: Places, planned: PlannedRun, configs: Sequence[RunConfig]
+) -> Iterator[tuple[str, Row]]:
     """Yield every row that a finished run has in any table."""
     ended = places.ended(planned.label)
     spent = read_json(ended)["core_seconds"] if ended.is_file() else 0.0
     names = planned.names
-    for name, config in zip(names, planned.configs(), strict=True):
+    for name, config in zip(names, configs, strict=True):
         path = places.run(name)
         provenance = read_json(path / "provenance.json")
         lines = (path / "generations.jsonl").read_text(encoding="utf-8").splitlines()
@@ -126,7 +137,7 @@ def _run_row(
         "number": int(number) if is_numbered else 0,
         "method": config.method,
         "preset": config.preset,
-        "seed": config.run.seed,
+        "seed": planned.seed,
         "variant": planned.variant,
         "generations": len(records),
         "evaluations": records[-1]["team_evaluations"],
