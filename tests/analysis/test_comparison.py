@@ -139,6 +139,8 @@ def test_what_the_tests_say_is_said_apart_where_they_disagree() -> None:
 def test_too_few_runs_are_told_from_runs_that_differ_too_little() -> None:
     few = compare_all(cells_of({("complex-1", t): sample(m, 3) for t, m in ((HOM, 0), (CONE, 9))}))
     enough = compare_all(cells_of({("complex-1", t): sample(0, 4) for t in (HOM, CONE)}))
+    three = compare_all(cells_of({("complex-1", t): sample(0, 4) for t in (HOM, MESP, CONE)}))
+    assert three[0].too_few  # 3 x 2 / C(8, 4) = 0.086
     assert few[0].too_few  # 2 / C(6, 3) = 0.1
     assert not enough[0].too_few  # 2 / C(8, 4) = 0.029
 

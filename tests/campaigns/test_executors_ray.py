@@ -140,6 +140,17 @@ def test_no_cluster_at_an_address_is_one_clear_line(monkeypatch):
         make_executor("ray", address="auto")
 
 
+def test_a_node_that_does_not_start_in_time_is_one_clear_line(monkeypatch):
+    import ray
+
+    def init(*_, **options):
+        raise Exception("The current node timed out during startup.\nMore.")
+
+    monkeypatch.setattr(ray, "init", init)
+    with pytest.raises(EnvironmentFailure, match=r"^Ray at this machine: .* startup\. More\.$"):
+        make_executor("ray", 1)
+
+
 def test_ray_begins_nothing_that_calls_home_and_no_page():
     executor = make_executor("ray", 1)
     try:

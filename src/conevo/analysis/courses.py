@@ -73,7 +73,8 @@ class Histories:
 
     def grid(self, n: int) -> Floats:
         """Return n numbers of team evaluations, the last the most that a run spent."""
-        return np.round(np.linspace(0, self.evaluations.max(initial=0), n + 1)[1:])
+        most = float(self.evaluations.max(initial=0))
+        return np.array([round(most * k / n) for k in range(1, n + 1)], dtype=np.float64)
 
 
 def read_histories(tables: Tables, group: Group) -> Histories:

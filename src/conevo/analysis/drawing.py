@@ -198,7 +198,7 @@ def ticks_of(
         limits = (low, low + 1.04 * (high - low) if high > low else low + 1.0)
     found = MaxNLocator(n).tick_values(*limits)
     near = 1e-9 * (limits[1] - limits[0])
-    return [v for v in found.tolist() if limits[0] - near <= v <= limits[1] + near], limits
+    return [v for v in map(float, found) if limits[0] - near <= v <= limits[1] + near], limits
 
 
 def short(value: float) -> str:

@@ -222,7 +222,8 @@ def lines(
                 if name in of:
                     band, start = of[name], sum(map(len, x))
                     across, middle = field.at(*place, band.x, band.middle)
-                    shapes += _outline(*(field.at(*place, band.x, y)[1] for y in band[2:]), across)
+                    low, high = (field.at(*place, band.x, end)[1] for end in (band.low, band.high))
+                    shapes += _outline(low, high, across)
                     every = max(1, len(across) // 6)
                     shift = k * every // max(len(names), 1)
                     marked.append(np.arange(start + shift, start + len(across), every))

@@ -68,7 +68,8 @@ class RayCluster:
             options |= {"include_dashboard": False}
         try:
             self._ray.init(address or "local", **options)
-        except (ConnectionError, RuntimeError, ValueError, OSError) as error:
+        except Exception as error:  # Ray raises bare ones, as when a node is slow to start
+            self._ray.shutdown()
             line = " ".join(str(error).split())
             raise EnvironmentFailure(f"Ray at {address or 'this machine'}: {line}") from error
         nodes = [int(n["Resources"].get("CPU", 0)) for n in self._ray.nodes() if n["Alive"]]

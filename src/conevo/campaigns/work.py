@@ -29,7 +29,7 @@ from conevo.runs.shaping import Shaping, start_shaping
 
 __all__ = ["carry_out", "main", "planned_runs"]
 
-PATIENCE = 60.0  # seconds to wait for another worker that is just about to leave a run
+PATIENCE = 600.0  # seconds to wait for another worker that is just about to leave a run
 
 
 def planned_runs(root: Path) -> dict[str, PlannedRun]:
