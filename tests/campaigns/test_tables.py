@@ -47,6 +47,13 @@ def test_every_run_has_its_row_as_it_was(campaign, tables):
         )
 
 
+def test_costs_of_all_attempts_count(campaign, tables):
+    spent = {entry.label: entry.core_seconds for entry in campaign.ledger.entries()}
+    _, rows = tables.query("SELECT run, core_seconds FROM runs")
+    assert dict(rows) == pytest.approx(spent)
+    assert min(spent.values()) > 0
+
+
 def test_scores_are_those_of_the_testing_phase(campaign, tables):
     for label in campaign.planned:
         tested = Run(campaign.places.run(label)).test_result

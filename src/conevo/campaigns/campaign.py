@@ -197,7 +197,8 @@ class Campaign:
         """Make the tables of all that is finished, unless they are those already."""
         finished = [run for label, run in self.planned.items() if self.is_finished(label)]
         if finished:
-            seal_tables(self.places, finished)
+            spent = {entry.label: entry.core_seconds for entry in self.ledger.entries()}
+            seal_tables(self.places, finished, spent)
 
     def _reconcile(self) -> None:
         """Make the ledger say what the directories say."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import shutil
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -32,10 +32,15 @@ def is_sealed(places: Places, finished: Sequence[PlannedRun]) -> bool:
     return path.is_file() and read_json(path) == _manifest(finished)
 
 
-def seal_tables(places: Places, finished: Sequence[PlannedRun]) -> None:
+def seal_tables(places: Places, finished: Sequence[PlannedRun], spent: Mapping[str, float]) -> None:
     """Make the tables of these runs, unless they are there.
 
     A kill leaves the tables that were there before, or none.
+
+    Args:
+        places: of the campaign.
+        finished: its finished runs.
+        spent: core seconds by label, as far as the ledger knows them.
 
     Raises:
         UsageError: a file of a run is damaged.
@@ -52,7 +57,8 @@ def seal_tables(places: Places, finished: Sequence[PlannedRun]) -> None:
         with writing(places.tables):
             cells: dict[str, list[RunConfig]] = {}
             for planned in finished:
-                for table, row in _rows(places, planned, _configs(planned, cells)):
+                cost = max(spent.get(planned.label, 0.0), _last_cost(places, planned.label))
+                for table, row in _rows(places, planned, _configs(planned, cells), cost):
                     files[table].write(json.dumps(row, allow_nan=False) + "\n")
             for file in files.values():
                 file.close()
@@ -88,12 +94,16 @@ def _configs(planned: PlannedRun, cells: dict[str, list[RunConfig]]) -> list[Run
     return cells[cell]
 
 
+def _last_cost(places: Places, label: str) -> float:
+    """Return the core seconds of a run's last worker, which may have known no coordinator."""
+    ended = places.ended(label)
+    return float(read_json(ended)["core_seconds"]) if ended.is_file() else 0.0
+
+
 def _rows(
-    places: Places, planned: PlannedRun, configs: Sequence[RunConfig]
+    places: Places, planned: PlannedRun, configs: Sequence[RunConfig], cost: float
 ) -> Iterator[tuple[str, Row]]:
     """Yield every row that a finished run has in any table."""
-    ended = places.ended(planned.label)
-    spent = read_json(ended)["core_seconds"] if ended.is_file() else 0.0
     names = planned.names
     for name, config in zip(names, configs, strict=True):
         path = places.run(name)
@@ -110,7 +120,7 @@ def _rows(
                 "measure": measure,
                 "optimum": getattr(config.build_world(), "optimum", None),
                 "n_robots": len(test["champion"]["labels"]),
-                "core_seconds": spent / len(names),
+                "core_seconds": cost / len(names),
             },
         )
         for team, title in (("champion", "champion"), ("generation_0", "generation 0")):

@@ -56,7 +56,7 @@ def claims(tables: Tables) -> Section:
         "by Mann-Whitney with Holm's correction over the claim; alike: no significant difference, "
         "and the interval of the difference inside ±15 % of the larger mean."
     )
-    table = Table("claims", "Claims of the thesis", note, columns, about, numbers=rows)
+    table = Table("claims", "Claims of the thesis", note, columns, rows)
     return Section("Claims of the thesis", text, [table, _statements(found)])
 
 
