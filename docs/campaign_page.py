@@ -1,7 +1,6 @@
 """Put what a campaign says into its results page: ``python docs/campaign_page.py CAMPAIGN FOLDER``.
 
-Writes the report of a finished campaign into ``FOLDER/report`` (LaTeX, PDF and marl-eval's file are
-left out, since ``conevo report`` makes them again), and tables between the markers of
+Writes the report of a finished campaign into ``FOLDER/report``, and tables between the markers of
 ``FOLDER/README.md``: what was run and what it cost, performance, comparisons with CONE, castes and
 the claims of the thesis.
 """
@@ -10,7 +9,6 @@ from __future__ import annotations
 
 import shutil
 import sys
-import tempfile
 from pathlib import Path
 from statistics import fmean, stdev
 from typing import Any
@@ -24,8 +22,6 @@ from conevo.campaigns.campaign import Campaign
 from conevo.cli.find import sealed
 from conevo.evolution.methods.registry import METHODS
 from conevo.runs.run import Run
-
-KEPT = ("index.html", "figures/*.svg", "numbers/*.csv")
 
 
 def by_cell(values: list[Value]) -> dict[str, dict[str, list[float]]]:
@@ -156,15 +152,7 @@ def main() -> None:
     """Write the report and the page."""
     campaign = sealed(Campaign(Path(sys.argv[1])))
     folder = Path(sys.argv[2])
-    with tempfile.TemporaryDirectory() as draft:
-        report = write_report(campaign.path, Path(draft) / "report").parent
-        target = folder / "report"
-        shutil.rmtree(target, ignore_errors=True)
-        for pattern in KEPT:
-            for path in sorted(report.glob(pattern)):
-                copy = target / path.relative_to(report)
-                copy.parent.mkdir(parents=True, exist_ok=True)
-                shutil.copyfile(path, copy)
+    write_report(campaign.path, folder / "report")
     shutil.copyfile(campaign.places.plan, folder / "plan.toml")
     page = folder / "README.md"
     with Tables(campaign.places.tables) as tables:

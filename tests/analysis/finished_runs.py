@@ -42,7 +42,12 @@ TASKS = {
         (*(f"{kind}-{what}" for kind in "ABC" for what in ("detector", "gatherer")), "move"),
     ),
 }
-METRICS = ("specialization", "activity_entropy", "division_by_action")
+METRICS = (
+    "specialization",
+    "activity_entropy",
+    "division_by_action",
+    "hierarchic_social_entropy",
+)
 COLLECTIVES = ("entrapment", "pursuer-blocker", "spiders-fly", "role-switcher", "none")
 
 

@@ -251,3 +251,23 @@ def test_the_best_method_is_found_best(report) -> None:
     )
     assert float(pair["interval_low"]) < truth < float(pair["interval_high"])
     assert pair["verdict"] == "above (t-test only)"
+
+
+def test_diversity_that_pays_is_that_of_the_runs_of_a_cell(campaign, report) -> None:
+    with Tables(campaign / "tables") as tables:
+        value_of = {one.run: one.value for one in tables.values()}
+        _, found = tables.query(
+            "SELECT run, value FROM metrics JOIN runs USING (run) WHERE task = 'rover-v1/complex-2'"
+            " AND method = 'cone' AND metric = 'hierarchic_social_entropy'"
+        )
+    diversity = [value for _, value in found]
+    correlation = np.corrcoef(diversity, [value_of[run] for run, _ in found])[0, 1]
+    file = next((report / "numbers").glob("rover-complex*-specialization-measures.csv"))
+    (row,) = [
+        row
+        for row in rows_of(file)
+        if (row["environment"], row["method"], row["metric"])
+        == ("complex-2", "cone", "diversity that pays")
+    ]
+    assert float(row["mean"]) == pytest.approx(np.mean(diversity) * correlation, rel=1e-6)
+    assert row["n"] == "4"

@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from collections.abc import Mapping
 
 import numpy as np
 
-from conevo.analysis.comparison import Cell
+from conevo.analysis.comparison import Cell, Treatment
 from conevo.analysis.exhibits import Column, Section, Table, number, plain
 from conevo.analysis.sections.scope import Scope, named
+from conevo.specialization.diversity import task_specialization
 from conevo.specialization.team import METRICS
 
 __all__ = ["definitions", "metrics"]
+
+DIVERSITY = "hierarchic_social_entropy"
+PAYS = "diversity that pays"
 
 
 def metrics(scope: Scope) -> Section:
@@ -19,12 +24,15 @@ def metrics(scope: Scope) -> Section:
     title = "Measures of specialization"
     cells = {one.run: cell for cell, values in scope.cells.items() for one in values}
     found: dict[tuple[str, Cell], list[float]] = defaultdict(list)
+    diversity: dict[str, float] = {}
     listed = scope.tables.query(
         "SELECT run, metric, value FROM metrics WHERE isfinite(value) ORDER BY run, metric"
     )[1]
     for run, metric, value in listed:
         if run in cells:
             found[metric, cells[run]].append(value)
+            if metric == DIVERSITY:
+                diversity[run] = value
     if not found:
         return Section(title, ["No team of these runs was studied."])
     seen = {metric for metric, _ in found}
@@ -46,6 +54,8 @@ def metrics(scope: Scope) -> Section:
                         | {"metric": metric, "n": len(values), "mean": mean, "sd": sd}
                     )
             rows.append(row)
+        if diversity:
+            rows.append(_what_pays(scope, environment, treatments, diversity, numbers))
     columns = [
         Column("environment", "environment", plain),
         Column("metric", "measure", plain),
@@ -55,13 +65,33 @@ def metrics(scope: Scope) -> Section:
         f"{scope.stem}-specialization-measures",
         "Measures of specialization of the champions",
         "Mean over runs ± standard deviation of the runs, champions in fresh scenarios; what the "
-        "measures are and between which values they lie stands at the end of the report.",
+        "measures are and between which values they lie stands at the end of the report. "
+        f"{PAYS.capitalize()} is one number for all runs of a cell, from three on.",
         columns,
         rows,
         is_open=len(rows) <= 12,
         numbers=numbers,
     )
     return Section(title, (), [table])
+
+
+def _what_pays(
+    scope: Scope,
+    environment: str,
+    treatments: Mapping[Treatment, str],
+    diversity: Mapping[str, float],
+    numbers: list[dict[str, object]],
+) -> dict[str, str]:
+    """Return the part of diversity that pays, of each treatment, and add it to the numbers."""
+    row = {"environment": environment, "metric": PAYS}
+    for treatment in treatments:
+        ran = scope.cells.get(Cell(environment, treatment), ())
+        of = [one for one in ran if one.run in diversity]
+        part = task_specialization([diversity[one.run] for one in of], [one.value for one in of])
+        row[treatment.title] = number(part)
+        about = {"metric": PAYS, "n": len(of), "mean": part, "sd": None}
+        numbers.append(scope.key(environment, treatment) | about)
+    return row
 
 
 def definitions() -> Section:
@@ -75,6 +105,15 @@ def definitions() -> Section:
         }
         for name, metric in METRICS.items()
     ]
+    rows.append(
+        {
+            "name": PAYS,
+            "span": "plus or minus the hierarchic social entropy",
+            "what": "the runs' mean hierarchic social entropy times its correlation with their "
+            "task performance; below 0: diversity costs",
+            "source": "Li et al. 2004",
+        }
+    )
     columns = [
         Column("name", "measure", plain),
         Column("span", "range", plain),
