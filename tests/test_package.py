@@ -151,6 +151,6 @@ def test_no_tracked_file_names_a_registry_or_a_machine() -> None:
 
 def search(pattern: re.Pattern[str], path: Path) -> re.Match[str] | None:
     """The first hit of a pattern in a text file; pictures and arrays have none."""
-    if path.suffix in {".gif", ".npz", ".png"} or not path.is_file():
+    if path.suffix in {".gif", ".npz", ".pdf", ".png"} or not path.is_file():
         return None
     return pattern.search(path.read_text(encoding="utf-8"))
