@@ -77,7 +77,7 @@ def test_a_task_whose_time_is_up_lets_its_worker_leave_and_goes_back_into_the_qu
 def test_what_the_array_asks_for_is_what_was_said(tmp_path):
     campaign = tiny_campaign(tmp_path)
     script = slurm.write_array(
-        campaign.path, ["a", "b"], threads=8, hours=1.5, at_once=1, python="/opt/it's/python"
+        campaign.path, ["a", "b"], threads=8, hours=1.5, at_once=1, python="/srv/it's/python"
     )
     lines = script.read_text().splitlines()
     assert {
@@ -88,7 +88,7 @@ def test_what_the_array_asks_for_is_what_was_said(tmp_path):
         "#SBATCH --signal=B:USR1@180",
         "#SBATCH --requeue",
     } <= set(lines)
-    assert any("'/opt/it'\"'\"'s/python' -m conevo" in line for line in lines)
+    assert any("'/srv/it'\"'\"'s/python' -m conevo" in line for line in lines)
     assert (campaign.path / "slurm-runs.txt").read_text() == "a\nb\n"
     assert lines[0] == "#!/bin/bash"
     assert sys.executable in slurm.write_array(campaign.path, ["a"]).read_text()
