@@ -1,6 +1,9 @@
 """What teams of a group lose without a caste, and what clones of its fittest specialist do.
 
-Nitschke 2009, sections 4.6.5, 4.6.6, 5.5.3, 5.5.4, 6.5.4, 6.5.5.
+Nitschke 2009, sections 4.6.5, 4.6.6, 5.5.3, 5.5.4, 6.5.4, 6.5.5. Choice: what a run loses is told
+in percent of the larger of the two performances, as in the claims, so that a team that reached
+almost nothing before cannot outweigh all others; the thesis' percent of the unchanged team is that
+of the means.
 """
 
 from __future__ import annotations
@@ -26,9 +29,9 @@ class _Team(NamedTuple):
     value: float
 
     @property
-    def percent(self) -> float:
-        """What it reached of the unchanged team's, in percent."""
-        return 100 * self.value / self.whole
+    def lost(self) -> float:
+        """What is lost, in percent of the larger of the two: -100 to 100, below 0 if it gained."""
+        return 100 * (self.whole - self.value) / max(self.whole, self.value)
 
 
 def lesions(scope: Scope) -> Section:
@@ -38,7 +41,7 @@ def lesions(scope: Scope) -> Section:
         "lesion",
         "Lesions",
         "replaced by heuristic robots",
-        "All robots of a caste replaced by the heuristic controller that matches it; percent of "
+        "All robots of a caste replaced by the heuristic controller that matches it; compared with "
         "the same team unlesioned in the same fresh scenarios.",
     )
 
@@ -50,7 +53,7 @@ def clones(scope: Scope) -> Section:
         "clones",
         "Behavioural validation: clones",
         "cloned",
-        "A team of clones of the caste's fittest robot; percent of the evolved team in the same "
+        "A team of clones of the caste's fittest robot; compared with the evolved team in the same "
         "fresh scenarios.",
     )
 
@@ -60,8 +63,7 @@ def _section(scope: Scope, study: str, title: str, what: str, note: str) -> Sect
     text = []
     if lost:
         text.append(
-            f"{lost} runs are left out: their unchanged team reached nothing, so that there is no "
-            "percentage."
+            f"{lost} teams are left out: neither they nor the unchanged ones reached anything."
         )
     if not cells:
         return Section(title, text or ["No team of these runs was studied so."])
@@ -71,7 +73,7 @@ def _section(scope: Scope, study: str, title: str, what: str, note: str) -> Sect
 
 
 def _teams(scope: Scope, study: str) -> tuple[dict[Cell, list[_Team]], int]:
-    """Return the changed teams of each cell by run, and how many runs have no percentage."""
+    """Return the changed teams of each cell by run, and how many of them have nothing to lose."""
     found = scope.tables.query(
         f"""
         SELECT s.run, s.team, avg(s.value) FROM scores s JOIN runs r USING (run)
@@ -88,10 +90,11 @@ def _teams(scope: Scope, study: str) -> tuple[dict[Cell, list[_Team]], int]:
         for one in runs:
             of = dict(values.get(one.run, {}))
             whole = of.pop("whole", None)
-            if whole is not None and not whole > 0:
-                lost += 1
-            elif whole is not None:
-                teams += [_Team(one.run, caste, whole, value) for caste, value in of.items()]
+            if whole is not None:
+                own = [_Team(one.run, caste, whole, value) for caste, value in of.items()]
+                able = [team for team in own if max(team.whole, team.value) > 0]
+                teams += able
+                lost += len(own) - len(able)
         if teams:
             cells[cell] = teams
     return cells, lost
@@ -105,7 +108,7 @@ def _figure(
     for cell, teams in cells.items():
         of_run = defaultdict(list)
         for team in teams:
-            of_run[team.run].append(team.percent)
+            of_run[team.run].append(team.lost)
         means[cell] = [sum(values) / len(values) for values in of_run.values()]
     names = named(scope.treatments, means)
     environments = [e for e in scope.environments if any(cell.environment == e for cell in means)]
@@ -117,16 +120,17 @@ def _figure(
     rows = [
         scope.key(cell.environment, cell.treatment)
         | {"run": team.run, "caste": team.caste, "whole": team.whole, scope.measure: team.value}
-        | {"percent": team.percent}
+        | {"lost": team.lost}
         for cell, teams in cells.items()
         for team in teams
     ]
     size = sizes(len(values) for values in means.values())
     return Figure(
         f"{scope.stem}-{study}",
-        f"Task performance ({scope.unit}) with a caste {what}, percent of the team as it was",
-        f"{note} A point per run: the mean over its castes; beside them the mean with Student's "
-        f"95 % interval. {size} per cell.",
+        f"Task performance ({scope.unit}) that is lost with a caste {what}",
+        f"{note} Percent of the larger of the two; below 0 the changed team reached more. A point "
+        "per run: the mean over its castes; beside them the mean with Student's 95 % interval. "
+        f"{size} per cell.",
         (),
         rows,
         drawing=figures.points(
@@ -142,8 +146,8 @@ def _figure(
                 for name, of in estimates.items()
             },
             x_label=scope.axis,
-            y_label="% of the unchanged team",
-            reference=100.0,
+            y_label="lost, % of the larger",
+            reference=0.0,
         ),
     )
 
@@ -154,16 +158,22 @@ def _rows(scope: Scope, cells: dict[Cell, list[_Team]]) -> list[dict[str, Any]]:
         for caste in sorted({team.caste for team in teams}):
             with_it = [team for team in teams if team.caste == caste]
             result = compare([team.value for team in with_it], [team.whole for team in with_it])
-            percent = mean_interval([team.percent for team in with_it])
+            lost = mean_interval([team.lost for team in with_it])
+            of = _percent(result.mean_a, result.mean_b)
             rows.append(
                 scope.key(cell.environment, cell.treatment)
                 | {"caste": caste, "n": len(with_it)}
-                | {"whole": result.mean_b, "changed": result.mean_a, "percent": percent.value}
-                | {"interval": (percent.low, percent.high)}
+                | {"whole": result.mean_b, "changed": result.mean_a, "percent": of}
+                | {"lost": lost.value, "interval": (lost.low, lost.high)}
                 | {"p_t": result.p_t, "p_mann_whitney": result.p_mann_whitney}
             )
     corrected = holm([row["p_mann_whitney"] for row in rows])
     return [row | {"p_holm": p} for row, p in zip(rows, corrected, strict=True)]
+
+
+def _percent(changed: float | None, whole: float | None) -> float | None:
+    """Return what is left of the whole, None where there is none."""
+    return 100 * changed / whole if changed is not None and whole else None
 
 
 def _table(scope: Scope, study: str, what: str, note: str, rows: list[dict[str, Any]]) -> Table:
@@ -174,15 +184,17 @@ def _table(scope: Scope, study: str, what: str, note: str, rows: list[dict[str, 
         Column("n", "n"),
         Column("whole", "unchanged"),
         Column("changed", what.split()[0]),
-        Column("percent", "%"),
-        Column("interval", "95 % interval of %", interval),
+        Column("percent", "% of unchanged"),
+        Column("lost", "lost, %"),
+        Column("interval", "95 % interval", interval),
         Column("p_t", "p (t)", p_value),
         Column("p_holm", "p (MW, Holm)", p_value),
     ]
     return Table(
         f"{scope.stem}-{study}-castes",
         f"Task performance ({scope.unit}) with a caste {what}",
-        f"{note} n: runs that have the caste; 95 % interval: Student's t. p (t): Student's "
+        f"{note} n: runs that have the caste; % of unchanged: of the means; lost: percent of the "
+        "larger of the two, mean over runs with Student's 95 % interval. p (t): Student's "
         "independent t-test of changed and unchanged teams, uncorrected, as in the thesis; p (MW, "
         f"Holm): Mann-Whitney, corrected by Holm for the {len(rows)} rows.",
         columns,
