@@ -2,6 +2,7 @@
 
 import json
 import shutil
+import time
 
 import pytest
 
@@ -68,7 +69,12 @@ def test_a_campaign_is_carried_out_and_its_runs_are_as_any_other(tmp_path):
 
 def test_serial_runs_have_all_cores_one_after_the_other(tmp_path):
     campaign = tiny_campaign(tmp_path)
-    assert {e.state for e in campaign.carry_on(Serial(2)).values()} == {"finished"}
+    began = time.process_time()
+    entries = campaign.carry_on(Serial(2), threads=2)
+    assert {entry.state for entry in entries.values()} == {"finished"}
+    costs = [entry.core_seconds for entry in entries.values()]
+    assert min(costs) > 0
+    assert sum(costs) <= time.process_time() - began + 0.01
     sessions = [Run(campaign.places.run(x)).provenance["sessions"] for x in campaign.planned]
     assert [[one["threads"] for one in of_run] for of_run in sessions] == [[2]] * 4
 

@@ -9,6 +9,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -211,6 +212,27 @@ def test_workers_that_are_stopped_write_their_checkpoint_and_are_gone(name, camp
     until(lambda: n_generations(made, label) > done)
     executor.stop()
     assert run.provenance["sessions"][1]["from_generation"] in (done - 1, done)  # records go first
+
+
+def test_workers_leave_also_where_interrupts_are_ignored(campaign):
+    """As in a job that a shell has put into the background."""
+    made = campaign(ENDLESS)
+    (label,) = made.planned
+    executor = make_executor("processes", 1)
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        executor.submit(Job(made.path, label, 1))
+    finally:
+        signal.signal(signal.SIGINT, before)
+    until(lambda: n_generations(made, label) > 0)
+    stopping = threading.Thread(target=executor.stop)
+    stopping.start()
+    stopping.join(timeout=20)
+    left = workers(made.path)
+    for process in left:
+        os.kill(process, signal.SIGKILL)
+    stopping.join()
+    assert left == {}
 
 
 @every_executor

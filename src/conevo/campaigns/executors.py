@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import ClassVar, Protocol
 
 from conevo.campaigns.places import Places
-from conevo.campaigns.work import carry_out
+from conevo.campaigns.work import carry_out, core_seconds
 from conevo.errors import UsageError, unknown_name
 
 __all__ = ["EXECUTORS", "Ending", "Executor", "Job", "make_executor", "usable_cores"]
@@ -73,13 +73,12 @@ class Serial:
     name: ClassVar[str] = "serial"
 
     def __init__(self, cores: int) -> None:
-        self.cores = 1  # one run at a time, which has them all
-        self._threads = cores
+        self.cores = cores
         self._endings: list[Ending] = []
 
     def submit(self, job: Job) -> None:
         """Carry the job out now; Ctrl-C reaches the run itself."""
-        carry_out(job.root, job.label, self._threads)
+        carry_out(job.root, job.label, job.threads, spent_before=core_seconds())
         self._endings.append(Ending(job.label))
 
     def wait(self, seconds: float) -> list[Ending]:

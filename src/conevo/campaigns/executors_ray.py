@@ -9,7 +9,6 @@ all nodes see it, or else in an object store, from where they are fetched.
 from __future__ import annotations
 
 import os
-import subprocess
 import tempfile
 import time
 from contextlib import suppress
@@ -17,14 +16,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, ClassVar
 
-from conevo.campaigns.executors import (
-    ONE_THREAD,
-    Ending,
-    Job,
-    usable_cores,
-    why_lost,
-    worker_command,
-)
+from conevo.campaigns.executors import Ending, Job, spawn, usable_cores, why_lost
 from conevo.campaigns.object_store import ObjectStore
 from conevo.campaigns.places import Places
 from conevo.errors import EnvironmentFailure, UsageError
@@ -145,17 +137,7 @@ def _supervise(job: Job, copies: ObjectStore | None = None) -> int:
 
     The worker also leaves when this process is killed: its stdin ends then.
     """
-    log = Places(job.root).log(job.label)
-    log.parent.mkdir(exist_ok=True)
-    with log.open("ab") as file:
-        worker = subprocess.Popen(
-            worker_command(job),
-            stdin=subprocess.PIPE,
-            stdout=file,
-            stderr=file,
-            start_new_session=True,
-            env=os.environ | dict.fromkeys(ONE_THREAD, "1"),
-        )
+    worker = spawn(job)
     try:
         copied = time.monotonic()
         while worker.poll() is None:

@@ -12,6 +12,7 @@ import json
 import os
 import platform
 import resource
+import signal
 import sys
 import threading
 import time
@@ -27,7 +28,7 @@ from conevo.runs.durable import replace_file
 from conevo.runs.run import Run, start
 from conevo.runs.shaping import Shaping, start_shaping
 
-__all__ = ["carry_out", "main", "planned_runs"]
+__all__ = ["carry_out", "core_seconds", "main", "planned_runs"]
 
 PATIENCE = 600.0  # seconds to wait for another worker that is just about to leave a run
 
@@ -52,13 +53,14 @@ def planned_runs(root: Path) -> dict[str, PlannedRun]:
     return {run.label: run for run in runs}
 
 
-def carry_out(root: Path, label: str, threads: int) -> bool:
+def carry_out(root: Path, label: str, threads: int, *, spent_before: float = 0.0) -> bool:
     """Carry a run on to its end, study it, and write down how it ended.
 
     Args:
         root: the campaign's directory.
         label: which of its runs.
         threads: CPU threads; no result depends on it.
+        spent_before: core seconds of this process that are not the run's.
 
     Returns:
         Whether it is finished. If not, ``ended/LABEL.json`` says why.
@@ -75,10 +77,9 @@ def carry_out(root: Path, label: str, threads: int) -> bool:
             _study(places, planned[label], found, threads)
     except Exception as error:
         ending = {"status": "failed", **_describe(error)}
-    spent = resource.getrusage(resource.RUSAGE_SELF)
     ending |= {
         "threads": threads,
-        "core_seconds": round(spent.ru_utime + spent.ru_stime, 3),
+        "core_seconds": round(core_seconds() - spent_before, 3),
         "wall_seconds": round(time.perf_counter() - began, 3),
         "host": platform.node(),
     }
@@ -86,6 +87,12 @@ def carry_out(root: Path, label: str, threads: int) -> bool:
     path.parent.mkdir(exist_ok=True)
     replace_file(path, as_json(ending))
     return bool(ending["status"] == "finished")
+
+
+def core_seconds() -> float:
+    """Return the core seconds that this process has had."""
+    spent = resource.getrusage(resource.RUSAGE_SELF)
+    return spent.ru_utime + spent.ru_stime
 
 
 def _describe(error: Exception) -> dict[str, str]:
@@ -147,6 +154,8 @@ def _frozen(value: Any) -> Any:
 def main() -> None:
     """Carry out one run; end when the coordinator does, which holds the other end of stdin."""
     root, label, threads = sys.argv[1:]
+    # A shell's background jobs ignore interrupts, and what they begin does so, too.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
     def leave_with_coordinator() -> None:
         sys.stdin.buffer.read()

@@ -49,8 +49,10 @@ def ready(
         UsageError: options that do not go together, an unknown executor or one not installed.
     """
     made = make_executor(executor, cores, address, store)
-    if threads > made.cores and executor != "serial":
+    if threads > made.cores:
         raise UsageError(f"--threads {threads}: there are only {made.cores} cores to use")
+    if executor == "serial":
+        threads = made.cores  # of the only run at work
     return Execution(made, threads, style_of(as_json, quiet, False))
 
 
