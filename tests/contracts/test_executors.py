@@ -52,6 +52,8 @@ method = "hetcne"
 settings = {{ "method.genotypes" = 20, "run.budget_evaluations" = 1 }}
 """
 
+COORDINATORS: list[subprocess.Popen[str]] = []
+
 
 @pytest.fixture
 def campaign(tmp_path):
@@ -101,9 +103,25 @@ def coordinate(campaign, name):
         "from conevo.campaigns.executors import make_executor\n"
         f"Campaign({str(campaign.path)!r}).carry_on(make_executor({name!r}, 1))\n"
     )
-    return subprocess.Popen(
-        [sys.executable, "-c", code], start_new_session=True, stderr=subprocess.PIPE, text=True
+    begun = subprocess.Popen(
+        [sys.executable, "-c", code],
+        start_new_session=True,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
+    COORDINATORS.append(begun)
+    return begun
+
+
+@pytest.fixture(autouse=True)
+def none_left_behind():
+    """Kill the coordinators of a test that failed: their runs never end."""
+    yield
+    for process in COORDINATORS:
+        if process.poll() is None:
+            os.killpg(process.pid, signal.SIGKILL)
+    COORDINATORS.clear()
 
 
 def assert_finished(campaign, undisturbed):
@@ -283,8 +301,8 @@ def test_no_more_threads_are_at_work_than_cores(name, campaign):
         seen.append(sum(threads))
 
     executor = make_executor(name, 2)
-    assert executor.cores == (1 if name == "serial" else 2)
-    made.carry_on(executor, threads=1, watch=count)
+    assert executor.cores == 2
+    made.carry_on(executor, threads=2 if name == "serial" else 1, watch=count)
     assert max(seen) == (0 if name == "serial" else 2)
     used = [run_of(made, label).provenance["sessions"][0]["threads"] for label in made.planned]
     assert used == ([2, 2, 2] if name == "serial" else [1, 1, used[2]])
