@@ -263,11 +263,13 @@ def test_a_killed_coordinator_loses_nothing_and_nothing_is_run_twice(name, campa
     coordinator.wait()
     until(lambda: not workers(made.path))
     assert not made.is_running
-    assert [one.state for one in made.standings().values()] == ["finished", "pending"]
+    states = [one.state for one in made.standings().values()]
+    # Ray takes its time to notice, so that a run may come to its end meanwhile.
+    assert states in [["finished", "pending"], *([["finished"] * 2] if name == "ray" else [])]
     made.carry_on(make_executor(name, 1))
     sessions = [run_of(made, label).provenance["sessions"] for label in (first, second)]
-    assert [len(some) for some in sessions] == [1, 2]
-    assert sessions[1][1]["from_generation"] >= 2
+    assert [len(some) for some in sessions] == [1, 1 + states.count("pending")]
+    assert all(one["from_generation"] >= 2 for one in sessions[1][1:])
     assert_finished(made, undisturbed)
 
 

@@ -9,6 +9,7 @@ all nodes see it, or else in an object store, from where they are fetched.
 from __future__ import annotations
 
 import os
+import signal
 import tempfile
 import time
 from contextlib import suppress
@@ -137,6 +138,8 @@ def _supervise(job: Job, copies: ObjectStore | None = None) -> int:
 
     The worker also leaves when this process is killed: its stdin ends then.
     """
+    # A shell's background jobs ignore interrupts; so would Ray's worker, which is cancelled by one.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     worker = spawn(job)
     try:
         copied = time.monotonic()
