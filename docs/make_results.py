@@ -7,8 +7,7 @@ it. Writes ``NAME.csv`` (one row per run), ``NAME-curves.csv`` (every tenth part
 ``NAME.png`` (learning curves), and puts the tables between the markers of ``NAME.md``. Where the
 world has teams to compare with (heuristic ones, random networks), they play the same test
 scenarios; what predators do is in ``NAME-behaviours.csv``. Shapings in the same directory, in
-environments of the same world, get a table and a picture of their own (``shaped_tables.py``). Needs
-matplotlib.
+environments of the same world, get a table and a picture of their own (``shaped_tables.py``).
 """
 
 from __future__ import annotations

@@ -29,7 +29,7 @@ def remaining_seconds(
     """
     planned = campaign.planned
     known: dict[tuple[str, ...], list[float]] = {}
-    left = spent = 0.0
+    left = 0.0
     for label, entry in entries.items():
         seconds = entry.core_seconds if entry.state == "finished" else 0.0
         if seconds > 0:

@@ -20,6 +20,7 @@ from conevo.analysis.exhibits import (
     p_value,
     plain,
 )
+from conevo.analysis.ranks import EXACT_RUNS
 from conevo.analysis.sections.scope import Scope, place_names, sizes
 from conevo.analysis.statistics import ALPHA
 
@@ -27,9 +28,9 @@ __all__ = ["comparisons"]
 
 TESTS = (
     "p (t): Student's independent t-test, two-sided, uncorrected, as in the thesis; p (Welch): the "
-    "same without equal variances; p (MW): Mann-Whitney, exact; p (MW, Holm): the same, corrected "
-    "by Holm for all {n} pairs of this table; A12: probability that a run of the first is "
-    "above one of the second (Vargha and Delaney)."
+    "same without equal variances; p (MW): Mann-Whitney, exact up to {exact} runs; p (MW, Holm): "
+    "the same, corrected by Holm for all {n} pairs of this table; A12: probability that a run of "
+    "the first is above one of the second (Vargha and Delaney)."
 )
 
 
@@ -129,7 +130,7 @@ def _pair_table(
         Column("a12", "A12"),
         Column("verdict", "tests say", plain),
     ]
-    tests = TESTS.format(n=pairs[0].n_tests if pairs else 0)
+    tests = TESTS.format(n=pairs[0].n_tests if pairs else 0, exact=EXACT_RUNS)
     note = (
         f"Difference: mean of the first less that of the second; 95 % interval: Welch; {tests} "
         "Alike: no test below 0.05 and the interval inside ±15 % of the larger mean."
