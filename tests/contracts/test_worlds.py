@@ -1,5 +1,6 @@
 """What every world promises, for each environment family of the registry."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -118,6 +119,14 @@ def test_record_equals_evaluate_bit_for_bit(some_world):
         n_inputs = some_world.controller.n_inputs
         assert seen["inputs"].shape == (ITERATIONS, some_world.n_robots, n_inputs)
         assert seen["fitness"][-1].tobytes() == out.fitness[n, 0].tobytes()
+        ended = np.array([out.performance[name][n, 0] for name in some_world.performance])
+        assert seen["performance"][-1].tobytes() == ended.tobytes()
+        shorter = replace(some_world.params, iterations=10)
+        early = Rollout(replace(some_world, params=shorter)).evaluate(
+            genes, teams[n : n + 1], scenarios, heuristic[n : n + 1]
+        )
+        ended = np.array([early.performance[name][0, 0] for name in some_world.performance])
+        assert seen["performance"][9].tobytes() == ended.tobytes()
         for name in some_world.simulation().recorded_at_end:
             size = some_world.simulation().sizes.get(name, some_world.n_robots)
             assert seen[name].shape == (size,)

@@ -7,9 +7,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from conevo.errors import EnvironmentFailure
+from conevo.errors import EnvironmentFailure, UsageError
 
-__all__ = ["append_line", "replace_file", "sync_directory", "writing"]
+__all__ = ["append_line", "replace_file", "sync_directory", "write_new", "writing"]
 
 
 @contextmanager
@@ -39,6 +39,22 @@ def replace_file(path: Path, data: bytes) -> None:
             draft.unlink(missing_ok=True)
             raise
         sync_directory(path.parent)
+
+
+def write_new(path: Path, data: bytes) -> None:
+    """Write a file, all at once; one that is there already is left as it is.
+
+    Raises:
+        UsageError: something else is there; the same bytes are no reason.
+        EnvironmentFailure: it cannot be written.
+    """
+    if path.is_symlink() or path.exists():
+        if path.is_file() and path.read_bytes() == data:
+            return
+        raise UsageError(f"{path} exists and is something else; choose another place with --out")
+    with writing(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+    replace_file(path, data)
 
 
 def append_line(path: Path, line: str) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -157,6 +158,49 @@ class Run:
     def team(self, generation: int) -> Team | None:
         """Return the fittest team of a generation, None if it was not kept."""
         return self._store.load_team(generation)
+
+    def team_again(
+        self, generation: int, lab: Lab, progress: Callable[[int, int], None] | None = None
+    ) -> Team:
+        """Return the fittest team of a generation; one that was not kept is evolved again.
+
+        Args:
+            generation: any finished one.
+            lab: this run's.
+            progress: told the generations done and wanted, if the team was not kept.
+
+        Raises:
+            UsageError: no such generation, or evolving again does not give what the log says.
+        """
+        records = self.generations()
+        if not 0 <= generation < len(records):
+            last = f"0 to {len(records) - 1}" if records else "none yet"
+            raise UsageError(f"{self.path} has no generation {generation} (it has {last})")
+        kept = self.team(generation)
+        if kept is not None:
+            return kept
+        teams: list[Team] = []
+
+        def keep(state: State, record: Record) -> None:
+            if record["team_fitness"] != records[record["generation"]]["team_fitness"]:
+                raise UsageError(
+                    f"{self.path}: generation {record['generation']} does not come out again as "
+                    f"its log says, so the team of generation {generation} is lost"
+                )
+            teams[:] = [fittest_team(state, record["generation"])]
+            if progress is not None:
+                progress(record["generation"] + 1, generation + 1)
+
+        evolve_generations(
+            lab.method,
+            self._store.load_origin(self.config.method) or lab.first_state(),
+            lab.evaluate,
+            settings=replace(self.config.run, generations=generation + 1, target=None),
+            castes=lab.world.castes,
+            iterations=lab.world.params.iterations,
+            on_generation=keep,
+        )
+        return teams[0]
 
     def ancestry(self) -> tuple[State, Record]:
         """Return the state this finished run ended with, and what its descendants say about it.

@@ -229,8 +229,10 @@ class Rollout:
             heuristic: [R] or None.
 
         Returns:
-            The world's recorded arrays, each [T, its size], those it records at the end as they
-            are, and ``inputs`` [T, R, sensors + context].
+            The world's recorded arrays, each [T, its size], and those it records at the end as they
+            are; ``inputs`` [T, R, sensors + context], of every iteration with the context that it
+            left; ``sums`` [T, R, outputs], weighted sums of the output units; ``performance``
+            [T, measures], each as if the epoch ended there.
         """
         if len(scenarios) != 1:
             raise ValueError(f"record takes one scenario, got {len(scenarios)}")
@@ -239,18 +241,20 @@ class Rollout:
         )
         scene, batch = self._scene(scenarios), self._batch(1)
         job = self._job(genes, teams, modes, 1)
-        steps: dict[str, list[npt.NDArray[Any]]] = {n: [] for n in self._simulation.recorded}
-        inputs: list[npt.NDArray[Any]] = []
-        r, n_inputs, sizes = self.world.n_robots, self._shape.n_inputs, self._sizes
+        names = dict.fromkeys((*self._simulation.recorded, "performance"))
+        steps: dict[str, list[npt.NDArray[Any]]] = {name: [] for name in (*names, "inputs", "sums")}
+        state, sizes, r = batch.state, self._sizes, self.world.n_robots
+        n_inputs, n_outputs = self._shape.n_inputs, self._shape.n_outputs
         for t in range(self.world.params.iterations):
             job.t_begin, job.t_end = t, t + 1
             self._launch(batch, scene, job, 1)
-            for name, values in steps.items():
-                values.append(getattr(batch.state, name).numpy()[: sizes[name]].copy())
-            first = batch.state.nets.inputs.numpy()[: r * n_inputs]
-            inputs.append(first.reshape(r, n_inputs).copy())
-        final = {n: getattr(batch.state, n).numpy() for n in self._simulation.recorded_at_end}
-        return {name: np.stack(values) for name, values in (steps | {"inputs": inputs}).items()} | {
+            for name in names:
+                steps[name].append(getattr(state, name).numpy()[: sizes[name]].copy())
+            inputs = state.nets.inputs.numpy()[: r * n_inputs]
+            steps["inputs"].append(inputs.reshape(r, n_inputs).copy())
+            steps["sums"].append(state.nets.sums.numpy()[:r, :n_outputs].copy())
+        final = {n: getattr(state, n).numpy() for n in self._simulation.recorded_at_end}
+        return {name: np.stack(values) for name, values in steps.items()} | {
             name: values[: sizes[name]].copy() for name, values in final.items()
         }
 
@@ -284,9 +288,13 @@ class Rollout:
         scene = self._simulation.scene()
         for name in self._simulation.scene.vars:
             values = getattr(scenarios, name)
-            is_shared = self._simulation.scene.vars[name].type.ndim > 1
-            setattr(scene, name, self._array(values if is_shared else values.ravel()))
+            setattr(scene, name, self._array(values if self.is_shared(name) else values.ravel()))
         return scene
+
+    def is_shared(self, name: str) -> bool:
+        """Return whether all scenarios have a field of theirs in common."""
+        field = self._simulation.scene.vars.get(name)
+        return field is not None and field.type.ndim > 1
 
     def _array(self, values: npt.NDArray[Any]) -> Any:
         dtype = wp.dtype_from_numpy(values.dtype)

@@ -1,0 +1,49 @@
+"""The replay of one or two teams as one page that needs no network and no server."""
+
+from __future__ import annotations
+
+import base64
+import json
+import zlib
+from collections.abc import Sequence
+from importlib import resources
+from importlib.metadata import version
+
+from conevo.errors import UsageError
+from conevo.replay.stage import Pool, Stage
+
+__all__ = ["FORMAT", "replay_page"]
+
+FORMAT = 1
+PLACE = "<!-- conevo:data -->"  # in the viewer's page, where the data go
+# Inside a script element nothing may end it: these are written as JSON escapes.
+_ESCAPED = {ord(sign): f"\\u{ord(sign):04x}" for sign in "<>&\u2028\u2029"}
+
+
+def replay_page(stages: Sequence[Stage]) -> str:
+    """Return the viewer with the data of its teams; the same stages always give the same page.
+
+    Args:
+        stages: one team, or two in the same scenario, side by side.
+
+    Raises:
+        UsageError: two teams whose epochs are not equally long.
+    """
+    if not 1 <= len(stages) <= 2:
+        raise ValueError(f"a page shows one team or two, not {len(stages)}")
+    lengths = sorted({stage.iterations for stage in stages})
+    if len(lengths) > 1:
+        raise UsageError(f"epochs of {lengths[0]} and {lengths[1]} iterations: not side by side")
+    pool = Pool()
+    teams = [pool.plain(stage) for stage in stages]
+    about = {"format": FORMAT, "conevo": version("conevo"), "teams": teams}
+    text = json.dumps(about, allow_nan=False, separators=(",", ":")).translate(_ESCAPED)
+    data = base64.b64encode(zlib.compress(pool.data, 9)).decode()
+    viewer = resources.files("conevo.replay").joinpath("viewer/dist/replay.html").read_text("utf-8")
+    before, found, after = viewer.partition(PLACE)
+    if not found:
+        raise RuntimeError(f"the viewer has no {PLACE}")
+    return (
+        f'{before}<script type="application/json" id="about">{text}</script>\n'
+        f'<script type="application/octet-stream" id="data">{data}</script>{after}'
+    )

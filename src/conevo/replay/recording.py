@@ -1,0 +1,202 @@
+"""Recording: the team of a run plays one epoch again, with the kernels that it evolved with."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from conevo.analysis.fittest import equip
+from conevo.controllers import ControllerSpec
+from conevo.errors import UsageError
+from conevo.replay.channel import Channel
+from conevo.replay.trajectory import FORMAT, About, Trajectory
+from conevo.rng import fold
+from conevo.runs.evaluation import describe
+from conevo.runs.run import Run
+from conevo.worlds.protocol import World
+from conevo.worlds.rollout import Rollout
+
+__all__ = ["hidden_activations", "record", "record_epoch"]
+
+Array = npt.NDArray[Any]
+# What a replay does not need of a scenario: what only kernels look at.
+_UNSEEN = ("seed", "cell", "clamp", "prey_in", "prey_out")
+
+
+def record(
+    run: Run,
+    generation: int | None = None,
+    epoch: int = 0,
+    *,
+    threads: int | None = None,
+    like: Trajectory | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Trajectory:
+    """Record one epoch of a run's team.
+
+    Args:
+        run: finished or not.
+        generation: whose fittest team; by default the champion, the fittest of all so far.
+        epoch: number of the scenario among those that the run's testing phase draws, from 0.
+        threads: CPU threads, all by default; changes no result.
+        like: another run's trajectory of the same task: its scenario is played instead.
+        progress: told the generations done and wanted while the run is evolved again.
+
+    Raises:
+        UsageError: no generation has finished yet, no such generation, made with other kernels, or
+            the other trajectory is of another task.
+    """
+    champion, lab = equip(run, threads)
+    team = champion
+    if generation is not None and generation != champion.generation:
+        team = run.team_again(generation, lab, progress)
+    scenario = fold(run.config.run.seed, "test", epoch)
+    if like is not None:
+        _refuse_other(run, lab.world, like)
+        scenario, epoch = like.about["scenario"], like.about["epoch"]
+    genes, rows = team.as_trial()
+    about, channels = record_epoch(lab.rollout, genes, rows[0], scenario)
+    config = run.config
+    return Trajectory(
+        about
+        | {
+            "task": config.task,
+            "method": config.method,
+            "label": config.label,
+            "run_id": config.run_id,
+            "seed": config.run.seed,
+            "generation": team.generation,
+            "epoch": epoch,
+        },
+        channels,
+    )
+
+
+def _refuse_other(run: Run, world: World, like: Trajectory) -> None:
+    """Raise UsageError if the run's world is not the one of a trajectory."""
+    there = like.about
+    here = {"world": world.name, "environment": world.environment, "params": _params(world)}
+    for key, value in here.items():
+        if there[key] != value:  # type: ignore[literal-required]
+            what = f"{there['task']} of {there['label']}"
+            if key == "params":
+                named: dict[str, Any] = value  # type: ignore[assignment]
+                other = next(n for n in named if named[n] != there["params"].get(n))
+                what += f", whose world.{other} is {there['params'].get(other)!r}"
+                what += f" (here {named[other]!r})"
+            raise UsageError(f"{run.path} is of {run.config.task}: it cannot play {what}")
+
+
+def record_epoch(
+    rollout: Rollout,
+    genes: npt.NDArray[np.float32],
+    team: npt.NDArray[np.int32],
+    scenario: int,
+    heuristic: npt.NDArray[np.int32] | None = None,
+) -> tuple[About, dict[str, Channel]]:
+    """Record any team in one scenario.
+
+    Args:
+        rollout: of the world.
+        genes: pool of neuron genotypes [K, G].
+        team: pool rows [R, U], -1 for an empty slot.
+        scenario: its key.
+        heuristic: [R] index of a heuristic controller, -1 for the network; None for networks.
+
+    Returns:
+        What is known of it, of no run; and the channels.
+    """
+    world, spec = rollout.world, rollout.world.controller
+    scenes = world.scenarios([scenario])
+    modes = np.full(world.n_robots, -1, np.int32) if heuristic is None else heuristic
+    seen = rollout.record(genes, team, scenes, modes)
+    outcome = rollout.evaluate(genes, team[None], scenes, modes[None])
+    portrait = describe(outcome, world.castes)
+    inputs, sums = seen.pop("inputs"), seen.pop("sums")
+    seen.pop("counts", None)
+    has_network = modes < 0
+    for name, values in {**seen, "fitness": outcome.fitness}.items():
+        if not np.isfinite(values).all():
+            raise UsageError(f"the world's {name} is not finite here: the epoch cannot be kept")
+    channels = {name: Channel.of(values) for name, values in seen.items()}
+    channels["sensors"] = Channel.of(inputs[:, :, : spec.n_sensors])
+    hidden = hidden_activations(spec, genes, team, inputs) * has_network[:, None]
+    channels["hidden"] = Channel.of(hidden, bits=8)
+    channels["outputs"] = Channel.of(_sigmoid(sums) * has_network[:, None], bits=8)
+    for name in vars(scenes):
+        if name not in _UNSEEN:
+            is_shared = rollout.is_shared(name)
+            values = getattr(scenes, name)
+            channels[f"scene/{name}"] = Channel.of(values if is_shared else values[0])
+    names = ("", *world.heuristics)
+    about: About = {
+        "format": FORMAT,
+        "conevo": version("conevo"),
+        "kernel_hash": rollout.kernel_hash,
+        "world": world.name,
+        "environment": world.environment,
+        "task": f"{world.name}/{world.environment}",
+        "method": "",
+        "label": "",
+        "run_id": "",
+        "seed": 0,
+        "generation": 0,
+        "epoch": 0,
+        "scenario": scenario,
+        "iterations": world.params.iterations,
+        "n_robots": world.n_robots,
+        "params": _params(world),
+        "controller": asdict(spec),  # type: ignore[typeddict-item]
+        "actions": list(world.actions),
+        "castes": list(world.castes),
+        "labels": portrait.labels,
+        "specialization": portrait.specialization,
+        "fitness": [float(value) for value in outcome.fitness[0, 0]],
+        "heuristic": [names[mode + 1] for mode in modes],
+        "n_hidden": [int(n) for n in (team >= 0).sum(axis=1)],
+        "performance": portrait.performance,
+    }
+    return about, channels
+
+
+def hidden_activations(
+    spec: ControllerSpec,
+    genes: npt.NDArray[np.float32],
+    team: npt.NDArray[np.int32],
+    inputs: npt.NDArray[np.float32],
+) -> npt.NDArray[np.float64]:
+    """Return the activation of every hidden neuron [T, R, U], 0 in empty slots.
+
+    The kernel keeps only those that feed the context; the others follow from what it does keep: in
+    iteration t a neuron sees the sensors of t and the context that iteration t - 1 left.
+
+    Args:
+        spec: shape of the controllers.
+        genes: pool of neuron genotypes [K, G].
+        team: pool rows [R, U].
+        inputs: [T, R, sensors + context] as ``Rollout.record`` returns them.
+    """
+    sensors, context = np.split(inputs.astype(np.float64), [spec.n_sensors], axis=2)
+    before = np.concatenate([np.zeros_like(context[:1]), context[:-1]])
+    seen = np.concatenate([sensors, before], axis=2)
+    weights = spec.weight_scale * genes[team][:, :, : spec.n_inputs].astype(np.float64)
+    sums = np.einsum("tri,rui->tru", seen, weights) + float(spec.bias)
+    return np.where(team >= 0, _sigmoid(sums), 0.0)
+
+
+def _sigmoid(sums: Array) -> npt.NDArray[np.float64]:
+    """Return the logistic function; the kernel's differs from it by less than 1e-6."""
+    return 0.5 + 0.5 * np.tanh(0.5 * sums.astype(np.float64))
+
+
+def _params(world: World) -> dict[str, Any]:
+    """Return the parameters of a world; a prey file by its digest, not by where it lies."""
+    found = asdict(world.params)
+    if found.get("prey_digest"):
+        found["prey"] = "file"
+    return found

@@ -1,0 +1,272 @@
+"""What is to be drawn of an epoch: the one description that the viewer and films share.
+
+A stage knows no world. ``conevo.replay.stages`` makes one of a trajectory; the viewer gets it as
+JSON with the channels beside it. Lengths are in the world's unit, angles in rad counter-clockwise
+from +x, y points up, colours are "#rrggbb". Frame t, from 0 to T - 1, is the state after iteration
+t; actions and sensor values of frame t are those of iteration t.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+
+from conevo.replay.channel import Channel
+
+__all__ = [
+    "Backdrop",
+    "BodyKind",
+    "Event",
+    "Gauge",
+    "Kind",
+    "Measure",
+    "Pool",
+    "PlanRow",
+    "Ring",
+    "Robot",
+    "SensorGroup",
+    "Stage",
+    "Things",
+]
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A name with a colour: an action, a caste, a type of thing, a kind of event."""
+
+    name: str
+    colour: str
+
+
+@dataclass(frozen=True)
+class Backdrop:
+    """What stands still.
+
+    shape "rect": numbers x0, y0, x1, y1. "disc": x, y, radius. "raster": x0, y0, x1, y1, and
+    ``cells`` [rows, columns], drawn where it is not 0; row 0 lies at y0. An empty fill or line is
+    not drawn.
+    """
+
+    shape: str
+    numbers: tuple[float, ...]
+    fill: str = ""
+    line: str = ""
+    label: str = ""
+    cells: Channel | None = None
+
+
+@dataclass(frozen=True)
+class BodyKind:
+    """How some bodies look: "robot" bodies have the colour of their action or caste.
+
+    shape: "disc", or "square" for what is not of the team. colour: "" for the team's robots.
+    """
+
+    name: str
+    radius: float
+    shape: str = "disc"
+    colour: str = ""
+
+
+@dataclass(frozen=True)
+class Things:
+    """Rocks or objects.
+
+    kinds: of them; kind [K] index of each. x, y: [K], or [T, K] if they can be moved. size: half a
+    side or the radius. shape: "square" or "disc". gone [K]: iteration in which each was detected or
+    taken away, T if it never was: it fades during ``fade`` frames, to a faint mark. state [T, K]:
+    index into ``states``, names with a colour for the rim ("" for none).
+    """
+
+    name: str
+    kinds: tuple[Kind, ...]
+    kind: Channel
+    x: Channel
+    y: Channel
+    size: float
+    shape: str
+    gone: Channel | None = None
+    fade: int = 60
+    state: Channel | None = None
+    states: tuple[Kind, ...] = ()
+
+
+@dataclass(frozen=True)
+class Ring:
+    """A range around the team's robots: [A] radius by the action of the moment, 0 for none.
+
+    when: "action": drawn for all robots, filled faintly in the colour of the action. "selected":
+    an outline around the selected robot; around all if the reader asks for ranges. of "others": the
+    same around the other bodies.
+    """
+
+    name: str
+    radius: tuple[float, ...]
+    when: str
+    of: str = "robots"
+
+
+@dataclass(frozen=True)
+class SensorGroup:
+    """Sensors that belong together: ``count`` of them from number ``first`` on.
+
+    angles [count]: direction that each looks in; relative to the heading if ``turns``. half: half
+    the angle that it sees, reach: how far, from the robot's centre; no angles for what has no
+    direction. A wedge as opaque as the sensor's reading shows them around a selected robot.
+    names [count].
+    """
+
+    name: str
+    first: int
+    count: int
+    names: tuple[str, ...]
+    angles: tuple[float, ...] = ()
+    half: float = 0.0
+    reach: float = 0.0
+    turns: bool = False
+
+
+@dataclass(frozen=True)
+class Robot:
+    """What is said about a robot over the whole epoch.
+
+    caste: index into the stage's castes. specialization: S. fitness. heuristic: its heuristic
+    controller, "" for its network. n_hidden: neurons it has.
+    """
+
+    caste: int
+    specialization: float
+    fitness: float
+    heuristic: str = ""
+    n_hidden: int = 0
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something to jump to. kind: index into the stage's event kinds; robots: numbers."""
+
+    t: int
+    kind: int
+    text: str
+    robots: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True)
+class PlanRow:
+    """A complex object: kinds of its parts in order, and the iteration [parts] that built each.
+
+    T if it never was. The kinds are those of the first group of things.
+    """
+
+    name: str
+    is_ordered: bool
+    parts: tuple[int, ...]
+    built: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Gauge:
+    """A bar that moves with time: [T] between 0 and ``most``."""
+
+    name: str
+    values: Channel
+    most: float
+    colour: str
+
+
+@dataclass(frozen=True)
+class Measure:
+    """A curve over the timeline: [T], the last value is what the epoch ended with."""
+
+    name: str
+    values: Channel
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One team in one epoch, ready to be drawn. R robots come first among the B bodies.
+
+    action [T, R]: index into actions, -1 for none. energy [T, R] or None. held [T, R]: number of
+    the thing (of the first group) that a robot holds, -1 for none; or None. sensors [T, R, S],
+    hidden [T, R, H], outputs [T, R, O]: activations; None where robots have no networks.
+    output_names [O]. seconds: of an iteration, 0 if the world does not say.
+    """
+
+    title: str
+    subtitle: str
+    facts: tuple[tuple[str, str], ...]
+    unit: str
+    seconds: float
+    bounds: tuple[float, float, float, float]
+    iterations: int
+    actions: tuple[Kind, ...]
+    castes: tuple[Kind, ...]
+    robots: tuple[Robot, ...]
+    body_kinds: tuple[BodyKind, ...]
+    body: tuple[int, ...]
+    x: Channel
+    y: Channel
+    action: Channel
+    heading: Channel | None = None
+    energy: Channel | None = None
+    held: Channel | None = None
+    sensors: Channel | None = None
+    hidden: Channel | None = None
+    outputs: Channel | None = None
+    sensor_groups: tuple[SensorGroup, ...] = ()
+    output_names: tuple[str, ...] = ()
+    backdrop: tuple[Backdrop, ...] = ()
+    things: tuple[Things, ...] = ()
+    rings: tuple[Ring, ...] = ()
+    events: tuple[Event, ...] = ()
+    event_kinds: tuple[Kind, ...] = ()
+    plan: tuple[PlanRow, ...] = ()
+    gauges: tuple[Gauge, ...] = ()
+    measures: tuple[Measure, ...] = ()
+
+
+class Pool:
+    """Channels one after another in one piece of memory, for a page.
+
+    Values lie with time running fastest: that of [t, i, j] of a channel [T, I, J] is number
+    t + T * (i + I * j). Every channel begins at a multiple of four bytes; little-endian.
+    """
+
+    def __init__(self) -> None:
+        self._parts: list[bytes] = []
+        self._size = 0
+
+    def add(self, channel: Channel) -> dict[str, Any]:
+        """Add a channel and return where it lies: at, bytes (each), shape, low, step."""
+        codes = channel.codes
+        data = codes.astype(codes.dtype.newbyteorder("<")).tobytes(order="F")
+        place = {
+            "at": self._size,
+            "bytes": codes.dtype.itemsize,
+            "shape": list(codes.shape),
+            "low": channel.low,
+            "step": channel.step,
+        }
+        padded = data + bytes(-len(data) % 4)
+        self._parts.append(padded)
+        self._size += len(padded)
+        return place
+
+    @property
+    def data(self) -> bytes:
+        """All channels."""
+        return b"".join(self._parts)
+
+    def plain(self, thing: Any) -> Any:
+        """Return a stage, or a part of one, as JSON has it; its channels are added to the pool."""
+        if isinstance(thing, Channel):
+            return self.add(thing)
+        if isinstance(thing, tuple):
+            return [self.plain(part) for part in thing]
+        if isinstance(thing, np.generic):
+            return thing.item()
+        if hasattr(thing, "__dataclass_fields__"):
+            return {field.name: self.plain(getattr(thing, field.name)) for field in fields(thing)}
+        return thing

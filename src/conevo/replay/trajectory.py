@@ -1,0 +1,233 @@
+"""A recorded epoch of one team in one file, small, versioned and readable with numpy alone.
+
+::
+
+    import json, numpy
+    file = numpy.load("epoch.npz")
+    about = json.loads(file["about"].tobytes())
+    kept = about["channels"]["x"]
+    x = kept["low"] + kept["step"] * file["x"]          # [T, bodies]
+
+The values of a whole number's channel are exact; others have 16 bits between their least and their
+largest value, activations of neurons 8. Row t is the state after iteration t; actions, sensors and
+activations of row t are those of iteration t.
+
+=====================  =============================================================================
+channel                what
+=====================  =============================================================================
+the world's own        every array of its ``Simulation.recorded`` [T, ...] and ``recorded_at_end``
+``performance``        [T, measures] each measure as if the epoch ended there
+``sensors``            [T, R, S] what every robot sensed
+``hidden``             [T, R, U] activation of the neuron in each slot, 0 in an empty one
+``outputs``            [T, R, O] activations of the output units, of which the highest wins
+``scene/NAME``         the scenario: where everything stood
+=====================  =============================================================================
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import math
+import zipfile
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from typing_extensions import TypedDict  # pydantic reads typing's own from Python 3.12 on only
+
+from conevo.errors import EnvironmentFailure, UsageError
+from conevo.replay.channel import Channel
+from conevo.runs.durable import write_new
+
+__all__ = ["FORMAT", "About", "Trajectory"]
+
+FORMAT = 1
+MOST_BYTES = 2**30  # of a file when it is unpacked: what a small file can ask for is limited
+_CODES = {np.dtype(kind) for kind in (np.uint8, np.uint16, np.uint32)}
+
+
+class Controller(TypedDict):
+    """The shape of the networks; see ``controllers.ControllerSpec``."""
+
+    n_sensors: int
+    n_hidden: int
+    n_outputs: int
+    max_hidden: int
+    recurrent: bool
+    bias: bool
+    weight_scale: float
+
+
+class About(TypedDict):
+    """What a trajectory is of.
+
+    label, run_id, method, seed: of the run. generation: in which the team was the fittest one.
+    epoch: number of the scenario among those that the seed draws; scenario: its key. labels [R]:
+    caste of each robot in this epoch. specialization, fitness [R]: S and fitness in it. heuristic
+    [R]: name of a robot's heuristic controller, "" for its network. n_hidden [R]: neurons.
+    """
+
+    format: int
+    conevo: str
+    kernel_hash: str
+    world: str
+    environment: str
+    task: str
+    method: str
+    label: str
+    run_id: str
+    seed: int
+    generation: int
+    epoch: int
+    scenario: int
+    iterations: int
+    n_robots: int
+    params: dict[str, bool | int | float | str]
+    controller: Controller
+    actions: list[str]
+    castes: list[str]
+    labels: list[str]
+    specialization: list[float]
+    fitness: list[float]
+    heuristic: list[str]
+    n_hidden: list[int]
+    performance: dict[str, float]
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """What one team did in one epoch.
+
+    Attributes:
+        about: what it is of.
+        channels: what was recorded, by name.
+    """
+
+    about: About
+    channels: dict[str, Channel]
+
+    def to_bytes(self) -> bytes:
+        """Return the file: the same trajectory always gives the same bytes."""
+        kept = {name: {"low": c.low, "step": c.step} for name, c in self.channels.items()}
+        about = json.dumps(self.about | {"channels": kept}, sort_keys=True, allow_nan=False)
+        # Time lies closest together: neighbours in time are alike, so the file becomes smaller.
+        arrays = {name: np.asarray(c.codes, order="F") for name, c in self.channels.items()}
+        text = np.frombuffer(about.encode(), dtype=np.uint8)
+        buffer = io.BytesIO()
+        np.savez_compressed(buffer, allow_pickle=False, about=text, **arrays)
+        return buffer.getvalue()
+
+    def save(self, path: Path) -> None:
+        """Write the file, all at once.
+
+        Raises:
+            UsageError: there is another file already.
+            EnvironmentFailure: it cannot be written.
+        """
+        write_new(path, self.to_bytes())
+
+    @staticmethod
+    def load(path: Path) -> Trajectory:
+        """Return the trajectory in a file.
+
+        Raises:
+            UsageError: it is damaged, or no trajectory.
+            EnvironmentFailure: it cannot be read.
+        """
+        try:
+            data = path.read_bytes()
+        except OSError as error:
+            raise EnvironmentFailure(f"cannot read {path}: {error.strerror}") from error
+        try:
+            about, arrays = _unpack(data)
+            version = about.get("format") if isinstance(about, dict) else None
+            if version != FORMAT:
+                raise ValueError(f"its format is {version!r}, not {FORMAT}")
+            kept = about.pop("channels")
+            if set(kept) != set(arrays):
+                raise ValueError("it has other channels than it says")
+            checked: About = _checker().validate_python(about, strict=True)
+            _check(checked)
+            return Trajectory(
+                checked, {name: _channel(arrays[name], kept[name]) for name in arrays}
+            )
+        except Exception as error:  # whatever a damaged or hostile file makes its readers say
+            raise UsageError(f"{path} is damaged or no trajectory ({_reason(error)})") from error
+
+
+def _unpack(data: bytes) -> tuple[Any, dict[str, Any]]:
+    """Return the text and the arrays of a file, after looking at what it asks for."""
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        members = archive.infolist()
+        if sum(member.file_size for member in members) > MOST_BYTES:
+            raise ValueError(f"unpacked it would have more than {MOST_BYTES} bytes")
+        names = [member.filename.removesuffix(".npy") for member in members]
+        if len(set(names)) != len(names):
+            raise ValueError("it has something twice")
+        found = {}
+        for name, member in zip(names, members, strict=True):
+            found[name] = _array(archive.read(member))
+    about = found.pop("about")
+    return json.loads(about.tobytes(), parse_constant=_refuse), found
+
+
+def _array(data: bytes) -> Any:
+    """Return an array of codes: of the size that the file has, whatever its header says."""
+    stream = io.BytesIO(data)
+    version = np.lib.format.read_magic(stream)
+    if version != (1, 0):
+        raise ValueError(f"arrays of version {version}")
+    shape, is_fortran, dtype = np.lib.format.read_array_header_1_0(stream)
+    if dtype not in _CODES:
+        raise ValueError(f"codes of type {dtype}")
+    if math.prod(shape) * dtype.itemsize != len(data) - stream.tell():
+        raise ValueError("an array of another size than it says")
+    flat = np.frombuffer(data, dtype=dtype, offset=stream.tell())
+    return flat.reshape(shape, order="F" if is_fortran else "C")
+
+
+def _channel(codes: Any, kept: Any) -> Channel:
+    low, step = kept["low"], kept["step"]
+    for number in (low, step):
+        if isinstance(number, bool) or not isinstance(number, int | float):
+            raise TypeError(f"{number!r} is no number")
+    top = low + step * np.iinfo(codes.dtype).max
+    if not (math.isfinite(top) and math.isfinite(low) and step >= 0):
+        raise ValueError(f"values from {low} in steps of {step}")
+    return Channel(codes, low, step)
+
+
+def _check(about: About) -> None:
+    """Raise ValueError if the numbers do not go together."""
+    r, castes = about["n_robots"], (*about["castes"], "non-specialized")
+    if not (r >= 1 and about["iterations"] >= 1):
+        raise ValueError("no robots or no iterations")
+    for name in ("labels", "specialization", "fitness", "heuristic", "n_hidden"):
+        if len(about[name]) != r:
+            raise ValueError(f"{name} of {len(about[name])} robots, not {r}")
+    if unknown := set(about["labels"]) - set(castes):
+        raise ValueError(f"castes that the world does not have: {', '.join(sorted(unknown))}")
+
+
+def _refuse(constant: str) -> None:
+    raise ValueError(f"{constant} is no number")
+
+
+@cache
+def _checker() -> Any:
+    from pydantic import ConfigDict, TypeAdapter, with_config
+
+    config = ConfigDict(extra="forbid", allow_inf_nan=False)
+    return TypeAdapter(with_config(config)(About))
+
+
+def _reason(error: Exception) -> str:
+    """Return what went wrong, in one line."""
+    errors = getattr(error, "errors", None)
+    if callable(errors):  # pydantic's, several lines
+        first = errors()[0]
+        return f"{'.'.join(map(str, first['loc']))}: {first['msg']}"
+    return " ".join(str(error).split())[:200] or type(error).__name__

@@ -1,0 +1,45 @@
+"""Short epochs of random and heuristic teams in every world, for tests of what shows them."""
+
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from conevo.replay.recording import record_epoch
+from conevo.replay.trajectory import Trajectory
+from conevo.rng import fold, stream
+from conevo.worlds.registry import world
+from conevo.worlds.rollout import Rollout
+
+LIGHT = Path(__file__).resolve().parents[2] / "examples" / "light.py"
+TASKS = ("rover/complex-5", "pursuit/team-7", "prey/shaping-3", "gacc/complex-5", f"{LIGHT}:dark-1")
+
+
+def random_team(a_world, seed=0):
+    """Return a pool and the rows of one team of networks, of more neurons than at the start."""
+    spec, r = a_world.controller, a_world.n_robots
+    used = min(spec.n_hidden + 1, spec.max_hidden)
+    pool = stream(seed, "pool").uniform(-1, 1, (r * used, spec.n_genes)).astype(np.float32)
+    team = np.full((r, spec.max_hidden), -1, dtype=np.int32)
+    team[:, :used] = np.arange(len(pool)).reshape(r, used)
+    team[0, 0] = -1  # a hole among the neurons
+    return pool, team
+
+
+@cache
+def epoch(task, iterations=200, seed=3, *, is_heuristic=False):
+    """Return the trajectory of a team of networks; heuristic: every second robot is."""
+    a_world = world(task, iterations=iterations)
+    rollout = Rollout(a_world, n_threads=1)
+    genes, team = random_team(a_world, seed)
+    modes = np.full(a_world.n_robots, -1, dtype=np.int32)
+    if is_heuristic:
+        modes[::2] = np.arange(len(modes[::2])) % len(a_world.heuristics)
+    about, channels = record_epoch(rollout, genes, team, fold(seed, "test", 0), modes)
+    return Trajectory(about, channels)
+
+
+def renamed(trajectory, **changes):
+    """Return the trajectory with other words about it."""
+    return replace(trajectory, about=trajectory.about | changes)

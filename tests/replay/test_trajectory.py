@@ -1,0 +1,272 @@
+"""Trajectories: what was recorded is what happened, and a file is whole or refused."""
+
+import io
+import json
+import zipfile
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from conevo.errors import EnvironmentFailure, UsageError
+from conevo.replay.channel import Channel
+from conevo.replay.recording import hidden_activations
+from conevo.replay.trajectory import Trajectory
+from conevo.rng import fold
+from conevo.worlds.registry import world
+from conevo.worlds.rollout import Rollout
+from replay.epochs import TASKS, epoch, random_team, renamed
+
+# --- channels -------------------------------------------------------------------------------------
+
+
+@given(st.lists(st.integers(-(2**31), 2**31 - 1), min_size=1, max_size=20))
+def test_whole_numbers_are_kept_exactly(numbers):
+    kept = Channel.of(np.array(numbers))
+    assert kept.values.tolist() == numbers
+    assert kept.codes.dtype in (np.uint8, np.uint16, np.uint32)
+
+
+@given(st.lists(st.floats(-1e6, 1e6), min_size=1, max_size=20), st.sampled_from([8, 16]))
+def test_others_are_off_by_half_a_step_at_most(numbers, bits):
+    kept = Channel.of(np.array(numbers), bits)
+    span = max(numbers) - min(numbers)
+    assert kept.codes.dtype.itemsize * 8 == bits
+    assert np.abs(kept.values - numbers).max() <= 0.5 * span / (2**bits - 1) + 1e-9 * (1 + span)
+    assert kept.values.min() == min(numbers)
+
+
+def test_a_constant_and_nothing_at_all_can_be_kept():
+    assert Channel.of(np.full(3, 2.5)).values.tolist() == [2.5] * 3
+    assert Channel.of(np.zeros((4, 0))).values.shape == (4, 0)
+
+
+@pytest.mark.parametrize("numbers", [[np.nan], [0.0, np.inf]])
+def test_what_is_not_finite_cannot_be_kept(numbers):
+    with pytest.raises(ValueError, match="finite"):
+        Channel.of(np.array(numbers))
+
+
+# --- recording ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_a_trajectory_is_what_the_kernels_did(task):
+    a_world = world(task, iterations=60)
+    rollout = Rollout(a_world, n_threads=1)
+    genes, team = random_team(a_world)
+    key = fold(3, "test", 0)
+    seen = rollout.record(genes, team, a_world.scenarios([key]))
+    out = rollout.evaluate(genes, team[None], a_world.scenarios([key]))
+    from conevo.replay.recording import record_epoch
+
+    about, channels = record_epoch(rollout, genes, team, key)
+    for name in a_world.simulation().recorded:
+        if name != "counts":
+            kept = channels[name]
+            wanted = seen[name].astype(np.float64)
+            allowed = 0.0 if seen[name].dtype.kind in "biu" else kept.step / 2
+            assert np.abs(kept.values - wanted).max() <= allowed + 1e-9 * np.abs(wanted).max(), name
+    n = a_world.controller.n_sensors
+    sensors = channels["sensors"]
+    assert np.abs(sensors.values - seen["inputs"][:, :, :n]).max() <= sensors.step / 2 + 1e-9
+    assert about["fitness"] == [float(value) for value in out.fitness[0, 0]]
+    assert about["performance"] == {k: float(v[0, 0]) for k, v in out.performance.items()}
+    ended = list(about["performance"].values())
+    assert channels["performance"].values[-1] == pytest.approx(ended, rel=1e-4, abs=1e-9)
+    assert about["scenario"] == key
+    assert len(about["labels"]) == len(about["specialization"]) == a_world.n_robots
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_hidden_activations_are_those_of_the_kernel(task):
+    """Those that the kernel keeps (the context) agree, and all of them make its outputs."""
+    a_world = world(task, iterations=60)
+    spec = a_world.controller
+    genes, team = random_team(a_world)
+    rollout = Rollout(a_world, n_threads=1)
+    seen = rollout.record(genes, team, a_world.scenarios([fold(3, "test", 0)]))
+    hidden = hidden_activations(spec, genes, team, seen["inputs"])
+    assert hidden.shape == (60, a_world.n_robots, spec.max_hidden)
+    assert not hidden[:, team < 0].any()
+    context = seen["inputs"][:, :, spec.n_sensors :]
+    assert np.abs(hidden[:, :, : spec.n_context] - context).max(initial=0.0) < 1e-4
+    if not spec.recurrent:
+        assert spec.n_context == 0
+    weights = spec.weight_scale * genes[team][:, :, spec.n_inputs :]
+    sums = np.einsum("tru,ruo->tro", hidden, weights) + spec.bias
+    assert np.abs(sums - seen["sums"]).max() < 1e-3
+
+
+def test_heuristic_robots_have_no_activations():
+    found = epoch("rover/complex-5", 60, is_heuristic=True)
+    heuristic = np.array([bool(name) for name in found.about["heuristic"]])
+    assert heuristic[::2].all()
+    assert not heuristic[1::2].any()
+    for name in ("hidden", "outputs"):
+        assert not found.channels[name].values[:, heuristic].any()
+        assert found.channels[name].values[:, ~heuristic].any()
+
+
+# --- files ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_a_file_comes_back_as_it_was(task, tmp_path):
+    found = epoch(task)
+    path = tmp_path / "deep" / "epoch.npz"
+    found.save(path)
+    again = Trajectory.load(path)
+    assert again.about == found.about
+    assert again.channels.keys() == found.channels.keys()
+    for name, kept in found.channels.items():
+        assert np.array_equal(again.channels[name].values, kept.values), name
+    assert again.to_bytes() == path.read_bytes()
+    found.save(path)  # the same bytes are no other file
+
+
+def test_numpy_alone_reads_a_file(tmp_path):
+    """The recipe of the module's docstring."""
+    found = epoch("rover/complex-5")
+    found.save(tmp_path / "epoch.npz")
+    file = np.load(tmp_path / "epoch.npz")
+    about = json.loads(file["about"].tobytes())
+    kept = about["channels"]["x"]
+    x = kept["low"] + kept["step"] * file["x"]
+    assert x.shape == (200, 20)
+    assert np.array_equal(x, found.channels["x"].values)
+
+
+def test_another_file_is_not_replaced(tmp_path):
+    path = tmp_path / "epoch.npz"
+    path.write_text("mine")
+    with pytest.raises(UsageError, match="exists and is something else"):
+        epoch("rover/complex-5").save(path)
+    assert path.read_text() == "mine"
+
+
+def test_a_missing_file_is_the_machines_fault(tmp_path):
+    with pytest.raises(EnvironmentFailure, match=r"none\.npz: No such file"):
+        Trajectory.load(tmp_path / "none.npz")
+
+
+def refused(path, data):
+    path.write_bytes(data)
+    with pytest.raises(UsageError, match="damaged or no trajectory") as error:
+        Trajectory.load(path)
+    assert "\n" not in str(error.value)
+    return str(error.value)
+
+
+@settings(max_examples=80, deadline=None)
+@given(st.data())
+def test_a_damaged_file_is_refused_or_the_same(tmp_path_factory, data):
+    """One flipped bit, or an end that is missing."""
+    good = epoch("pursuit/team-7", 40).to_bytes()
+    path = tmp_path_factory.mktemp("torn") / "epoch.npz"
+    if data.draw(st.booleans()):
+        bad = bytearray(good)
+        at = data.draw(st.integers(0, len(good) - 1))
+        bad[at] ^= 1 << data.draw(st.integers(0, 7))
+    else:
+        bad = good[: data.draw(st.integers(0, len(good) - 1))]
+    path.write_bytes(bytes(bad))
+    try:
+        found = Trajectory.load(path)
+    except UsageError as error:
+        assert "\n" not in str(error)  # noqa: PT017 (either way is right)
+    else:  # a bit of the archive's own book-keeping, such as a date
+        assert found.to_bytes() == good
+
+
+def changed(found, *, about=(), arrays=(), drop=()):
+    """Return the bytes of a file with other words or arrays."""
+    with np.load(io.BytesIO(found.to_bytes())) as archive:
+        members = {name: archive[name] for name in archive.files}
+    text = json.loads(members["about"].tobytes())
+    text.update(about)
+    members["about"] = np.frombuffer(json.dumps(text).encode(), np.uint8)
+    members.update(arrays)
+    members = {name: array for name, array in members.items() if name not in drop}
+    out = io.BytesIO()
+    np.savez_compressed(out, **members)
+    return out.getvalue()
+
+
+HOSTILE = {
+    "another format": dict(about={"format": 2}),
+    "no channels": dict(about={"channels": {}}),
+    "channels of nothing": dict(about={"channels": None}),
+    "a word for a number": dict(about={"iterations": "many"}),
+    "a truth for a number": dict(about={"n_robots": True}),
+    "no robots": dict(about={"n_robots": 0}),
+    "more labels than robots": dict(about={"labels": ["low"] * 30}),
+    "a caste of its own": dict(about={"labels": ["<script>"] * 20}),
+    "something more": dict(about={"script": "alert(1)"}),
+    "nested params": dict(about={"params": {"a": {"b": []}}}),
+    "not a number": dict(about={"fitness": [float("nan")] * 20}),
+    "a missing array": dict(drop=("x",)),
+    "one array more": dict(arrays={"extra": np.zeros(3, np.uint8)}),
+    "floats for codes": dict(arrays={"x": np.zeros((200, 20))}),
+    "objects": dict(arrays={"x": np.array([{}], dtype=object)}),
+    "no text": dict(drop=("about",)),
+}
+
+
+@pytest.mark.parametrize("how", HOSTILE)
+def test_a_hostile_file_is_refused(how, tmp_path):
+    found = epoch("rover/complex-5")
+    assert Trajectory.load(_written(tmp_path, changed(found))).about == found.about
+    refused(tmp_path / "bad.npz", changed(found, **HOSTILE[how]))
+
+
+def _written(tmp_path, data):
+    (tmp_path / "good.npz").write_bytes(data)
+    return tmp_path / "good.npz"
+
+
+@pytest.mark.parametrize(
+    "kept",
+    [
+        {"low": 1e308, "step": 1e308},
+        {"low": 0, "step": -1},
+        {"low": "0", "step": 1},
+        {"low": True, "step": 1},
+        {"low": 0},
+        [],
+    ],
+)
+def test_a_channel_without_sense_is_refused(kept, tmp_path):
+    found = epoch("rover/complex-5")
+    with np.load(io.BytesIO(found.to_bytes())) as archive:
+        channels = json.loads(archive["about"].tobytes())["channels"]
+    refused(tmp_path / "bad.npz", changed(found, about={"channels": channels | {"x": kept}}))
+
+
+def test_a_header_cannot_ask_for_more_than_the_file_has(tmp_path):
+    out = io.BytesIO()
+    with zipfile.ZipFile(out, "w") as archive:
+        head = io.BytesIO()
+        np.lib.format.write_array_header_1_0(
+            head, {"descr": "|u1", "fortran_order": False, "shape": (2**40,)}
+        )
+        archive.writestr("about.npy", head.getvalue())
+    assert "another size" in refused(tmp_path / "bad.npz", out.getvalue())
+
+
+def test_a_small_file_cannot_unpack_to_a_huge_one(tmp_path, monkeypatch):
+    monkeypatch.setattr("conevo.replay.trajectory.MOST_BYTES", 100_000)
+    data = epoch("rover/complex-5").to_bytes()
+    assert "more than 100000 bytes" in refused(tmp_path / "bad.npz", data)
+
+
+def test_what_is_no_archive_is_refused(tmp_path):
+    for data in (b"", b"<script>alert(1)</script>", b"PK\x05\x06" + bytes(18)):
+        refused(tmp_path / "bad.npz", data)
+
+
+def test_words_about_it_are_kept_as_they_are(tmp_path):
+    words = renamed(epoch("rover/complex-5"), label="</script><b>\u2028\n", task="a/../b")
+    words.save(tmp_path / "epoch.npz")
+    assert Trajectory.load(tmp_path / "epoch.npz").about == words.about
