@@ -16,7 +16,10 @@ import conevo
 from conevo.runs.shaping import start_shaping
 
 ROOT = Path(__file__).resolve().parent.parent
-EXECUTED = ("README.md", "docs/quickstart.md", "docs/worlds.md", "docs/campaigns.md")
+EXECUTED = (
+    "README.md",
+    *(f"docs/{name}.md" for name in ("quickstart", "worlds", "campaigns", "replay")),
+)
 LINKED = (*EXECUTED, "CONTRIBUTING.md", "docs/index.md", "examples/README.md")
 MARKED = re.compile(r"<!-- ([a-z]+): (\S+) -->\n```\w+\n(.*?)```\n", re.DOTALL)
 

@@ -15,30 +15,9 @@ from pathlib import Path
 import pytest
 
 import conevo
-from conevo.cli.main import VERBS, main
+from conevo.cli.main import VERBS
 from conevo.runs.run import Run
 from runs.tiny import TASK, command, content, evolve_tiny, spawn, wait_for
-
-
-class Said:
-    """Exit code and output of one command."""
-
-    def __init__(self, code: int, out: str, err: str) -> None:
-        self.code, self.out, self.err = code, out, err
-
-
-@pytest.fixture
-def say(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]):
-    """Return a function that runs a command in an empty directory."""
-    monkeypatch.chdir(tmp_path)
-
-    def run(*arguments: str) -> Said:
-        with pytest.raises(SystemExit) as caught:
-            main(arguments)
-        out, err = capsys.readouterr()
-        return Said(int(caught.value.code or 0), out, err)
-
-    return run
 
 
 def tiny(*more: str, method: str = "cone") -> list[str]:

@@ -5,41 +5,17 @@ from __future__ import annotations
 import json
 import re
 import shlex
-import sys
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 import conevo
-from conevo.cli.main import main
 from conevo.runs.shaping import Shaping, start_shaping
 from conevo.worlds import prey_sets
 from runs.tiny import TINY, evolve_tiny, spawn, wait_for
 
 PURSUIT = {key: value for key, value in TINY.items() if key != "world.n_robots"}
-
-
-class Said:
-    """Exit code and output of one command."""
-
-    def __init__(self, code: int, out: str, err: str) -> None:
-        self.code, self.out, self.err = code, out, err
-
-
-@pytest.fixture
-def say(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]):
-    """Return a function that runs a command in an empty directory."""
-    monkeypatch.chdir(tmp_path)
-
-    def run(*arguments: str) -> Said:
-        monkeypatch.setattr(sys, "argv", ["conevo", *arguments])
-        with pytest.raises(SystemExit) as caught:
-            main(arguments)
-        out, err = capsys.readouterr()
-        return Said(int(caught.value.code or 0), out, err)
-
-    return run
 
 
 def sets(settings: dict[str, Any]) -> list[str]:

@@ -118,12 +118,15 @@ def record_epoch(
     outcome = rollout.evaluate(genes, team[None], scenes, modes[None])
     portrait = describe(outcome, world.castes)
     inputs, sums = seen.pop("inputs"), seen.pop("sums")
+    measured = seen.pop("performance")
     seen.pop("counts", None)
     has_network = modes < 0
-    for name, values in {**seen, "fitness": outcome.fitness}.items():
+    for name, values in {**seen, "fitness": outcome.fitness, "performance": measured}.items():
         if not np.isfinite(values).all():
             raise UsageError(f"the world's {name} is not finite here: the epoch cannot be kept")
     channels = {name: Channel.of(values) for name, values in seen.items()}
+    for k, name in enumerate(world.performance):
+        channels[f"performance/{name}"] = Channel.of(measured[:, k])
     channels["sensors"] = Channel.of(inputs[:, :, : spec.n_sensors])
     hidden = hidden_activations(spec, genes, team, inputs) * has_network[:, None]
     channels["hidden"] = Channel.of(hidden, bits=8)

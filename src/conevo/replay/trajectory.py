@@ -16,7 +16,7 @@ activations of row t are those of iteration t.
 channel                what
 =====================  =============================================================================
 the world's own        every array of its ``Simulation.recorded`` [T, ...] and ``recorded_at_end``
-``performance``        [T, measures] each measure as if the epoch ended there
+``performance/NAME``   [T] each task performance measure as if the epoch ended there
 ``sensors``            [T, R, S] what every robot sensed
 ``hidden``             [T, R, U] activation of the neuron in each slot, 0 in an empty one
 ``outputs``            [T, R, O] activations of the output units, of which the highest wins
@@ -112,7 +112,7 @@ class Trajectory:
     def to_bytes(self) -> bytes:
         """Return the file: the same trajectory always gives the same bytes."""
         kept = {name: {"low": c.low, "step": c.step} for name, c in self.channels.items()}
-        about = json.dumps(self.about | {"channels": kept}, sort_keys=True, allow_nan=False)
+        about = json.dumps(self.about | {"channels": kept}, allow_nan=False)
         # Time lies closest together: neighbours in time are alike, so the file becomes smaller.
         arrays = {name: np.asarray(c.codes, order="F") for name, c in self.channels.items()}
         text = np.frombuffer(about.encode(), dtype=np.uint8)
@@ -127,7 +127,7 @@ class Trajectory:
             UsageError: there is another file already.
             EnvironmentFailure: it cannot be written.
         """
-        write_new(path, self.to_bytes())
+        write_new({path: self.to_bytes()})
 
     @staticmethod
     def load(path: Path) -> Trajectory:

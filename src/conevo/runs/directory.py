@@ -145,7 +145,7 @@ class Directory:
         except OSError:
             return False
         try:
-            return not _try_lock(handle, fcntl.LOCK_SH)
+            return not _try_lock(handle, fcntl.LOCK_SH, tries=1)  # others that look refuse nobody
         finally:
             os.close(handle)
 
@@ -202,9 +202,9 @@ def read_json(path: Path) -> dict[str, Any]:
     return found
 
 
-def _try_lock(handle: int, kind: int) -> bool:
+def _try_lock(handle: int, kind: int, tries: int = 5) -> bool:
     """Take a lock if it is free; the tries outlast another process that only looks."""
-    for _ in range(5):
+    for _ in range(tries):
         try:
             fcntl.flock(handle, kind | fcntl.LOCK_NB)
         except OSError:

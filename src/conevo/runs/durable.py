@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
 from conevo.errors import EnvironmentFailure, UsageError
 
-__all__ = ["append_line", "replace_file", "sync_directory", "write_new", "writing"]
+__all__ = ["append_line", "refuse_file", "replace_file", "sync_directory", "write_new", "writing"]
 
 
 @contextmanager
@@ -41,20 +41,26 @@ def replace_file(path: Path, data: bytes) -> None:
         sync_directory(path.parent)
 
 
-def write_new(path: Path, data: bytes) -> None:
-    """Write a file, all at once; one that is there already is left as it is.
+def write_new(files: Mapping[Path, bytes]) -> None:
+    """Write files, each all at once; one that is there already is left as it is.
 
     Raises:
-        UsageError: something else is there; the same bytes are no reason.
-        EnvironmentFailure: it cannot be written.
+        UsageError: something else is in the place of one; none was written.
+        EnvironmentFailure: one cannot be written.
     """
+    missing = {p: data for p, data in files.items() if not (p.is_file() and p.read_bytes() == data)}
+    for path in missing:
+        refuse_file(path)
+    for path, data in missing.items():
+        with writing(path):
+            path.parent.mkdir(parents=True, exist_ok=True)
+        replace_file(path, data)
+
+
+def refuse_file(path: Path) -> None:
+    """Raise UsageError if there is something at ``path`` already."""
     if path.is_symlink() or path.exists():
-        if path.is_file() and path.read_bytes() == data:
-            return
-        raise UsageError(f"{path} exists and is something else; choose another place with --out")
-    with writing(path):
-        path.parent.mkdir(parents=True, exist_ok=True)
-    replace_file(path, data)
+        raise UsageError(f"{path} exists already; choose another place with --out, or remove it")
 
 
 def append_line(path: Path, line: str) -> None:

@@ -1,0 +1,75 @@
+"""``conevo film``: an epoch of a run's team as a film."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from conevo.cli.seeing import epoch_options
+from conevo.errors import UsageError
+
+__all__ = ["film"]
+
+
+@click.command(short_help="Make a film of a run's fittest team (GIF, MP4).")
+@click.argument("what", metavar="RUN|FILE")
+@epoch_options
+@click.option("--gif", is_flag=True, help="A GIF, for pages and slides.")
+@click.option("--mp4", is_flag=True, help="An MP4 (ffmpeg, or: pip install 'conevo[video]').")
+@click.option("--out", metavar="FILE", help="The film (default: a new one in replays/).")
+@click.option("--every", type=click.IntRange(1), metavar="N", help="Iterations between two frames.")
+@click.option("--fps", type=click.IntRange(1, 100), help="Frames per second.")
+@click.option("--size", type=click.IntRange(200, 2160), help="Height and width of a world, pixels.")
+@click.option("--from", "first", type=click.IntRange(0), metavar="T", help="First iteration.")
+@click.option("--to", "last", type=click.IntRange(0), metavar="T", help="Last iteration.")
+@click.option(
+    "--poster",
+    type=click.IntRange(0),
+    metavar="T",
+    help="No film, but a picture (PNG) of iteration T.",
+)
+@click.option("--colour", type=click.Choice(["action", "caste"]), default="action",
+              show_default=True, help="What a robot's colour says.")  # fmt: skip
+def film(
+    what: str,
+    gif: bool,
+    mp4: bool,
+    out: str | None,
+    every: int | None,
+    fps: int | None,
+    size: int | None,
+    first: int | None,
+    last: int | None,
+    poster: int | None,
+    colour: str,
+    **which: Any,
+) -> None:
+    """Record an epoch of RUN's fittest team (or take one that is kept, FILE) and make a film of it.
+
+    An MP4 if ffmpeg is there, else a GIF, unless told otherwise. No film is written over another.
+    """
+    from conevo.cli.seeing import REPLAYS, bar, name_of, trajectories
+    from conevo.replay.film import SIZES, choose_format, frames_of, write_film, write_poster
+    from conevo.replay.picture import Painter
+    from conevo.replay.stages import stage_of
+    from conevo.runs.durable import refuse_file
+
+    wanted = {"gif": gif, "mp4": mp4, "png": poster is not None}
+    if sum(wanted.values()) > 1:
+        raise UsageError("--gif, --mp4 and --poster exclude each other")
+    kind = choose_format(out, next((name for name in wanted if wanted[name]), ""))
+    if out:
+        refuse_file(Path(out))
+    seen = trajectories(what, **which)
+    path = Path(out) if out else REPLAYS / f"{name_of(seen)}.{kind}"
+    refuse_file(path)
+    painter = Painter([stage_of(one) for one in seen], size or SIZES[kind], colour)
+    if poster is not None:
+        write_poster(painter, path, poster)
+    else:
+        frames = frames_of(seen[0].about["iterations"], kind, every, first, last)
+        with bar(f"drawing {path.name}") as progress:
+            write_film(painter, path, frames, fps, progress)
+    click.echo(path)

@@ -1,0 +1,41 @@
+"""``conevo replay``: an epoch of a run's team as a page for the browser."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from conevo.cli.seeing import epoch_options, open_page
+
+__all__ = ["replay"]
+
+
+@click.command(short_help="See a run's fittest team in the browser.")
+@click.argument("what", metavar="RUN|FILE")
+@epoch_options
+@click.option("--out", metavar="FILE", help="The page (default: a new one in replays/).")
+@click.option("--keep", metavar="FILE", help="Keep the recorded epoch too (.npz).")
+@click.option("--no-browser", is_flag=True, help="Do not open it, only print where it is.")
+def replay(what: str, out: str | None, keep: str | None, no_browser: bool, **which: Any) -> None:
+    """Record an epoch of RUN's fittest team and show it in the browser.
+
+    RUN may be finished or running; FILE is an epoch that --keep has kept. The page is one file that
+    needs no network. It is never written over another one.
+    """
+    from conevo.cli.seeing import REPLAYS, name_of, trajectories
+    from conevo.replay.page import replay_page
+    from conevo.replay.stages import stage_of
+    from conevo.runs.durable import write_new
+
+    seen = trajectories(what, **which)
+    page = replay_page([stage_of(one) for one in seen]).encode()
+    path = Path(out) if out else REPLAYS / f"{name_of(seen)}.html"
+    files = {path: page}
+    if keep is not None:
+        files[Path(keep)] = seen[0].to_bytes()
+    write_new(files)
+    click.echo(path)
+    if not no_browser:
+        open_page(path.resolve().as_uri())

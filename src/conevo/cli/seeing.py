@@ -1,0 +1,142 @@
+"""What the verbs that show a team share: which epoch of which team, and where the file goes."""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+from conevo.errors import UsageError
+
+if TYPE_CHECKING:
+    from conevo.replay.trajectory import Trajectory
+
+__all__ = ["REPLAYS", "bar", "epoch_options", "name_of", "open_page", "trajectories"]
+
+REPLAYS = Path("replays")  # where pages and films are put unless told otherwise
+Function = TypeVar("Function", bound=Callable[..., Any])
+OPTIONS = (
+    click.option(
+        "--beside", metavar="RUN|FILE", help="A second team, in the same scenario, side by side."
+    ),
+    click.option(
+        "--generation", type=click.IntRange(0), metavar="G",
+        help="Its fittest team (default: the champion, the fittest of all).",
+    ),
+    click.option(
+        "--beside-generation", type=click.IntRange(0), metavar="G",
+        help="The same for the second team; RUN may be the same run.",
+    ),
+    click.option(
+        "--epoch", type=click.IntRange(0), metavar="K",
+        help="Which of the scenarios of its testing phase, from 0 (default).",
+    ),
+    click.option(
+        "--threads", type=click.IntRange(1), help="CPU threads (default all); changes no result."
+    ),
+)  # fmt: skip
+
+
+def epoch_options(function: Function) -> Function:
+    """Add the options that say which epoch of which team is meant."""
+    for option in reversed(OPTIONS):
+        function = option(function)
+    return function
+
+
+def trajectories(
+    what: str,
+    beside: str | None,
+    generation: int | None,
+    beside_generation: int | None,
+    epoch: int | None,
+    threads: int | None,
+) -> list[Trajectory]:
+    """Return the trajectory that is asked for, or the two.
+
+    Raises:
+        UsageError: no such run or file, nothing to be seen in it, or two that do not go together.
+    """
+    if beside is None and beside_generation is not None:
+        raise UsageError("--beside-generation needs --beside RUN")
+    first = _trajectory(what, generation, epoch, threads, None)
+    if beside is None:
+        return [first]
+    second = _trajectory(beside, beside_generation, None, threads, first)
+    for key in ("task", "scenario", "params"):
+        if first.about[key] != second.about[key]:
+            raise UsageError(f"{what} and {beside} are of different {key}s: not side by side")
+    return [first, second]
+
+
+def _trajectory(
+    text: str,
+    generation: int | None,
+    epoch: int | None,
+    threads: int | None,
+    like: Trajectory | None,
+) -> Trajectory:
+    from conevo.cli.find import find_run
+    from conevo.replay.recording import record
+    from conevo.replay.trajectory import Trajectory
+
+    if Path(text).is_file():
+        for name, value in (("generation", generation), ("epoch", epoch)):
+            if value is not None:
+                raise UsageError(f"--{name} {value}: {text} is a recorded epoch, not a run")
+        return Trajectory.load(Path(text))
+    run = find_run(text)
+    with bar(f"evolving {run.path.name} again") as progress:
+        return record(run, generation, epoch or 0, threads=threads, like=like, progress=progress)
+
+
+def name_of(seen: list[Trajectory]) -> str:
+    """Return a file's name, without its ending, for what is shown."""
+    names = [
+        f"{t.about['label']}-generation-{t.about['generation']}-epoch-{t.about['epoch']}"
+        for t in seen
+    ]
+    name = "-beside-".join(re.sub(r"[^\w.-]+", "-", one).strip("-.") for one in names)
+    return name[:200] or "epoch"  # the label of a file from elsewhere may be anything
+
+
+def open_page(address: str) -> None:
+    """Open a page in the browser, or say that there is none."""
+    import webbrowser
+
+    if not webbrowser.open(address):
+        click.echo(f"conevo: note: no browser found here; open {address} in one", err=True)
+
+
+@contextmanager
+def bar(text: str) -> Iterator[Callable[[int, int], None]]:
+    """Yield a function that shows how much of something is done, and when all of it will be.
+
+    On a terminal only, on stderr, and nothing before it is first called.
+    """
+    if not sys.stderr.isatty():
+        yield lambda done, total: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn(text), BarColumn(), TextColumn("{task.completed}/{task.total}"))
+    progress = Progress(
+        *columns, TimeRemainingColumn(), console=Console(stderr=True), transient=True
+    )
+
+    def show(done: int, total: int) -> None:
+        if not progress.tasks:
+            progress.start()
+            progress.add_task(text, total=total)
+        progress.update(progress.tasks[0].id, completed=done, total=total)
+
+    try:
+        yield show
+    finally:
+        progress.stop()

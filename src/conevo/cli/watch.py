@@ -1,0 +1,62 @@
+"""``conevo watch``: a page that follows runs while they are at work."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from conevo.cli.seeing import open_page
+
+if TYPE_CHECKING:
+    from conevo.replay.live.watched import Watched
+
+__all__ = ["watch"]
+
+
+@click.command(short_help="Follow runs live in the browser.")
+@click.argument("what", metavar="[RUN|CAMPAIGN]", required=False)
+@click.option(
+    "--port", type=click.IntRange(0, 65535), default=0, help="Of the page (default: any)."
+)
+@click.option("--no-browser", is_flag=True, help="Do not open it, only print its address.")
+def watch(what: str | None, port: int, no_browser: bool) -> None:
+    """Serve a page that follows RUN, CAMPAIGN, or everything in runs/ and campaigns/.
+
+    Only this machine can reach it. It reads files and writes none; end it with Ctrl-C.
+    """
+    from conevo.replay.live.server import serve
+
+    watched = _watched(what)
+
+    def on_ready(address: str) -> None:
+        click.echo(f"{address}  (Ctrl-C ends it; the runs go on)")
+        if not no_browser:
+            open_page(address)
+
+    serve(watched, port, lambda label: _champion_page(*watched.champion(label)), on_ready)
+
+
+def _watched(what: str | None) -> Watched:
+    """Return what is to be followed."""
+    from conevo.campaigns.campaign import CAMPAIGNS
+    from conevo.cli.find import campaign_at, find
+    from conevo.replay.live.watched import Watched
+    from conevo.runs.run import RUNS
+
+    if what is None:
+        return Watched(folders=[RUNS, CAMPAIGNS])
+    return Watched([(campaign_at(what) or find(what)).path])
+
+
+@lru_cache(maxsize=8)
+def _champion_page(path: Path, generation: int) -> str:
+    """Return the replay of a run's champion; made again when ``generation`` is another one."""
+    from conevo.replay.page import replay_page
+    from conevo.replay.recording import record
+    from conevo.replay.stages import stage_of
+    from conevo.runs.run import Run
+
+    return replay_page([stage_of(record(Run(path)))])

@@ -1,0 +1,387 @@
+"""Films of what a team does: GIF by Pillow, MP4 by ffmpeg, and single pictures.
+
+A file appears all at once: until it is finished it has a hidden name beside its own, and what ends
+early leaves neither. Nothing is written over another file.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import IO
+
+import numpy as np
+import numpy.typing as npt
+from PIL import GifImagePlugin, Image
+
+from conevo.errors import EnvironmentFailure, UsageError
+from conevo.replay.picture import Painter
+from conevo.runs.durable import refuse_file, sync_directory, writing
+
+__all__ = [
+    "FPS",
+    "SIZES",
+    "choose_format",
+    "find_ffmpeg",
+    "frames_of",
+    "write_film",
+    "write_gif",
+    "write_mp4",
+    "write_poster",
+]
+
+Progress = Callable[[int, int], None]
+
+FPS = {"gif": 20, "mp4": 60}  # Choice: 60 iterations per second, as the viewer begins with
+SIZES = {"gif": 480, "mp4": 720, "png": 720}  # Choice: of a world in pixels; GIFs are for slides
+GIF_FRAMES = 250  # Choice: a GIF has about so many frames unless told otherwise
+_SAMPLES = 16  # frames that a GIF's colours are taken from
+_EXACT = 128  # of its 255 colours are the most frequent ones as they are, others near those left
+_SAME = 255  # the index that leaves a pixel as it was
+_NO_FFMPEG = "MP4 needs ffmpeg: install it, or conevo[video], or make a GIF with --gif"
+
+
+def choose_format(out: str | None, wanted: str = "") -> str:
+    """Return what to make: "gif", "mp4" or "png".
+
+    Args:
+        out: the file's name if there is one.
+        wanted: one of the three, or "": what the name ends in, else an MP4 if ffmpeg is there.
+
+    Raises:
+        UsageError: the name ends in something else, or ffmpeg is wanted and missing.
+    """
+    ending = Path(out).suffix[1:].lower() if out else ""
+    kind = wanted or ending or ("mp4" if find_ffmpeg() else "gif")
+    if out and ending != kind:
+        raise UsageError(f"{out} is to hold {kind.upper()}, so its name must end in .{kind}")
+    if kind == "png" and not wanted:
+        raise UsageError(f"{out}: a picture is of one iteration, choose it with --poster T")
+    if kind not in ("gif", "mp4", "png"):
+        raise UsageError(f"{out}: a film's name ends in .gif or .mp4")
+    if kind == "mp4" and not find_ffmpeg():
+        raise UsageError(_NO_FFMPEG)
+    return kind
+
+
+def frames_of(
+    iterations: int,
+    kind: str = "mp4",
+    every: int | None = None,
+    first: int | None = None,
+    last: int | None = None,
+) -> list[int]:
+    """Return the frames of a film, the last one always among them.
+
+    Args:
+        iterations: of the epoch.
+        kind: "mp4" shows every iteration unless told otherwise, "gif" 250 of them or a few less.
+        every: iterations from one frame to the next.
+        first: iteration, from 0.
+        last: iteration, by default the epoch's.
+
+    Raises:
+        UsageError: nothing is left to be shown.
+    """
+    begin = 0 if first is None else first
+    end = iterations - 1 if last is None else last
+    if not 0 <= begin <= end < iterations:
+        raise UsageError(
+            f"no iterations from {begin} to {end}: the epoch has 0 to {iterations - 1}"
+        )
+    if every is None:
+        every = math.ceil((end - begin + 1) / GIF_FRAMES) if kind == "gif" else 1
+    if every < 1:
+        raise UsageError(f"every {every} iterations is not possible")
+    frames = list(range(begin, end + 1, every))
+    return frames if frames[-1] == end else [*frames, end]
+
+
+def write_film(
+    painter: Painter,
+    path: Path,
+    frames: Sequence[int],
+    fps: int | None = None,
+    progress: Progress | None = None,
+) -> None:
+    """Write a GIF or an MP4, as the file's name says; see ``write_gif`` and ``write_mp4``."""
+    kind = choose_format(str(path))
+    write = {"gif": write_gif, "mp4": write_mp4}[kind]
+    write(painter, path, frames, fps or FPS[kind], progress)
+
+
+def write_poster(painter: Painter, path: Path, t: int) -> None:
+    """Write the picture of one iteration as PNG.
+
+    Raises:
+        UsageError: no such iteration, or something is at ``path`` already.
+        EnvironmentFailure: it cannot be written.
+    """
+    picture = painter.frame(t)
+    with _appearing(path) as draft, draft.open("xb") as file:
+        picture.save(file, "PNG", optimize=True)
+
+
+def write_gif(
+    painter: Painter,
+    path: Path,
+    frames: Sequence[int],
+    fps: int = FPS["gif"],
+    progress: Progress | None = None,
+) -> None:
+    """Write an animated GIF that repeats for ever.
+
+    All frames share 255 colours, so none flickers; a frame holds only the pixels that change.
+
+    Args:
+        painter: of the frames.
+        path: where to.
+        frames: their numbers, at least one.
+        fps: frames per second; GIF counts in hundredths of a second, so 50 at most.
+        progress: told the frames done and all.
+
+    Raises:
+        UsageError: no frames, or something is at ``path`` already.
+        EnvironmentFailure: it cannot be written.
+    """
+    if not frames:
+        raise UsageError("a film without frames")
+    duration = 10 * max(round(100 / fps), 2)
+    palette = _Palette([painter.frame(t) for t in _spread(frames, _SAMPLES)])
+    with _appearing(path) as draft, draft.open("xb") as file:
+        file.write(_gif_head(painter.size, palette))
+        before: npt.NDArray[np.uint8] | None = None
+        for done, t in enumerate(frames, start=1):
+            pixels = palette.of(painter.frame(t))
+            for part in _gif_frame(pixels, before, duration):
+                file.write(part)
+            before = pixels
+            if progress:
+                progress(done, len(frames))
+        file.write(b";")
+
+
+def write_mp4(
+    painter: Painter,
+    path: Path,
+    frames: Sequence[int],
+    fps: int = FPS["mp4"],
+    progress: Progress | None = None,
+) -> None:
+    """Write an MP4 that players of all kinds show: H.264, yuv420p, its index at the beginning.
+
+    The same frames give the same bytes with the same ffmpeg. Ffmpeg is a process of its own that
+    reads frames from a pipe, and has ended when this returns or raises.
+
+    Args:
+        painter: of the frames.
+        path: where to.
+        frames: their numbers, at least one.
+        fps: frames per second.
+        progress: told the frames done and all.
+
+    Raises:
+        UsageError: no frames, something is at ``path`` already, or there is no ffmpeg.
+        EnvironmentFailure: ffmpeg fails, or the file cannot be written.
+    """
+    ffmpeg = find_ffmpeg()
+    if ffmpeg is None:
+        raise UsageError(_NO_FFMPEG)
+    if not frames:
+        raise UsageError("a film without frames")
+    with _appearing(path) as draft, tempfile.TemporaryFile() as said:
+        command = _command(ffmpeg, painter.size, fps, draft)
+        with _running(command, said) as process:
+            pipe = process.stdin
+            assert pipe is not None
+            with suppress(BrokenPipeError):  # it reads no more: what it said tells why
+                for done, t in enumerate(frames, start=1):
+                    pipe.write(painter.video(t))
+                    if progress:
+                        progress(done, len(frames))
+                pipe.close()
+            process.wait()
+        if process.returncode != 0:
+            said.seek(0)
+            raise EnvironmentFailure(_why(path, said.read().decode(errors="replace"), draft))
+
+
+def find_ffmpeg() -> str | None:
+    """Return ffmpeg on this machine, else that of the package imageio-ffmpeg, else None."""
+    found = shutil.which("ffmpeg")
+    if found:
+        return found
+    try:
+        from imageio_ffmpeg import get_ffmpeg_exe
+    except ImportError:
+        return None
+    try:
+        exe: str = get_ffmpeg_exe()
+    except RuntimeError:  # the package is there, without an ffmpeg
+        return None
+    return exe
+
+
+# --- files ----------------------------------------------------------------------------------------
+
+
+@contextmanager
+def _appearing(path: Path) -> Iterator[Path]:
+    """Yield a hidden name beside ``path``; the file that is written there then becomes ``path``."""
+    refuse_file(path)
+    draft = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    try:
+        with writing(path):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            yield draft
+            with draft.open("rb") as file:
+                os.fsync(file.fileno())
+            refuse_file(path)
+            draft.rename(path)
+            sync_directory(path.parent)
+    finally:
+        with suppress(OSError):
+            draft.unlink(missing_ok=True)
+
+
+# --- MP4 ------------------------------------------------------------------------------------------
+
+
+def _command(ffmpeg: str, size: tuple[int, int], fps: int, draft: Path) -> list[str]:
+    """Return the call of ffmpeg that reads frames of ``Painter.video`` from its input."""
+    colours = ["-color_range", "tv", "-colorspace", "bt709"]
+    colours += ["-color_primaries", "bt709", "-color_trc", "bt709"]
+    frames = ["-f", "rawvideo", "-pix_fmt", "yuv420p", "-s", f"{size[0]}x{size[1]}"]
+    # Choice: "veryfast" at quality 20 with a simple search for motion: slower settings gain little
+    # on drawn pictures. Two threads on every machine, so that the bytes are the same.
+    video = ["-c:v", "libx264", "-preset", "veryfast", "-crf", "20", "-threads", "2"]
+    video += ["-x264-params", "me=dia:subme=1"]
+    exact = ["-map_metadata", "-1", "-fflags", "+bitexact", "-flags:v", "+bitexact"]
+    return [
+        *(ffmpeg, "-nostdin", "-hide_banner", "-loglevel", "error", "-y"),
+        *(*frames, *colours, "-r", str(fps), "-i", "pipe:0"),
+        *(*video, "-pix_fmt", "yuv420p", *colours, *exact, "-movflags", "+faststart"),
+        *("-f", "mp4", f"file:{draft.absolute()}"),
+    ]
+
+
+@contextmanager
+def _running(command: list[str], said: IO[bytes]) -> Iterator[subprocess.Popen[bytes]]:
+    """Yield a process that reads what is written to it; it has ended afterwards in any case."""
+    process = subprocess.Popen(
+        command,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.DEVNULL,
+        stderr=said,
+        process_group=0,  # an interrupt is for us, who then end it
+    )
+    try:
+        yield process
+    finally:
+        if process.poll() is None:
+            process.kill()
+            process.wait()
+        if process.stdin is not None:
+            with suppress(OSError):
+                process.stdin.close()
+
+
+def _why(path: Path, said: str, draft: Path) -> str:
+    """Return one line about why ffmpeg failed."""
+    lines = [line.strip() for line in said.splitlines() if line.strip()]
+    reason = re.sub(r"^\[[^]]*\] ", "", lines[0]) if lines else "it said nothing"
+    reason = reason.replace(f"file:{draft.absolute()}", str(path)).replace(str(draft), str(path))
+    return f"ffmpeg could not write {path}: {reason}"
+
+
+# --- GIF ------------------------------------------------------------------------------------------
+
+
+def _spread(frames: Sequence[int], most: int) -> list[int]:
+    """Return at most so many of the frames, first and last among them."""
+    picked = np.unique(np.linspace(0, len(frames) - 1, most).round().astype(int))
+    return [frames[k] for k in picked]
+
+
+class _Palette:
+    """The 255 colours that serve some pictures best.
+
+    The most frequent colours are kept exactly, so that areas and robots have the colours of the
+    legend; the rest stands for the shades between them. A colour of a picture becomes the nearest
+    of these, the same in every frame.
+    """
+
+    def __init__(self, samples: Sequence[Image.Image]) -> None:
+        numbers = np.concatenate([_numbers(sample).ravel() for sample in samples])
+        found, counts = np.unique(numbers, return_counts=True)
+        found = found[np.argsort(-counts, kind="stable")]
+        self.colours = _parts(found[:_EXACT])
+        if len(found) > _EXACT:
+            rest = Image.fromarray(_parts(found[_EXACT:])[None])
+            shades = rest.quantize(_SAME - _EXACT).getpalette() or []
+            few = np.array(shades, np.uint8).reshape(-1, 3)[: _SAME - _EXACT]
+            self.colours = np.concatenate([self.colours, few])
+        self._index = np.full(1 << 24, _SAME, np.uint8)  # of every colour; _SAME: not known yet
+
+    def of(self, picture: Image.Image) -> npt.NDArray[np.uint8]:
+        """Return a picture's pixels as indices [height, width]."""
+        numbers = _numbers(picture)
+        new = np.unique(numbers[self._index[numbers] == _SAME])
+        for k in range(0, len(new), 4096):
+            some = new[k : k + 4096]
+            apart = _parts(some)[:, None].astype(np.int32) - self.colours
+            self._index[some] = (apart**2).sum(axis=-1).argmin(axis=-1)
+        return self._index[numbers]
+
+
+def _numbers(picture: Image.Image) -> npt.NDArray[np.uint32]:
+    """Return the colours of a picture as numbers 0xrrggbb."""
+    parts = np.asarray(picture).astype(np.uint32)
+    return parts @ np.array([1 << 16, 1 << 8, 1], np.uint32)
+
+
+def _parts(numbers: npt.NDArray[np.uint32]) -> npt.NDArray[np.uint8]:
+    """Return the red, green and blue [n, 3] of such numbers [n]."""
+    return np.stack([numbers >> 16, numbers >> 8 & 255, numbers & 255], axis=-1).astype(np.uint8)
+
+
+def _gif_head(size: tuple[int, int], palette: _Palette) -> bytes:
+    """Return a GIF's beginning: its size, the colours of all frames, and that it repeats."""
+    width, height = (side.to_bytes(2, "little") for side in size)
+    colours = palette.colours.tobytes().ljust(3 * 256, b"\0")
+    return (
+        b"GIF89a" + width + height + b"\xf7\0\0" + colours + b"!\xff\x0bNETSCAPE2.0\x03\x01\0\0\0"
+    )
+
+
+def _gif_frame(
+    pixels: npt.NDArray[np.uint8], before: npt.NDArray[np.uint8] | None, duration: int
+) -> list[bytes]:
+    """Return a frame's bytes: the rectangle that has changed, transparent where it has not."""
+    if before is None:
+        return GifImagePlugin.getdata(_indexed(pixels), duration=duration, disposal=1)
+    changed = pixels != before
+    rows, columns = np.flatnonzero(changed.any(axis=1)), np.flatnonzero(changed.any(axis=0))
+    if not len(rows):  # at least a pixel, or viewers would lose the time
+        rows = columns = np.zeros(1, np.int64)
+    box = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+    piece = np.where(changed[box], pixels[box], np.uint8(_SAME))
+    return GifImagePlugin.getdata(
+        _indexed(piece),
+        (int(columns[0]), int(rows[0])),
+        duration=duration,
+        disposal=1,
+        transparency=_SAME,
+    )
+
+
+def _indexed(pixels: npt.NDArray[np.uint8]) -> Image.Image:
+    height, width = pixels.shape
+    return Image.frombytes("P", (width, height), pixels.tobytes())

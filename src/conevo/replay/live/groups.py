@@ -1,0 +1,228 @@
+"""What belongs together on a live page: the runs of a folder, or those of a campaign."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections import Counter
+from collections.abc import Callable, Hashable, Sequence
+from pathlib import Path
+from typing import Any
+
+from conevo.campaigns.campaign import Campaign
+from conevo.campaigns.estimate import remaining_seconds
+from conevo.campaigns.executors import usable_cores
+from conevo.campaigns.ledger import Entry
+from conevo.errors import ConevoError, UsageError
+from conevo.replay.live.files import Stamp, is_locked, readable, stamp
+from conevo.replay.live.panels import Panel, panels_of
+from conevo.replay.live.runs import Standing, Subject
+from conevo.runs.directory import LOCK, kind_of
+
+__all__ = ["Experiment", "Group", "Names", "Runs", "children"]
+
+GoOn = Callable[[], bool]
+PLACES = ("task", "preset", "method", "variant")  # what decides in which panel a run is
+
+
+class Names:
+    """Labels of runs: no two are the same, and a run keeps the one that it has."""
+
+    def __init__(self) -> None:
+        self._of: dict[Path, str] = {}
+        self._taken: set[str] = set()
+
+    def of(self, path: Path, wanted: str) -> str:
+        """Return the label of the run at ``path``, the one wanted if it is free."""
+        if path not in self._of:
+            free = label = readable(wanted)
+            n = 2
+            while label in self._taken:
+                label, n = f"{free} ({n})", n + 1
+            self._of[path] = label
+            self._taken.add(label)
+        return self._of[path]
+
+
+class Group:
+    """Runs that belong together.
+
+    Attributes:
+        subjects: the runs, in order.
+        panels: their comparisons.
+        is_named: whether it is shown while it has no runs.
+    """
+
+    is_named = False
+
+    def __init__(self, kind: str, path: Path | None, name: str) -> None:
+        self._about: dict[str, Any] = {
+            "kind": kind,
+            "path": readable(str(path or "")),
+            "name": readable(name),
+        }
+        self._about["title"] = self._about["name"]
+        self.subjects: list[Subject] = []
+        self.panels: list[Panel] = []
+        self._places: Hashable = ()
+
+    @property
+    def about(self) -> dict[str, Any]:
+        """What is said of the group."""
+        counts = Counter(one.summary["status"] for one in self.subjects)
+        return self._about | {"counts": dict(counts)} | self._prospects(counts)
+
+    def look(self, go_on: GoOn) -> None:
+        """Read what has changed."""
+        raise NotImplementedError
+
+    def _prospects(self, counts: Counter[str]) -> dict[str, Any]:
+        raise NotImplementedError
+
+    def _arrange(self) -> None:
+        """Make the panels anew if there are other runs, or more is known of them."""
+        places = tuple(
+            (one.label, *(one.summary[name] for name in PLACES)) for one in self.subjects
+        )
+        if places != self._places:
+            self._places = places
+            self.panels = panels_of(self.subjects, self._about["name"])
+
+
+class Runs(Group):
+    """Runs and shapings.
+
+    Attributes:
+        listing: their directories; may be replaced between two looks.
+    """
+
+    def __init__(self, path: Path | None, name: str, names: Names) -> None:
+        super().__init__("runs", path, name)
+        self.listing: Sequence[Path] = ()
+        self._names = names
+        self._known: dict[Path, Subject] = {}
+
+    def look(self, go_on: GoOn) -> None:
+        """Read what has changed."""
+        self._known = {
+            path: self._known.get(path) or Subject(self._names.of(path, path.name), path)
+            for path in self.listing
+        }
+        self.subjects = list(self._known.values())
+        for one in self.subjects:
+            one.look(None, go_on)
+        self._arrange()
+
+    def _prospects(self, counts: Counter[str]) -> dict[str, Any]:
+        ends = [one.summary["ends_at"] for one in self.subjects if one.summary["ends_at"]]
+        return {
+            "running": bool(counts["running"]),
+            "ends_at": max(ends, default=None),
+            "problem": "",
+        }
+
+
+class Experiment(Group):
+    """A campaign: what its plan and its ledger say, and the files of its runs."""
+
+    is_named = True
+
+    def __init__(self, path: Path, names: Names, prefix: str) -> None:
+        super().__init__("campaign", path, path.name)
+        self._path, self._names, self._prefix = path, names, prefix
+        self._campaign: Campaign | None = None
+        self._plan: tuple[Stamp | None, ...] = ()
+        self._ledger: Hashable = None
+        self._entries: dict[str, Entry] = {}
+        self._by_label: dict[str, Subject] = {}
+        self._versions = -1
+        self._is_running = False
+        self._ends_at: float | None = None
+        self._problem = ""
+
+    def look(self, go_on: GoOn) -> None:
+        """Read what has changed; whatever is wrong with the campaign is its problem."""
+        try:
+            self._read()
+            self._problem = ""
+        except ConevoError as error:
+            self._problem = readable(str(error))
+        for label, one in self._by_label.items():
+            entry = self._entries.get(label)
+            one.look(Standing(entry.state, entry.reason) if entry else Standing("pending"), go_on)
+        self._arrange()
+
+    def _read(self) -> None:
+        files = (stamp(self._path / "plan.toml"), stamp(self._path / "runs.jsonl"))
+        if self._campaign is None or files != self._plan:
+            self._open()
+            self._plan, self._ledger = files, None
+        assert self._campaign is not None
+        self._is_running = is_locked(self._path / LOCK)
+        versions = sum(one.version for one in self.subjects)
+        ledger = (stamp(self._campaign.ledger.path), self._is_running, versions)
+        if ledger != self._ledger:
+            self._entries = self._campaign.standings()
+            self._ledger = ledger
+            self._ends_at = self._judge(self._campaign) if self._is_running else None
+
+    def _open(self) -> None:
+        """Read the plan.
+
+        Raises:
+            UsageError: it is damaged, or its runs lie elsewhere.
+        """
+        campaign = Campaign(self._path)
+        folder = campaign.path / "runs"
+        if folder.is_symlink():
+            raise UsageError(f"{folder} is a link, and links are not followed")
+        self._campaign = campaign
+        self._about |= {
+            "title": campaign.plan.title or campaign.plan.name,
+            "preset": campaign.plan.preset,
+        }
+        known, self._by_label = self._by_label, {}
+        for label, run in campaign.planned.items():
+            path = folder / Path(label).name
+            about = {
+                name: getattr(run, name) for name in ("method", "preset", "seed", "variant")
+            } | {"task": run.world}
+            name = f"{self._prefix}/{label}" if self._prefix else label
+            self._by_label[label] = known.get(label) or Subject(
+                self._names.of(path, name), path, about
+            )
+        self.subjects = list(self._by_label.values())
+
+    def _judge(self, campaign: Campaign) -> float | None:
+        """Return when the campaign will be finished, seconds since 1970; None if unknown.
+
+        By the cores at work now: those of the machine say nothing of runs that are carried out
+        elsewhere.
+        """
+        at = time.time()
+        cores = sum(one.threads for one in self._entries.values() if one.state == "running")
+        left = remaining_seconds(campaign, self._entries, cores or usable_cores(), at)
+        return None if left is None else round(at + left, 1)
+
+    def _prospects(self, counts: Counter[str]) -> dict[str, Any]:
+        return {
+            "running": self._is_running,
+            "ends_at": self._ends_at,
+            "problem": self._problem,
+        }
+
+
+def children(folder: Path) -> list[tuple[Path, str]]:
+    """Return what a folder holds by name: directories and their kind; "" for links to some."""
+    found = []
+    try:
+        with os.scandir(folder) as entries:
+            for entry in entries:
+                if entry.name.startswith(".") or not entry.is_dir():
+                    continue
+                path = Path(entry.path)
+                if kind := kind_of(path):
+                    found.append((path, "" if entry.is_symlink() else kind))
+    except OSError:
+        return []  # not there yet, or just removed
+    return sorted(found)

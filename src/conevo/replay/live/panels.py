@@ -1,0 +1,187 @@
+"""Methods side by side: the curve of every run, and the median of each method's."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from statistics import median
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from conevo.replay.live.runs import Subject
+
+__all__ = ["Panel", "panels_of"]
+
+Array = npt.NDArray[np.float64]
+MOST = 300  # points of a curve
+ALL = 40_000  # points of all curves together, about
+FEWEST = 40
+DIGITS = 5  # significant ones of the largest value of a curve
+AXES = ("evaluations", "generation")
+QUANTITIES = ("performance", "fitness")
+
+
+class Panel:
+    """The runs of one environment that are compared with each other.
+
+    Args:
+        title: the environment, and what else the runs have in common.
+        series: run -> what it is compared by, a method or a variant.
+    """
+
+    def __init__(self, title: Mapping[str, Any], series: Mapping[Subject, str]) -> None:
+        self._title, self._series = dict(title), dict(series)
+        self._key: tuple[Any, ...] = ()
+        self._data: dict[str, Any] = {}
+
+    def look(self, n_runs: int) -> dict[str, Any]:
+        """Return the panel as it stands: the same object until one of its runs changes.
+
+        Args:
+            n_runs: on the whole page, which decides how fine curves are drawn.
+        """
+        points = int(np.clip(ALL // max(n_runs, 1), FEWEST, MOST))
+        key = (points, *(subject.version for subject in self._series))
+        if key != self._key:
+            self._key = key
+            self._data = self._title | {
+                "measure": self._measure,
+                "rows": [self._row(name) for name in dict.fromkeys(self._series.values())],
+                "over": {axis: self._curves(axis, points) for axis in AXES},
+            }
+        return self._data
+
+    @property
+    def _measure(self) -> str:
+        """The main measure of task performance, "" if no run has come to one."""
+        named = (next(iter(one.summary["performance"]), "") for one in self._series)
+        return next((name for name in named if name), "")
+
+    def _row(self, series: str) -> dict[str, Any]:
+        """Return how the runs of a series stand, and the medians of what they came to last."""
+        runs = [one.summary for one, name in self._series.items() if name == series]
+        sound = [run for run in runs if run["status"] != "unreadable"]
+        values = {
+            "performance": [next(iter(run["performance"].values()), None) for run in sound],
+            "fitness": [run["fitness"] for run in sound],
+            "specialization": [run["specialization"] for run in sound],
+            "evaluations": [run["evaluations"] or None for run in sound],
+        }
+        known = {key: [v for v in column if v is not None] for key, column in values.items()}
+        return {
+            "series": series,
+            "of": len(runs),
+            "status": dict(Counter(run["status"] for run in runs)),
+            "lowest": min(known["performance"], default=None),
+            "highest": max(known["performance"], default=None),
+            **{key: median(column) if column else None for key, column in known.items()},
+        }
+
+    def _curves(self, axis: str, points: int) -> dict[str, Any]:
+        """Return curves over one axis: x [G]; of every run and of every series' median, y [G]."""
+        top = 0.0
+        runs = [one for one in self._series if one.summary["status"] != "unreadable"]
+        curves = {q: [one.curve(q, axis) for one in runs] for q in QUANTITIES}
+        for one, (x, _) in zip(runs, curves["fitness"], strict=True):
+            budget = one.summary["budget"] if axis == "evaluations" and len(x) else 0
+            top = max(top, budget, x[-1] if len(x) else 0.0)
+        whole = axis == "generation" and top < points
+        grid = np.arange(top + 1) if whole else np.linspace(0.0, top, points)
+        found: dict[str, Any] = {"x": [float(f"{x:.6g}") for x in grid]}
+        lines = {q: [_steps(x, y, grid) for x, y in curves[q]] for q in QUANTITIES}
+        found["lines"] = [
+            {"label": one.label, "series": self._series[one]}
+            | {q: _plain(_until_end(lines[q][k], curves[q][k][0], grid)) for q in QUANTITIES}
+            for k, one in enumerate(runs)
+            if len(curves["fitness"][k][0])
+        ]
+        found["medians"] = [
+            {"series": name}
+            | {
+                q: _plain(
+                    _median(
+                        [
+                            lines[q][k]
+                            if one.summary["status"] == "finished"
+                            else _until_end(lines[q][k], curves[q][k][0], grid)
+                            for k, one in enumerate(runs)
+                            if self._series[one] == name and len(curves[q][k][0])
+                        ],
+                        len(grid),
+                    )
+                )
+                for q in QUANTITIES
+            }
+            for name in dict.fromkeys(self._series.values())
+        ]
+        return found
+
+
+def panels_of(subjects: Sequence[Subject], group: str) -> list[Panel]:
+    """Return the panels of runs that belong together, an environment each.
+
+    Methods are compared, within a variant of the plan; the variants, where there is one method.
+    Runs of different presets are never compared.
+    """
+    by_task: dict[tuple[str, str], list[Subject]] = {}
+    for one in subjects:
+        about = one.summary
+        if about["task"]:
+            by_task.setdefault((about["task"], about["preset"]), []).append(one)
+    found = []
+    for (task, preset), members in by_task.items():
+        title = {"group": group, "task": task, "preset": preset}
+        if len({one.summary["method"] for one in members}) > 1:
+            by_variant: dict[str, dict[Subject, str]] = {}
+            for one in members:
+                about = one.summary
+                by_variant.setdefault(about["variant"], {})[one] = about["method"]
+            found += [
+                Panel(title | {"variant": variant, "by": "method"}, series)
+                for variant, series in by_variant.items()
+            ]
+        else:
+            series = {one: one.summary["variant"] or one.summary["method"] for one in members}
+            by = "variant" if any(one.summary["variant"] for one in members) else "method"
+            found.append(Panel(title | {"variant": "", "by": by}, series))
+    return found
+
+
+def _steps(x: Array, y: Array, grid: Array) -> Array:
+    """Return at each place of the grid what the last generation before it came to; NaN before."""
+    at = np.searchsorted(x, grid, side="right") - 1
+    values = np.append(y, np.nan)
+    return np.where(at >= 0, values[at], np.nan)
+
+
+def _until_end(values: Array, x: Array, grid: Array) -> Array:
+    """Return values up to the first place of the grid at or after the last x."""
+    last = int(np.searchsorted(grid, x[-1])) if len(x) else -1
+    return np.where(np.arange(len(grid)) <= last, values, np.nan)
+
+
+def _median(rows: Sequence[Array], size: int) -> Array:
+    """Return the median of rows [n, G], where at least half of them have a value.
+
+    Choice: a finished run keeps its last value, so that runs that end by their budget at slightly
+    different evaluations do not drop out one by one.
+    """
+    if not rows:
+        return np.full(size, np.nan)
+    ordered = np.sort(np.stack(rows), axis=0)  # NaN last
+    n = np.isfinite(ordered).sum(axis=0)
+    columns = np.arange(size)
+    low, high = np.maximum(n - 1, 0) // 2, n // 2
+    middle = (ordered[low, columns] + ordered[np.minimum(high, len(rows) - 1), columns]) / 2
+    return np.where(2 * n >= len(rows), np.where(n > 0, middle, np.nan), np.nan)
+
+
+def _plain(values: Array) -> list[float | None]:
+    """Return numbers as JSON has them, none for what is not finite."""
+    finite = np.abs(values[np.isfinite(values)])
+    most = float(finite.max()) if finite.size else 0.0
+    places = DIGITS - 1 - int(np.floor(np.log10(most))) if most > 0 else 0
+    rounded = np.round(values, min(places, 12))
+    return [v if v - v == 0.0 else None for v in rounded.tolist()]

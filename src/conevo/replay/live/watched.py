@@ -1,0 +1,183 @@
+"""What a live page shows: runs, shapings and campaigns as they stand, from their files alone.
+
+Nothing is written and no link is followed. What is wrong with a run is one line of that run.
+"""
+
+from __future__ import annotations
+
+import math
+import threading
+import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from conevo.errors import UsageError
+from conevo.evolution.methods.registry import METHODS
+from conevo.replay.live.files import readable
+from conevo.replay.live.groups import Experiment, Group, Names, Runs, children
+from conevo.replay.live.runs import Subject
+from conevo.replay.palette import FAINT, several
+from conevo.replay.stages import gacc, pursuit, rover
+from conevo.runs.directory import kind_of
+
+__all__ = ["FORMAT", "Watched"]
+
+FORMAT = 1
+REST = "non-specialized"  # a caste of its own
+CASTES: dict[str, dict[str, str]] = {
+    "rover": rover.ACTIONS,
+    "pursuit": pursuit.ACTIONS,
+    "prey": pursuit.ACTIONS,
+    "gacc": gacc.CASTES,
+}
+
+
+class Watched:
+    """What is followed.
+
+    Args:
+        paths: directories of runs, shapings or campaigns.
+        folders: in which all of these are followed, also those that appear later.
+        title: of the page.
+
+    Raises:
+        UsageError: a path holds nothing that can be followed.
+    """
+
+    def __init__(
+        self, paths: Sequence[Path] = (), folders: Sequence[Path] = (), title: str = ""
+    ) -> None:
+        named = [Path(path).resolve() for path in paths]
+        self._folders = [Path(folder).resolve() for folder in folders]
+        for path in named:
+            if not kind_of(path):
+                raise UsageError(f"{path} holds no run, no shaping and no campaign")
+        names = ", ".join(path.name for path in (*named, *self._folders))
+        self.title = readable(title or names)
+        self._lock = threading.Lock()
+        self._names = Names()
+        self._groups: dict[Path, Group] = {}
+        runs = [path for path in named if kind_of(path) != "campaign"]
+        if runs:
+            self._groups[Path()] = group = Runs(None, "runs", self._names)
+            group.listing = runs
+        for path in named:
+            if path not in runs:
+                prefix = "" if named == [path] and not self._folders else path.name
+                self._groups[path] = Experiment(path, self._names, prefix)
+        self._by_label: dict[str, Subject] = {}
+        self._state: dict[str, Any] = {}
+        self._version = 0
+
+    def snapshot(self, patience: float = math.inf) -> dict[str, Any]:
+        """Return how everything stands, as JSON has it: the same object until something changes.
+
+        Args:
+            patience: seconds after which what has not been read yet is left for the next time
+                (``reading`` counts those runs).
+        """
+        with self._lock:
+            until = time.monotonic() + patience
+            state = self._look(lambda: time.monotonic() < until)
+            if state != {key: value for key, value in self._state.items() if key != "version"}:
+                self._version += 1
+                self._state = state | {"version": self._version}
+            return self._state
+
+    def details(self, label: str) -> dict[str, Any]:
+        """Return all generations of a run, as JSON has them.
+
+        Raises:
+            UsageError: no run has this label.
+        """
+        with self._lock:
+            return self._subject(label).details()
+
+    def champion(self, label: str) -> tuple[Path, int]:
+        """Return the directory of the run that a label's fittest team so far is of, its generation.
+
+        Raises:
+            UsageError: no run has this label, or no generation has finished yet.
+        """
+        with self._lock:
+            found = self._subject(label).champion
+        if found is None:
+            raise UsageError(f"{label} has no finished generation yet, so there is no team to show")
+        return found
+
+    @property
+    def labels(self) -> Mapping[str, Subject]:
+        """The runs of the last snapshot by their labels."""
+        return self._by_label
+
+    def _subject(self, label: str) -> Subject:
+        if label not in self._by_label:
+            raise UsageError(f"no run is called {label!r} here")
+        return self._by_label[label]
+
+    def _look(self, go_on: Callable[[], bool]) -> dict[str, Any]:
+        for folder in self._folders:
+            self._list(folder)
+        for group in self._groups.values():
+            group.look(go_on)
+        groups = [group for group in self._groups.values() if group.subjects or group.is_named]
+        subjects = [subject for group in groups for subject in group.subjects]
+        self._by_label = {subject.label: subject for subject in subjects}
+        runs = [subject.summary for subject in subjects]
+        return {
+            "format": FORMAT,
+            "title": self.title,
+            "reading": sum(subject.is_behind for subject in subjects),
+            "groups": [group.about for group in groups],
+            "runs": runs,
+            "panels": [panel.look(len(runs)) for group in groups for panel in group.panels],
+            "methods": _methods(run["method"] for run in runs),
+            "castes": _castes(runs),
+            "palette": list(several(16)),
+        }
+
+    def _list(self, folder: Path) -> None:
+        """Find what is in a folder now."""
+        kinds = dict(children(folder))
+        group = self._groups.setdefault(folder, Runs(folder, folder.name, self._names))
+        assert isinstance(group, Runs)
+        group.listing = [path for path, kind in kinds.items() if kind != "campaign"]
+        for path in [one for one in self._groups if one.parent == folder]:
+            if kinds.get(path) != "campaign" and path not in self._folders:
+                del self._groups[path]
+        for path, kind in kinds.items():
+            if kind == "campaign" and path not in self._groups:
+                self._groups[path] = Experiment(path, self._names, path.name)
+
+
+def _methods(names: Iterable[str]) -> dict[str, dict[str, str]]:
+    """Return title and colour of methods: always the same of those in the registry.
+
+    CONE comes last of them and so gets the ink: thin pale lines of no other look like its own.
+    """
+    known = sorted(METHODS.values(), key=lambda entry: entry.name == "cone")
+    titles = {entry.name: entry.title for entry in known}
+    titles |= {name: name for name in sorted(set(names) - set(METHODS) - {""})}
+    colours = several(len(titles))
+    return {
+        name: {"title": title, "colour": colour}
+        for (name, title), colour in zip(titles.items(), colours, strict=True)
+    }
+
+
+def _castes(runs: Iterable[Mapping[str, Any]]) -> dict[str, dict[str, str]]:
+    """Return the colour of every caste of every world, the one that it has in a replay.
+
+    In the world's order; castes of worlds outside the package come by name, the rest last.
+    """
+    seen: dict[str, set[str]] = {}
+    for run in runs:
+        seen.setdefault(run["task"].partition("/")[0], set()).update(run["castes"])
+    found = {}
+    for world, names in seen.items():
+        known = CASTES.get(world.rpartition("-v")[0], {})
+        others = sorted(names - known.keys() - {REST})
+        free = [c for c in several(len(others) + len(known)) if c not in known.values()]
+        found[world] = {**known, **dict(zip(others, free, strict=False)), REST: FAINT}
+    return found

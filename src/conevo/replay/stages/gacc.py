@@ -1,0 +1,162 @@
+"""The stage of gathering and collective construction: objects, home area, what is being built."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+from conevo.replay.channel import Channel
+from conevo.replay.palette import BLUE, FAINT, GREEN, INK, ORANGE, SKY, VERMILION, shade
+from conevo.replay.stage import (
+    Backdrop,
+    BodyKind,
+    Gauge,
+    Kind,
+    Measure,
+    PlanRow,
+    Ring,
+    SensorGroup,
+    Stage,
+    Things,
+)
+from conevo.replay.stages.building import EVENT_KINDS, Building
+from conevo.replay.stages.parts import MOVE, Parts, begun, columns, octants
+from conevo.worlds.gacc_plans import TYPES, plan
+
+__all__ = ["stage"]
+
+# Choice: hue says for which type of object, lightness what is done: detecting is light, gripping
+# and gathering are as light as the objects themselves, constructing is dark.
+HUES = (ORANGE, SKY, GREEN)
+DETECT, GRIP, CONSTRUCT = (tuple(shade(hue, by) for hue in HUES) for by in (0.5, 0.0, -0.35))
+ACTIONS = {
+    **{f"detect {kind}": colour for kind, colour in zip(TYPES, DETECT, strict=True)},
+    "move": MOVE,
+    **{f"grip {kind}": colour for kind, colour in zip(TYPES, GRIP, strict=True)},
+}
+CASTES = {
+    f"{kind}-{name}": colour
+    for name, colours in (("detector", DETECT), ("gatherer", GRIP), ("constructor", CONSTRUCT))
+    for kind, colour in zip(TYPES, colours, strict=True)
+}
+OUTPUTS = (
+    *(f"detect {kind}" for kind in TYPES),
+    *("move: dx", "move: dy"),
+    *(f"grip {kind}" for kind in TYPES),
+)
+LIFE = (  # in the order of its numbers
+    Kind("lying", ""),
+    Kind("gripped", INK),
+    Kind("carried", INK),
+    Kind("waiting for help", VERMILION),
+    Kind("helped", BLUE),
+    Kind("delivered", FAINT),
+    Kind("dropped", ""),
+)
+RADIUS = 0.009  # Choice: a robot is a point in its world, and drawn this large
+OBJECT = 0.006  # Choice: half a side of an object, which is a point as well
+HOME_REACH = 0.12  # Choice: home is sensed from everywhere; its sensors are drawn this long
+
+
+def stage(parts: Parts) -> Stage:
+    """Return the stage of an epoch of ``gacc-v1``."""
+    t, r = parts.t, parts.r
+    objects, building = _objects(parts), Building(parts)
+    see, near = parts.param("object_range"), parts.param("robot_range")
+    grip = parts.param("grip_distance")
+    return Stage(
+        **begun(parts, ACTIONS, CASTES, OUTPUTS),
+        unit="sides",
+        seconds=0.0,
+        bounds=(0.0, 0.0, 1.0, 1.0),
+        body_kinds=(BodyKind("robot", RADIUS),),
+        body=(0,) * r,
+        x=parts.channel("x", t, r),
+        y=parts.channel("y", t, r),
+        energy=parts.channel("energy", t, r),
+        held=parts.index("held", objects.kind.codes.size, t, r, least=-1),
+        sensor_groups=(
+            octants("objects and obstacles", 0, see),
+            octants("robots", 8, near),
+            octants("home area", 16, min(parts.param("home_range"), HOME_REACH)),
+            SensorGroup("demand", 24, 3, tuple(TYPES)),
+        ),
+        backdrop=_backdrop(parts),
+        things=(objects,),
+        rings=(
+            Ring("object detection range", (*(see,) * 3, 0.0, *(0.0,) * 3), "action"),
+            Ring("grip distance", (*(0.0,) * 3, 0.0, *(grip,) * 3), "action"),
+            Ring("robot sensor range", (near,) * len(ACTIONS), "selected"),
+        ),
+        events=building.events(),
+        event_kinds=EVENT_KINDS,
+        plan=_plan(parts, building),
+        gauges=_demand(parts),
+        measures=(Measure("objects delivered", Channel.of(building.delivered)),),
+    )
+
+
+def _objects(parts: Parts) -> Things:
+    kind = parts.index("scene/object_type", len(TYPES), -1)
+    k = kind.codes.size
+    return Things(
+        "objects",
+        tuple(Kind(f"object {n}", colour) for n, colour in zip(TYPES, HUES, strict=True)),
+        kind,
+        parts.channel("object_x", parts.t, k),
+        parts.channel("object_y", parts.t, k),
+        size=OBJECT,
+        shape="square",
+        state=parts.index("life", len(LIFE), parts.t, k),
+        states=LIFE,
+    )
+
+
+def _backdrop(parts: Parts) -> tuple[Backdrop, ...]:
+    names = ("left", "bottom", "right", "top")
+    sides = zip(*(parts.floats(f"scene/{name}", -1).tolist() for name in names), strict=True)
+    home, zone = parts.param("home_side") / 2, parts.param("zone_side") / 2
+    return (
+        Backdrop("rect", _square(home), fill="#f3efe4", line="#c9c2ae", label="home area"),
+        Backdrop("rect", _square(zone), fill="#e3dcc8", line=FAINT, label="construction zone"),
+        *(
+            Backdrop("rect", (*one,), "#bdbbb4", FAINT, label="" if k else "obstacles")
+            for k, one in enumerate(sides)
+        ),
+    )
+
+
+def _square(half: float) -> tuple[float, float, float, float]:
+    """Return a square in the middle of the world."""
+    return 0.5 - half, 0.5 - half, 0.5 + half, 0.5 + half
+
+
+def _demand(parts: Parts) -> tuple[Gauge, ...]:
+    """Return the demand for each type, which is at most 1."""
+    demand = parts.channel("demand", parts.t, len(TYPES))
+    return tuple(
+        Gauge(f"demand {kind}", values, 1.0, colour)
+        for kind, colour, values in zip(TYPES, HUES, columns(demand), strict=True)
+    )
+
+
+def _plan(parts: Parts, building: Building) -> tuple[PlanRow, ...]:
+    """Return what there is to build; where no order is asked for, what came first, then the rest.
+
+    Raises:
+        ValueError: something else was built.
+    """
+    wanted = parts.index("scene/plan", len(TYPES), -1, -1).values.tolist()
+    ordered = plan(parts.about["environment"]).is_ordered
+    rows = []
+    for c, (is_ordered, kinds, built) in enumerate(
+        zip(ordered, wanted, building.rows, strict=True), 1
+    ):
+        came = [kind for kind, _ in built]
+        lacks = Counter(kinds)
+        lacks.subtract(came)
+        if min(lacks.values()) < 0 or (is_ordered and kinds[: len(came)] != came):
+            raise ValueError(f"complex object {c} is not built as it was planned")
+        shown = kinds if is_ordered else [*came, *sorted(lacks.elements())]
+        when = [t for _, t in built] + [parts.t] * (len(kinds) - len(came))
+        rows.append(PlanRow(f"complex object {c}", is_ordered, (*shown,), (*when,)))
+    return tuple(rows)

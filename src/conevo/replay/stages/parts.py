@@ -1,0 +1,170 @@
+"""What all stages are made of: a trajectory's channels, each looked at before it is used."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from conevo.replay.channel import Channel
+from conevo.replay.palette import FAINT
+from conevo.replay.stage import Kind, Measure, Robot, SensorGroup
+from conevo.replay.stages.words import facts, subtitle, title
+from conevo.replay.trajectory import Trajectory
+from conevo.specialization.individual import NON_SPECIALIZED
+
+__all__ = ["MOVE", "Parts", "begun", "columns", "octants"]
+
+MOVE = "#4a4a52"  # Choice: what robots do between what they are there for is dark grey
+_FARTHEST = 2.0**32  # beyond it whole numbers cannot be kept
+_COMPASS = ("ENE", "NNE", "NNW", "WNW", "WSW", "SSW", "SSE", "ESE")
+
+
+class Parts:
+    """A trajectory, of which every part is checked when it is asked for.
+
+    Attributes:
+        about: what the trajectory is of.
+        t: iterations.
+        r: robots.
+    """
+
+    def __init__(self, trajectory: Trajectory) -> None:
+        self.about = trajectory.about
+        self._channels = trajectory.channels
+        self.t = self.about["iterations"]
+        self.r = self.about["n_robots"]
+
+    def has(self, name: str, *shape: int) -> bool:
+        """Return whether there is a channel of this name and shape; -1 is any length."""
+        found = self._channels.get(name)
+        return found is not None and _fits(found.codes.shape, shape)
+
+    def channel(self, name: str, *shape: int) -> Channel:
+        """Return a channel.
+
+        Args:
+            name: of it.
+            shape: that it must have; -1 for any length.
+
+        Raises:
+            ValueError: there is none of that name, or it has another shape.
+        """
+        if self.has(name, *shape):
+            return self._channels[name]
+        if name not in self._channels:
+            raise ValueError(f"{name} is missing")
+        actual = list(self._channels[name].codes.shape)
+        wanted = ", ".join("any" if n < 0 else str(n) for n in shape)
+        raise ValueError(f"{name} is {actual}, not [{wanted}]")
+
+    def floats(self, name: str, *shape: int) -> npt.NDArray[np.float64]:
+        """Return the values of a channel of this shape."""
+        return np.asarray(self.channel(name, *shape).values, dtype=np.float64)
+
+    def whole(self, name: str, *shape: int) -> npt.NDArray[np.int64]:
+        """Return the values of a channel of this shape as whole numbers.
+
+        What the world has as float32 is whole but for the step it is kept in, less than a half.
+
+        Raises:
+            ValueError: as ``channel``, or the numbers are too large.
+        """
+        values = np.rint(self.floats(name, *shape))
+        if not (np.abs(values) < _FARTHEST).all():
+            raise ValueError(f"{name} holds numbers that are too large")
+        return values.astype(np.int64)
+
+    def index(self, name: str, n: int, *shape: int, least: int = 0) -> Channel:
+        """Return a channel of whole numbers from ``least`` to n - 1.
+
+        Raises:
+            ValueError: as ``channel``, or another number.
+        """
+        values = self.whole(name, *shape)
+        if values.size and not (values.min() >= least and values.max() < n):
+            raise ValueError(f"{name} is {values.min()}..{values.max()}, not {least}..{n - 1}")
+        return Channel.of(values)
+
+    def number(self, name: str) -> int:
+        """Return the one whole number, at least 0, of a channel."""
+        value = int(self.whole(name))
+        if value < 0:
+            raise ValueError(f"{name} is {value}")
+        return value
+
+    def param(self, name: str) -> float:
+        """Return a number among the world's parameters.
+
+        Raises:
+            ValueError: there is none, or it is not finite and at least 0.
+        """
+        value = self.about["params"].get(name)
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise ValueError(f"its world has no parameter {name}")
+        if not (math.isfinite(value) and value >= 0):
+            raise ValueError(f"world.{name} is {value}")
+        return float(value)
+
+    def measures(self, *names: str) -> tuple[Measure, ...]:
+        """Return every task performance measure as if the epoch ended in each iteration."""
+        return tuple(Measure(n, self.channel(f"performance/{n}", self.t)) for n in names)
+
+
+def _fits(actual: Sequence[int], shape: Sequence[int]) -> bool:
+    return len(actual) == len(shape) and all(
+        wanted in (-1, n) for n, wanted in zip(actual, shape, strict=True)
+    )
+
+
+def columns(channel: Channel) -> list[Channel]:
+    """Return the columns of a channel [T, n], each as a channel [T]."""
+    return [Channel(codes, channel.low, channel.step) for codes in channel.codes.T]
+
+
+def begun(
+    parts: Parts, actions: Mapping[str, str], castes: Mapping[str, str], outputs: Sequence[str]
+) -> dict[str, Any]:
+    """Return what every stage says, as arguments of ``Stage``.
+
+    Args:
+        parts: of the trajectory.
+        actions: colour of every action.
+        castes: colour of every caste but the non-specialized.
+        outputs: names of the output units.
+    """
+    about, t, r = parts.about, parts.t, parts.r
+    if list(actions) != about["actions"]:
+        raise ValueError(f"its actions are {', '.join(about['actions'])}")
+    known = {**castes, NON_SPECIALIZED: FAINT}
+    is_thinking = not all(about["heuristic"])
+    return {
+        "title": title(about),
+        "subtitle": subtitle(about),
+        "facts": facts(about),
+        "iterations": t,
+        "actions": tuple(Kind(*one) for one in actions.items()),
+        "castes": tuple(Kind(*one) for one in known.items()),
+        "robots": _robots(parts, list(known)),
+        "action": parts.index("action", len(actions), t, r, least=-1),
+        "sensors": parts.channel("sensors", t, r, -1),
+        "hidden": parts.channel("hidden", t, r, -1) if is_thinking else None,
+        "outputs": parts.channel("outputs", t, r, len(outputs)) if is_thinking else None,
+        "output_names": tuple(outputs),
+    }
+
+
+def _robots(parts: Parts, castes: list[str]) -> tuple[Robot, ...]:
+    about = parts.about
+    names = ("labels", "specialization", "fitness", "heuristic", "n_hidden")
+    rows: Any = zip(*(about[name] for name in names), strict=True)  # type: ignore[literal-required]
+    return tuple(Robot(castes.index(label), *rest) for label, *rest in rows)
+
+
+def octants(name: str, first: int, reach: float) -> SensorGroup:
+    """Return eight sensors of an octant each, counter-clockwise from +x; they do not turn."""
+    angles = tuple((k + 0.5) * math.pi / 4 for k in range(8))
+    return SensorGroup(name, first, 8, _COMPASS, angles, half=math.pi / 8, reach=reach)

@@ -1,0 +1,117 @@
+"""The stage of the multi-rover world: canals, red rocks, rovers, and what they detect."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+
+from conevo.replay.channel import Channel
+from conevo.replay.palette import BLUE, INK, SKY, YELLOW
+from conevo.replay.stage import Backdrop, BodyKind, Event, Kind, Measure, Ring, Stage, Things
+from conevo.replay.stages.parts import MOVE, Parts, begun, octants
+from conevo.replay.stages.words import enumerated
+from conevo.worlds import rocks
+
+__all__ = ["stage"]
+
+# Choice: the shorter the range of a setting, and the more accurate, the darker its colour.
+ACTIONS = {"low": YELLOW, "med": SKY, "hi": BLUE, "move": MOVE}
+OUTPUTS = ("low", "med", "hi", "move: dx", "move: dy")
+# Choice: all rocks are red, as they are called, and the darker the more they are worth; type E,
+# which is never with others, looks like A, which is worth the same.
+ROCKS = ("#eb9b80", "#d2613d", "#9c2f17", "#521107", "#eb9b80")
+CANAL = "#dde5ea"
+RADIUS = 0.009  # Choice: a rover is a point in its world, and drawn this large
+ROCK = 0.002  # half a side; sites are 0.005 apart
+LANDER = 0.012  # Choice: radius; the lander only records
+
+
+def stage(parts: Parts) -> Stage:
+    """Return the stage of an epoch of ``rover-v1``."""
+    t, r = parts.t, parts.r
+    ranges = tuple(parts.param(f"{name}_range") for name in ("low", "med", "hi"))
+    near = parts.param("rover_sensor_range")
+    return Stage(
+        **begun(parts, ACTIONS, ACTIONS, OUTPUTS),
+        unit="sides",
+        seconds=0.0,
+        bounds=(0.0, 0.0, 1.0, 1.0),
+        body_kinds=(BodyKind("rover", RADIUS),),
+        body=(0,) * r,
+        x=parts.channel("x", t, r),
+        y=parts.channel("y", t, r),
+        energy=parts.channel("energy", t, r),
+        # Choice: a rock sensor reaches as far as the setting in use; drawn as far as the largest.
+        sensor_groups=(octants("rovers", 0, near), octants("red rocks", 8, max(ranges))),
+        backdrop=_backdrop(parts),
+        things=(_rocks(parts),),
+        rings=(
+            Ring("detection range", (*ranges, 0.0), "action"),
+            Ring("rover sensor range", (near,) * len(ACTIONS), "selected"),
+        ),
+        events=_detections(parts),
+        event_kinds=(Kind("detection", ROCKS[2]),),
+        measures=(_value(parts), _area(parts)),
+    )
+
+
+def _backdrop(parts: Parts) -> tuple[Backdrop, ...]:
+    x, y = parts.floats("scene/lander", 2).tolist()
+    canal = parts.index("scene/canal", 2, -1, -1)
+    return (
+        Backdrop("raster", (0.0, 0.0, 1.0, 1.0), fill=CANAL, label="canals", cells=canal),
+        Backdrop("disc", (x, y, LANDER), fill="#ffffff", line=INK, label="lander"),
+    )
+
+
+def _rocks(parts: Parts) -> Things:
+    kind = parts.whole("scene/rock_type", -1)
+    _ = parts.index("scene/rock_type", len(rocks.TYPES), len(kind))
+    present = np.unique(kind)
+    worth = [f"red rock {rocks.TYPES[n]}, worth {rocks.VALUES[n]}" for n in present]
+    return Things(
+        "red rocks",
+        tuple(Kind(name, ROCKS[n]) for name, n in zip(worth, present, strict=True)),
+        Channel.of(np.searchsorted(present, kind)),
+        parts.channel("scene/rock_x", len(kind)),
+        parts.channel("scene/rock_y", len(kind)),
+        size=ROCK,
+        shape="square",
+        gone=Channel.of(np.minimum(parts.whole("detected", len(kind)), parts.t)),
+    )
+
+
+def _area(parts: Parts) -> Measure:
+    return Measure("share of area covered", parts.channel("performance/area", parts.t))
+
+
+def _value(parts: Parts) -> Measure:
+    """Return the value that the lander has recorded: an iteration after each detection."""
+    gone = parts.whole("detected", -1)
+    value = parts.whole("scene/rock_value", len(gone))
+    seen = gone < parts.t
+    gains = np.bincount(gone[seen] + 1, value[seen], minlength=parts.t)[: parts.t]
+    return Measure("value recorded by the lander", Channel.of(gains.cumsum().astype(np.int64)))
+
+
+def _detections(parts: Parts) -> tuple[Event, ...]:
+    """Return an event for every iteration in which rocks are detected, with who is paid."""
+    gone = parts.whole("detected", -1)
+    kind = parts.whole("scene/rock_type", len(gone))
+    value = parts.whole("value", parts.t, parts.r)
+    is_paid = np.diff(value, axis=0, prepend=0) > 0
+    events = []
+    for t in np.unique(gone[gone < parts.t]).tolist():
+        rovers = np.flatnonzero(is_paid[t]).tolist()
+        by = f" by {enumerated('rover', rovers)}" if rovers else ""
+        events.append(Event(t, 0, _letters(kind[gone == t].tolist()) + by, tuple(rovers)))
+    return tuple(events)
+
+
+def _letters(kinds: list[int]) -> str:
+    """Return rocks by type, "A, A, C"; many of them counted, "7 A, 2 C"."""
+    letters = [rocks.TYPES[n] for n in sorted(kinds)]
+    if len(letters) > 6:
+        return ", ".join(f"{n} {letter}" for letter, n in Counter(letters).items())
+    return ", ".join(letters)

@@ -1,0 +1,78 @@
+"""What a stage says in words: whose team this is, what it reached, which robots took part."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+
+from conevo.evolution.methods.registry import METHODS
+from conevo.replay.trajectory import About
+
+__all__ = ["enumerated", "facts", "listed", "number", "subtitle", "title"]
+
+
+def title(about: About) -> str:
+    """Return the task without the world's version, as in "rover/complex-5"."""
+    name = about["world"]
+    return f"{name.rpartition('-v')[0] or name}/{about['environment']}"
+
+
+def subtitle(about: About) -> str:
+    """Return whose team this is, as in "CONE, seed 1, fittest team of generation 12, epoch 0"."""
+    if not about["method"]:
+        return "a team of no run"
+    team = f"fittest team of generation {about['generation']}"
+    return f"{_method(about)}, seed {about['seed']}, {team}, epoch {about['epoch']}"
+
+
+def facts(about: About) -> tuple[tuple[str, str], ...]:
+    """Return names and values: the run, what the team reached, what it is like."""
+    found = [("task", about["task"])]
+    if about["method"]:
+        found += [
+            ("method", _method(about)),
+            ("run", about["label"]),
+            ("seed", str(about["seed"])),
+            ("generation", str(about["generation"])),
+            ("epoch", str(about["epoch"])),
+        ]
+    found += [(name.replace("_", " "), number(v)) for name, v in about["performance"].items()]
+    found.append(("team fitness (mean)", number(sum(about["fitness"]) / about["n_robots"])))
+    by_hand = [name for name in about["heuristic"] if name]
+    if by_hand:
+        found.append(("heuristic robots", _tally(by_hand)))
+    neurons = [n for n, h in zip(about["n_hidden"], about["heuristic"], strict=True) if not h]
+    if neurons:
+        low, high = min(neurons), max(neurons)
+        found.append(("hidden neurons", str(low) if low == high else f"{low} to {high}"))
+    found.append(("castes", _tally(about["labels"])))
+    return tuple(found)
+
+
+def _method(about: About) -> str:
+    """Return the method's name as published."""
+    name = about["method"]
+    return METHODS[name].title if name in METHODS else name
+
+
+def _tally(names: Sequence[str]) -> str:
+    """Return how many there are of each, most first, equals by name: "7 move, 3 low"."""
+    found = sorted(Counter(names).items(), key=lambda one: (-one[1], one[0]))
+    return ", ".join(f"{n} {name}" for name, n in found)
+
+
+def number(value: float) -> str:
+    """Return a number as people write it: whole, or with three significant digits."""
+    if float(value).is_integer() or abs(value) >= 1000:
+        return f"{value:,.0f}"
+    return f"{value:.3g}"
+
+
+def listed(words: Sequence[str]) -> str:
+    """Return words in a row: "3", "3 and 7", "3, 7 and 8"."""
+    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
+
+
+def enumerated(name: str, robots: Sequence[int]) -> str:
+    """Return robots by their numbers: "rover 3", "rovers 3 and 7"."""
+    return f"{name}{'s' * (len(robots) != 1)} {listed([str(i) for i in robots])}"

@@ -1,0 +1,44 @@
+"""Trajectories with changes made by hand, and what a stage of them says."""
+
+from dataclasses import replace
+
+from conevo.replay.channel import Channel
+from replay.epochs import TASKS
+
+GACC, LIGHT = TASKS[3], TASKS[4]
+
+
+def values(trajectory, name):
+    return trajectory.channels[name].values
+
+
+def changed(trajectory, **arrays):
+    """The trajectory with other channels; None for none."""
+    channels = {**trajectory.channels}
+    for name, array in arrays.items():
+        name = name.replace("scene_", "scene/")
+        if array is None:
+            del channels[name]
+        else:
+            channels[name] = array if isinstance(array, Channel) else Channel.of(array)
+    return replace(trajectory, channels=channels)
+
+
+def told(stage, kind=None):
+    """The events of a kind, as (t, text, robots)."""
+    return [
+        (event.t, event.text, event.robots)
+        for event in stage.events
+        if kind in (None, stage.event_kinds[event.kind].name)
+    ]
+
+
+def parts_of(thing):
+    """Everything in a stage, at any depth."""
+    yield thing
+    if isinstance(thing, tuple):
+        for one in thing:
+            yield from parts_of(one)
+    elif hasattr(thing, "__dataclass_fields__") and not isinstance(thing, Channel):
+        for name in thing.__dataclass_fields__:
+            yield from parts_of(getattr(thing, name))

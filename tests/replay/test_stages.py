@@ -1,0 +1,280 @@
+"""Stages: what they say of an epoch is what happened in it, in all worlds."""
+
+import json
+import math
+from collections import Counter
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from conevo.errors import UsageError
+from conevo.kernels import khepera
+from conevo.replay import palette
+from conevo.replay.stage import Kind, Pool
+from conevo.replay.stages import building, checked, gacc, pursuit, rover, stage_of
+from conevo.replay.stages.words import enumerated, number
+from oracles.gacc_scene import octant
+from replay.epochs import TASKS, epoch, renamed
+from replay.eventful import played
+from replay.staging import changed, values
+
+GACC, LIGHT = TASKS[3], TASKS[4]
+
+
+# --- all worlds -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("task", TASKS)
+@pytest.mark.parametrize("is_heuristic", [False, True])
+def test_a_stage_shows_what_was_recorded(task, is_heuristic):
+    trajectory = epoch(task, is_heuristic=is_heuristic)
+    about, stage = trajectory.about, stage_of(trajectory)
+    t, r = about["iterations"], about["n_robots"]
+    for name in ("x", "y", "action", "heading", "energy", "held"):
+        shown = getattr(stage, name)
+        if name in trajectory.channels:
+            n = shown.codes.shape[1]
+            assert np.array_equal(shown.values, values(trajectory, name)[:, :n]), name
+        else:
+            assert shown is None
+    assert np.array_equal(stage.sensors.values, values(trajectory, "sensors"))
+    for name in ("hidden", "outputs"):
+        if all(about["heuristic"]):
+            assert getattr(stage, name) is None
+        else:
+            assert np.array_equal(getattr(stage, name).values, values(trajectory, name))
+    assert [kind.name for kind in stage.actions] == about["actions"]
+    castes = [stage.castes[robot.caste].name for robot in stage.robots]
+    assert castes == about["labels"]
+    assert stage.castes[-1] == Kind("non-specialized", palette.FAINT)
+    assert {kind.name for kind in stage.castes} == {*about["castes"], "non-specialized"}
+    for name in ("specialization", "fitness", "heuristic", "n_hidden"):
+        assert [getattr(robot, name) for robot in stage.robots] == about[name]
+    assert (stage.iterations, len(stage.robots)) == (t, r)
+    assert sorted(stage.events, key=lambda event: event.t) == list(stage.events)
+    x0, y0, x1, y1 = stage.bounds
+    assert (stage.x.values >= x0).all()
+    assert (stage.x.values <= x1).all()
+    assert (stage.y.values >= y0).all()
+    assert (stage.y.values <= y1).all()
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_a_stage_becomes_json_and_every_sensor_has_a_name(task):
+    stage, pool = stage_of(epoch(task)), Pool()
+    text = json.dumps(pool.plain(stage), allow_nan=False)
+    assert json.loads(text)["title"] == stage.title
+    assert checked(stage) == stage
+    groups = [range(g.first, g.first + g.count) for g in stage.sensor_groups]
+    assert [k for group in groups for k in group] == list(range(stage.sensors.codes.shape[2]))
+    assert all(len(set(g.names)) == g.count for g in stage.sensor_groups)
+
+
+def test_a_team_of_heuristic_robots_has_no_activations():
+    trajectory = epoch(TASKS[0])
+    r = trajectory.about["n_robots"]
+    stage = stage_of(renamed(trajectory, heuristic=["low"] * r, n_hidden=[0] * r))
+    assert stage.hidden is stage.outputs is None
+    assert stage.sensors is not None
+    assert dict(stage.facts)["heuristic robots"] == f"{r} low"
+    assert "hidden neurons" not in dict(stage.facts)
+
+
+def test_words():
+    of_a_run = {"method": "mesp", "label": "here", "seed": 4, "generation": 12, "epoch": 2}
+    stage = stage_of(renamed(epoch(TASKS[0]), **of_a_run))
+    assert stage.title == "rover/complex-5"
+    assert stage.subtitle == "Multi-Agent ESP, seed 4, fittest team of generation 12, epoch 2"
+    facts = dict(stage.facts)
+    performance = epoch(TASKS[0]).about["performance"]
+    assert facts["value"] == f"{performance['value']:.0f}"
+    assert facts["area"] == f"{performance['area']:.3g}"
+    assert (facts["run"], facts["method"], facts["seed"]) == ("here", "Multi-Agent ESP", "4")
+    assert facts["hidden neurons"] == "10 to 11"  # one has a hole among its neurons
+    mean = np.mean(epoch(TASKS[0]).about["fitness"])
+    assert facts["team fitness (mean)"] == number(mean)
+    caste, n = Counter(epoch(TASKS[0]).about["labels"]).most_common(1)[0]
+    assert facts["castes"].startswith(f"{n} {caste}")
+    assert stage_of(epoch(TASKS[0])).subtitle == "a team of no run"
+    unknown = stage_of(renamed(epoch(TASKS[0]), **(of_a_run | {"method": "mine"})))
+    assert unknown.subtitle.startswith("mine, seed 4, ")
+    assert [number(v) for v in (0.0, 3.0, 0.12345, 1234.56, 12.345, -0.5, 1e6)] == [
+        "0", "3", "0.123", "1,235", "12.3", "-0.5", "1,000,000",
+    ]  # fmt: skip
+    assert enumerated("robot", [3]) == "robot 3"
+    assert enumerated("robot", [3, 7]) == "robots 3 and 7"
+    assert enumerated("robot", [3, 7, 8]) == "robots 3, 7 and 8"
+
+
+# --- colours --------------------------------------------------------------------------------------
+
+# Machado, Oliveira and Fernandes 2009: colours as people without one kind of cones see them.
+VISION = {
+    "all cones": np.eye(3),
+    "no long": [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216],
+                [-0.003882, -0.048116, 1.051998]],
+    "no middle": [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413],
+                  [-0.011820, 0.042940, 0.968881]],
+    "no short": [[1.255528, -0.076749, -0.178779], [-0.078411, 0.930809, 0.147602],
+                 [0.004733, 0.691367, 0.303900]],
+}  # fmt: skip
+XYZ = [[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]]
+WHITE = [0.95047, 1.0, 1.08883]
+
+
+def lab(colours, vision):
+    """Coordinates in CIE L*a*b* [n, 3]."""
+    rgb = np.array([[int(c[k : k + 2], 16) for k in (1, 3, 5)] for c in colours]) / 255
+    linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
+    seen = np.clip(linear @ np.array(VISION[vision]).T, 0, 1)
+    f = seen @ np.array(XYZ).T / WHITE
+    f = np.where(f > 0.008856, np.cbrt(f), 7.787 * f + 16 / 116)
+    return np.stack([116 * f[:, 1] - 16, 500 * (f[:, 0] - f[:, 1]), 200 * (f[:, 1] - f[:, 2])], -1)
+
+
+def closest(colours, vision):
+    """The distance of the two colours that are the most alike."""
+    at = lab(colours, vision)
+    apart = np.linalg.norm(at[:, None] - at, axis=-1)
+    return apart[np.triu_indices(len(colours), 1)].min()
+
+
+@pytest.mark.parametrize("vision", VISION)
+def test_colours_can_be_told_apart_by_everybody(vision):
+    """2.3 can just be told apart; a palette of ten has no room for much more than 11."""
+    rovers = [*rover.ACTIONS.values(), palette.FAINT]
+    assert closest(rovers, vision) > 22
+    assert closest([*pursuit.ACTIONS.values(), palette.FAINT], vision) > 22
+    assert closest([*gacc.ACTIONS.values(), palette.FAINT], vision) > 11
+    assert closest([*gacc.CASTES.values(), gacc.MOVE, palette.FAINT], vision) > 11
+    stones = [*rover.ROCKS[:4], rover.CANAL]
+    assert closest(stones, vision) > 17
+    for stone in stones[:4]:
+        assert min(closest([stone, robot], vision) for robot in rovers) > 17
+    rims = [state.colour for state in gacc.LIFE if state.colour]
+    assert closest([*dict.fromkeys(rims), *gacc.HUES], vision) > 11
+    for kinds in (pursuit.EVENT_KINDS, building.EVENT_KINDS):
+        assert closest([kind.colour for kind in kinds], vision) > 11
+
+
+def test_lightness_tells_what_is_done_and_hue_for_which_type():
+    lightness = [[lab([c], "all cones")[0, 0] for c in verb] for verb in
+                 (gacc.DETECT, gacc.GRIP, gacc.CONSTRUCT)]  # fmt: skip
+    for light, middle, dark in zip(*lightness, strict=True):
+        assert light > middle + 10 > dark + 20
+    worth = [lab([c], "all cones")[0, 0] for c in rover.ROCKS[:4]]
+    assert all(a > b + 15 for a, b in pairwise(worth))
+
+
+# --- directions -----------------------------------------------------------------------------------
+
+
+def bearing(group, k):
+    return group.angles[k] % (2 * math.pi)
+
+
+def test_octants_are_where_the_world_has_them():
+    for group in stage_of(epoch(TASKS[0])).sensor_groups + stage_of(epoch(GACC)).sensor_groups[:3]:
+        assert not group.turns
+        for k in range(8):
+            for off in (-0.99, 0.0, 0.99):
+                a = bearing(group, k) + off * group.half
+                assert octant(math.cos(a), math.sin(a)) == k
+        compass = dict(zip(group.names, group.angles, strict=True))
+        assert compass["ENE"] == pytest.approx(math.radians(22.5))
+        assert compass["NNW"] == pytest.approx(math.radians(112.5))
+        assert compass["SSE"] == pytest.approx(math.radians(292.5))
+
+
+@pytest.mark.parametrize(("task", "group"), [(TASKS[0], 0), (GACC, 1)])
+def test_a_robot_that_is_sensed_stands_in_the_wedge(task, group):
+    stage = stage_of(played(task.partition("/")[0]))
+    g = stage.sensor_groups[group]
+    at = np.stack([stage.x.values, stage.y.values], axis=-1)
+    sensed = stage.sensors.values[1:, :, g.first : g.first + 8]
+    seen = np.argwhere(sensed > 1e-3)
+    assert len(seen) > 20
+    for t, i, k in seen[:200].tolist():
+        way = np.delete(at[t], i, axis=0) - at[t, i]  # where all were an iteration before
+        off = np.angle(np.exp(1j * (np.arctan2(way[:, 1], way[:, 0]) - g.angles[k])))
+        inside = (np.hypot(*way.T) < g.reach + 1e-3) & (np.abs(off) < g.half + 1e-2)
+        assert inside.any()
+
+
+def test_khepera_sensors_are_the_kernels():
+    assert float(khepera.RADIUS) == pursuit.RADIUS
+    infrared, light = stage_of(epoch("pursuit/team-7")).sensor_groups
+    for k in range(8):
+        way = khepera.LOOK_X[k], khepera.LOOK_Y[k]
+        assert (math.cos(light.angles[k]), math.sin(light.angles[k])) == pytest.approx(way)
+    assert infrared.angles == light.angles
+    assert infrared.turns
+    assert light.turns
+    assert light.reach == pursuit.RADIUS + 22.0
+    assert light.half == math.radians(30)
+    assert light.names[:4] == ("10° left", "45° left", "90° left", "180° left")
+    assert light.names[4:] == ("180° right", "90° right", "45° right", "10° right")
+
+
+def test_the_prey_shines_into_the_wedge():
+    stage = stage_of(played("pursuit"))
+    r, light = len(stage.robots), stage.sensor_groups[1]
+    at = np.stack([stage.x.values, stage.y.values], axis=-1)
+    readings = stage.sensors.values[1:, :, light.first : light.first + 8]
+    seen = np.argwhere(readings.max(axis=2) > 0.2)
+    assert len(seen) > 20
+    for t, i in seen.tolist():
+        way = at[t, r] - at[t, i]
+        k = readings[t, i].argmax()
+        looks = stage.heading.values[t, i] + light.angles[k]
+        off = np.angle(np.exp(1j * (np.arctan2(way[1], way[0]) - looks)))
+        wide = math.asin(min(2 * pursuit.RADIUS / np.hypot(*way), 1.0))
+        assert abs(off) < light.half + wide + 0.05
+        assert np.hypot(*way) < light.reach + pursuit.RADIUS + 0.1
+
+
+# --- other worlds ---------------------------------------------------------------------------------
+
+
+def test_a_world_outside_the_package():
+    stage = stage_of(epoch(LIGHT))
+    assert stage.title == "light/dark-1"
+    assert stage.bounds == (0, 0, 1, 1)
+    assert [kind.colour for kind in stage.actions] == [palette.BLUE, palette.ORANGE]
+    assert stage.castes[:2] == stage.actions
+    assert stage.things == stage.backdrop == stage.events == stage.rings == ()
+    (measure,) = stage.measures
+    assert measure.name == "nearness"
+    ended = epoch(LIGHT).about["performance"]["nearness"]
+    assert measure.values.values[-1] == pytest.approx(ended, abs=1e-4)
+
+
+@pytest.mark.parametrize("missing", [("x",), ("y", "action"), ("x", "y", "action")])
+def test_a_world_that_cannot_be_drawn(missing):
+    with pytest.raises(UsageError) as error:
+        stage_of(changed(epoch(LIGHT), **dict.fromkeys(missing)))
+    text = str(error.value)
+    assert text.startswith("world light-v1 cannot be drawn")
+    assert f"does not record {', '.join(missing)} of every robot" in text
+    assert "Simulation.recorded" in text
+
+
+def test_a_world_of_any_size_with_castes_of_its_own():
+    trajectory = epoch(LIGHT)
+    x = np.linspace(-3, 17, 600).reshape(200, 3)
+    other = changed(trajectory, x=x, heading=x, energy=x)
+    castes = ["rest", "non-specialized", "walker"]
+    stage = stage_of(renamed(other, castes=castes, labels=["walker", "rest", "non-specialized"]))
+    y = values(trajectory, "y")
+    assert stage.bounds == pytest.approx((-4, y.min() - 1, 18, y.max() + 1))
+    assert np.allclose(stage.heading.values, x, atol=1e-3)
+    assert stage.energy is not None
+    assert [one.name for one in stage.castes] == ["rest", "walker", "non-specialized"]
+    assert [robot.caste for robot in stage.robots] == [1, 0, 2]
+    assert stage.castes[0].colour == stage.actions[0].colour
+    assert len({one.colour for one in (*stage.castes, *stage.actions)}) == 4
+    half = changed(trajectory, x=np.linspace(-1, 0.5, 600).reshape(200, 3))
+    assert stage_of(half).bounds[0] < -1
+    standing = changed(trajectory, x=np.full((200, 3), 5.0), y=np.full((200, 3), 5.0))
+    assert stage_of(standing).bounds == (4.5, 4.5, 5.5, 5.5)

@@ -1,0 +1,392 @@
+"""Stages of damaged and hostile trajectories: whole or refused in one clear line."""
+
+import json
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from conevo.errors import UsageError
+from conevo.replay.channel import Channel
+from conevo.replay.stage import Event, Kind, Pool, Stage
+from conevo.replay.stages import check, checked, stage_of
+from conevo.replay.trajectory import Trajectory
+from replay.epochs import TASKS, epoch, renamed
+from replay.staging import changed, parts_of, values
+
+GACC, LIGHT = TASKS[3], TASKS[4]
+
+
+# --- what is damaged ------------------------------------------------------------------------------
+
+
+def refused(trajectory, match=None):
+    with pytest.raises(UsageError, match=match) as error:
+        stage_of(trajectory)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("task", "name"),
+    [
+        *((TASKS[0], name) for name in ("x", "y", "action", "energy", "detected", "value",
+                                        "sensors", "hidden", "outputs", "scene_canal",
+                                        "scene_rock_x", "scene_rock_type", "scene_lander")),
+        *((TASKS[1], name) for name in ("heading", "captured", "collided", "scene_n_bodies",
+                                        "scene_n_obstacles", "scene_obstacle_x")),
+        *((TASKS[2], name) for name in ("heading", "collided", "fitness")),
+        *((GACC, name) for name in ("held", "life", "part", "object_x", "waited", "situation",
+                                    "demand", "scene_plan", "scene_left", "scene_object_type")),
+    ],
+)  # fmt: skip
+def test_a_missing_or_misshapen_channel_is_named(task, name):
+    trajectory = epoch(task)
+    shown = name.replace("scene_", "scene/")
+    refused(changed(trajectory, **{name: None}), f"damaged: {shown} is missing")
+    more = np.zeros((7, 3, 5, 2))
+    refused(changed(trajectory, **{name: more}), rf"damaged: {shown} is \[7, 3, 5, 2\], not \[")
+
+
+def at(trajectory, name, index, value):
+    """The array of a channel with another value somewhere."""
+    array = values(trajectory, name.replace("scene_", "scene/")).copy()
+    array[index] = value
+    return {name: array}
+
+
+@pytest.mark.parametrize(
+    ("task", "name", "index", "value", "match"),
+    [
+        (TASKS[0], "action", (3, 4), 4, "action is"),
+        (TASKS[0], "action", (3, 4), -2, "action is"),
+        (TASKS[0], "scene_rock_type", 5, 5, "scene/rock_type is"),
+        (TASKS[0], "scene_rock_type", 5, -1, "scene/rock_type is"),
+        (TASKS[0], "detected", 5, -1, None),
+        (TASKS[0], "scene_canal", (0, 0), 2, "scene/canal is"),
+        (TASKS[1], "captured", (0, 0), 2, "captured is"),
+        (TASKS[1], "collided", (0, 0), -1, "collided is"),
+        (TASKS[1], "scene_n_bodies", (), 9, "9 bodies"),
+        (TASKS[1], "scene_n_bodies", (), 3, "3 bodies"),
+        (TASKS[1], "scene_n_obstacles", (), 7, "7 obstacles"),
+        (GACC, "held", (0, 0), 20, "held is"),
+        (GACC, "held", (0, 0), -2, "held is"),
+        (GACC, "life", (0, 0), 7, "life is"),
+        (GACC, "part", (0, 0), 20, "part is"),
+        (GACC, "part", (slice(5, None), 0), 4, "part 5 of complex object 1 is out of turn"),
+        (GACC, "part", (slice(5, None), slice(0, 2)), 0, "part 1 of complex object 1 is out"),
+        (GACC, "scene_plan", (0, 0), 3, "scene/plan is"),
+        (GACC, "scene_object_type", 0, 3, "scene/object_type is"),
+    ],
+)
+def test_numbers_that_cannot_be(task, name, index, value, match):
+    trajectory = epoch(task)
+    refused(changed(trajectory, **at(trajectory, name, index, value)), match)
+
+
+@pytest.mark.parametrize(("low", "step"), [(1e308, 1.0), (0.0, 1e300), (math.nan, 0.0), (0, 2**60)])
+def test_values_that_nobody_can_draw(low, step):
+    for name in ("x", "sensors"):
+        odd = replace(epoch(TASKS[0]).channels[name], low=low, step=step)
+        refused(changed(epoch(TASKS[0]), **{name: odd}), name)
+
+
+def test_a_hostile_name_stays_in_its_line():
+    for name in ("two\nlines", "<script>", "x" * 10_000, "\x1b[2J", "rover\u2028v1"):
+        with pytest.raises(UsageError) as error:
+            stage_of(renamed(changed(epoch(TASKS[0]), x=None), world=name))
+        text = str(error.value)
+        assert text.isprintable()
+        assert len(text) < 500
+
+
+def test_parts_in_another_order_than_the_plan():
+    """The first complex object begins with a B (BAABAABAAB); object 19 is a C."""
+    part = np.full((200, 20), -1)
+    part[5:, 19] = 0
+    wrong = changed(epoch(GACC), part=part)
+    refused(wrong, "complex object 1 is not built as it was planned")
+
+
+def test_parts_that_are_not_in_the_plan():
+    """The plan without an order has one A; here two are built in."""
+    trajectory = epoch("gacc/complex-1")
+    part = np.full((200, 10), -1)
+    part[5:, 0], part[9:, 1] = 0, 1
+    of_type = values(trajectory, "scene/object_type").copy()
+    of_type[1] = 0
+    wrong = changed(trajectory, part=part, scene_object_type=of_type)
+    refused(wrong, "complex object 1 is not built as it was planned")
+
+
+@pytest.mark.parametrize(
+    ("task", "about", "match"),
+    [
+        (TASKS[0], {"params": {}}, "no parameter low_range"),
+        (TASKS[0], {"actions": ["low"]}, "its actions are low"),
+        (TASKS[0], {"world": "gacc-v1"}, "its actions are|is missing"),
+        (TASKS[0], {"castes": [], "labels": ["hero"] * 20}, "hero"),
+        (TASKS[0], {"labels": ["low"]}, None),
+        (TASKS[0], {"iterations": 10}, "not \\[10"),
+        (TASKS[0], {"n_robots": 3}, None),
+        (TASKS[0], {"iterations": 0}, None),
+        (TASKS[0], {"environment": "x" * 3000}, "cannot be shown"),
+        (TASKS[0], {"environment": "\x07"}, "cannot be shown"),
+        (TASKS[0], {"environment": "\ud800"}, "cannot be shown"),
+        (TASKS[0], {"performance": None}, None),
+        (TASKS[0], {"fitness": [float("nan")] * 20}, "nan"),
+        (TASKS[0], {"fitness": [10**400] * 20}, None),
+        (GACC, {"environment": "complex-77"}, None),
+        (GACC, {"environment": "simple"}, None),
+        (GACC, {"environment": "complex-1"}, None),
+        (LIGHT, {"performance": {"far": 1.0}}, "performance/far is missing"),
+        (LIGHT, {"actions": ["rest"]}, "action is"),
+        (LIGHT, {"actions": ["rest", "rest"]}, None),
+    ],
+)
+def test_words_that_cannot_be(task, about, match):
+    refused(renamed(epoch(task), **about), match)
+
+
+@pytest.mark.parametrize("value", [None, "0.05", True, -0.1, math.nan, math.inf, []])
+def test_parameters_that_cannot_be(value):
+    trajectory = epoch(TASKS[0])
+    params = trajectory.about["params"] | {"hi_range": value}
+    refused(renamed(trajectory, params=params), "hi_range")
+
+
+ODD = st.sampled_from([-1, 0, 1, 2, 3, 7, 255, 65_535, 2**31 - 1, 2**32 - 1])
+STRANGE = st.sampled_from([0.0, 1.0, -1.0, 0.5, 1e-9, 1e18, 1e308, -1e308, math.nan, math.inf])
+
+
+@st.composite
+def damage(draw, channel):
+    """Another channel: reshaped, cut, turned, with other numbers, or none at all."""
+    codes = channel.codes
+    how = draw(st.sampled_from(["none", "cut", "turn", "flat", "one", "all", "scale", "empty"]))
+    if how == "none":
+        return None
+    if how == "cut" and codes.ndim:
+        axis = draw(st.integers(0, codes.ndim - 1))
+        return replace(channel, codes=np.delete(codes, 0, axis) if codes.shape[axis] else codes)
+    if how == "turn":
+        return replace(channel, codes=codes.T)
+    if how == "flat":
+        return replace(channel, codes=codes.ravel())
+    if how == "empty":
+        return replace(channel, codes=codes[:0] if codes.ndim else codes.reshape(1)[:0])
+    if how == "scale":
+        return replace(channel, low=draw(STRANGE), step=draw(STRANGE))
+    codes = codes.astype(np.uint32)
+    if how == "one" and codes.size:
+        codes.flat[draw(st.integers(0, codes.size - 1))] = draw(ODD) % 2**32
+    elif how == "all":
+        codes = np.full_like(codes, draw(ODD) % 2**32)
+    return replace(channel, codes=codes)
+
+
+@pytest.mark.parametrize("task", TASKS)
+@settings(max_examples=80, deadline=None)
+@given(data=st.data())
+def test_whatever_is_damaged_a_stage_is_whole_or_refused(task, data):
+    trajectory = epoch(task, 40)
+    name = data.draw(st.sampled_from(sorted(trajectory.channels)))
+    odd = data.draw(damage(trajectory.channels[name]))
+    channels = {**trajectory.channels, name: odd}
+    if odd is None:
+        del channels[name]
+    with np.errstate(all="ignore"):
+        assert_whole_or_refused(replace(trajectory, channels=channels))
+
+
+ABOUT = st.one_of(
+    st.none(), st.booleans(), st.integers(-5, 10**30), st.floats(), st.text(max_size=5),
+    st.lists(st.one_of(st.text(max_size=3), st.floats(), st.integers()), max_size=4),
+    st.dictionaries(st.text(max_size=3), st.floats(), max_size=3),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("task", TASKS)
+@settings(max_examples=80, deadline=None)
+@given(data=st.data())
+def test_whatever_is_said_a_stage_is_whole_or_refused(task, data):
+    trajectory = epoch(task, 40)
+    key = data.draw(st.sampled_from(sorted(trajectory.about)))
+    if key == "params" and data.draw(st.booleans()):
+        name = data.draw(st.sampled_from(sorted(trajectory.about["params"])))
+        value = trajectory.about["params"] | {name: data.draw(ABOUT)}
+    else:
+        value = data.draw(ABOUT)
+    assume(not (key == "world" and value == ""))
+    assert_whole_or_refused(renamed(trajectory, **{key: value}))
+
+
+def assert_whole_or_refused(trajectory):
+    """All numbers are finite, all indices in range: told without the code that checks it."""
+    refusal = ""
+    try:
+        stage = stage_of(trajectory)
+    except UsageError as error:
+        refusal = str(error)
+    if refusal:
+        assert "\n" not in refusal
+        return
+    t, r = stage.iterations, len(stage.robots)
+    json.dumps(Pool().plain(stage), allow_nan=False).encode()
+    for one in parts_of(stage):
+        if isinstance(one, Channel):
+            assert np.isfinite(one.values).all()
+        elif isinstance(one, Event):
+            assert 0 <= one.t < t
+            assert one.kind < len(stage.event_kinds)
+            assert set(one.robots) <= set(range(r))
+    assert stage.x.codes.shape == stage.y.codes.shape == (t, len(stage.body))
+    assert set(np.unique(stage.action.values)) <= set(range(-1, len(stage.actions)))
+    assert {robot.caste for robot in stage.robots} <= set(range(len(stage.castes)))
+    for things in stage.things:
+        assert set(np.unique(things.kind.values)) <= set(range(len(things.kinds)))
+        if things.gone is not None:
+            assert set(np.unique(things.gone.values)) <= set(range(t + 1))
+        if things.state is not None:
+            assert set(np.unique(things.state.values)) <= set(range(len(things.states)))
+    if stage.held is not None:
+        k = stage.things[0].kind.codes.size
+        assert set(np.unique(stage.held.values)) <= set(range(-1, k))
+
+
+# --- the check itself -----------------------------------------------------------------------------
+
+
+def whole(n=9):
+    return Channel.of(np.full((200, 30), n))
+
+
+ONE = Channel.of(np.zeros(200, dtype=int))
+WRONG = {
+    "no iterations": lambda s: {"iterations": 0},
+    "no robots": lambda s: {"robots": ()},
+    "robots without bodies": lambda s: {"body": s.body[1:]},
+    "a body of no kind": lambda s: {"body": (1, *s.body[1:])},
+    "bounds the wrong way round": lambda s: {"bounds": (1.0, 0.0, 0.0, 1.0)},
+    "endless bounds": lambda s: {"bounds": (0.0, 0.0, math.inf, 1.0)},
+    "time that goes back": lambda s: {"seconds": -1.0},
+    "no actions": lambda s: {"actions": ()},
+    "a colour that is script": lambda s: {"actions": (Kind("a", "red;}"), *s.actions[1:])},
+    "an action that does not exist": lambda s: {"action": whole(7)},
+    "a held thing that does not exist": lambda s: {"held": whole(20)},
+    "held things and no things": lambda s: {"things": (), "plan": ()},
+    "a caste that does not exist": lambda s: {"castes": s.castes[:1]},
+    "a robot that is not a number": lambda s: {
+        "robots": (replace(s.robots[0], specialization=math.nan), *s.robots[1:])
+    },
+    "places of others": lambda s: {"x": Channel.of(np.zeros((200, 31)))},
+    "other places": lambda s: {"y": ONE},
+    "places that are not finite": lambda s: {"x": replace(s.x, step=1e308)},
+    "another energy": lambda s: {"energy": ONE},
+    "another heading": lambda s: {"heading": ONE},
+    "flat sensors": lambda s: {"sensors": s.action},
+    "outputs without names": lambda s: {"output_names": s.output_names[1:]},
+    "sensors beyond the last": lambda s: {
+        "sensor_groups": (replace(s.sensor_groups[3], first=25),)
+    },
+    "sensors without names": lambda s: {"sensor_groups": (replace(s.sensor_groups[0], names=()),)},
+    "a sensor too few": lambda s: {
+        "sensor_groups": (replace(s.sensor_groups[0], angles=s.sensor_groups[0].angles[1:]),)
+    },
+    "sensors that reach back": lambda s: {
+        "sensor_groups": (replace(s.sensor_groups[0], reach=-1.0),)
+    },
+    "a floor of no shape": lambda s: {"backdrop": (replace(s.backdrop[0], shape="cloud"),)},
+    "a floor of three corners": lambda s: {
+        "backdrop": (replace(s.backdrop[0], numbers=(1, 2, 3)),)
+    },
+    "a floor without cells": lambda s: {"backdrop": (replace(s.backdrop[0], shape="raster"),)},
+    "a floor inside out": lambda s: {
+        "backdrop": (replace(s.backdrop[0], numbers=(1.0, 0.0, 0.0, 1.0)),)
+    },
+    "a floor of another colour": lambda s: {"backdrop": (replace(s.backdrop[0], fill="#12345"),)},
+    "an event too late": lambda s: {"events": (Event(200, 0, None),)},
+    "an event too early": lambda s: {"events": (Event(-1, 0, None),)},
+    "an event of no kind": lambda s: {"events": (Event(0, 6, None),)},
+    "an event of nobody": lambda s: {"events": (Event(0, 0, "", (30,)),)},
+    "a ring too few": lambda s: {"rings": (replace(s.rings[0], radius=(1.0,)),)},
+    "a ring inside out": lambda s: {"rings": (replace(s.rings[0], radius=(-1.0,) * 7),)},
+    "a ring at another time": lambda s: {"rings": (replace(s.rings[0], when="never"),)},
+    "a ring of somebody": lambda s: {"rings": (replace(s.rings[0], of="all"),)},
+    "a plan of other things": lambda s: {"plan": (replace(s.plan[0], parts=(3,) * 10),)},
+    "a plan that is late": lambda s: {"plan": (replace(s.plan[0], built=(201,) * 10),)},
+    "a plan too short": lambda s: {"plan": (replace(s.plan[0], parts=(0,)),)},
+    "an empty gauge": lambda s: {"gauges": (replace(s.gauges[0], most=0.0),)},
+    "a short gauge": lambda s: {"gauges": (replace(s.gauges[0], values=s.action),)},
+    "a short measure": lambda s: {"measures": (replace(s.measures[0], values=s.action),)},
+    "text that cannot be shown": lambda s: {"facts": (("a", "b\nc"),)},
+    **{
+        f"things with {name}": lambda s, name=name, value=value: {
+            "things": (replace(s.things[0], **{name: value}),)
+        }
+        for name, value in {
+            "kinds": (),
+            "kind": whole(0),
+            "x": ONE,
+            "size": 0.0,
+            "shape": "star",
+            "fade": 0,
+            "gone": Channel.of(np.full(20, 201)),
+            "states": (),
+            "state": ONE,
+        }.items()
+    },
+}
+
+
+@pytest.mark.parametrize("what", WRONG)
+def test_a_stage_that_does_not_fit_together_is_refused(what):
+    stage = stage_of(epoch(GACC))
+    with pytest.raises(UsageError, match="the trajectory is damaged: "):
+        checked(replace(stage, **WRONG[what](stage)))
+
+
+def test_what_standing_things_and_discs_must_be():
+    stage = stage_of(epoch(TASKS[0]))
+    canals, lander = stage.backdrop
+    for wrong in (
+        replace(lander, numbers=(0.5, 0.5, 0.0)),
+        replace(lander, line="ink"),
+        replace(canals, cells=ONE),
+        replace(canals, cells=Channel.of(np.zeros((0, 4)))),
+    ):
+        with pytest.raises(UsageError, match="damaged"):
+            checked(replace(stage, backdrop=(wrong,)))
+
+
+def test_too_many_events_the_rarest_stay(monkeypatch):
+    monkeypatch.setattr(check, "MOST_EVENTS", 10)
+    stage = replace(stage_of(epoch(GACC)), events=())
+    often = [Event(t, 0, f"often {t}") for t in range(20)]
+    rarely = [Event(t, 4, f"rarely {t}") for t in range(0, 18, 3)]
+    few = checked(replace(stage, events=(*often, *rarely)))
+    assert [event.text for event in few.events] == [
+        *("often 0", "rarely 0", "often 1", "often 2", "often 3", "rarely 3"),
+        *("rarely 6", "rarely 9", "rarely 12", "rarely 15"),
+    ]
+    assert few.facts[-1] == ("events", "10 of 26 shown, the rarest kinds first")
+    enough = checked(replace(stage, events=tuple(often[9::-1])))
+    assert enough.events == tuple(often[:10])
+    assert enough.facts == stage.facts
+
+
+def test_a_stage_is_the_same_from_a_file(tmp_path):
+    for task in TASKS:
+        trajectory = epoch(task)
+        path = tmp_path / "epoch.npz"
+        path.unlink(missing_ok=True)
+        trajectory.save(path)
+        kept, shown = stage_of(Trajectory.load(path)), stage_of(trajectory)
+        assert isinstance(kept, Stage)
+        assert sorted(kept.facts) == sorted(shown.facts)
+        one, other = Pool(), Pool()
+        plain, wanted = one.plain(replace(kept, facts=())), other.plain(replace(shown, facts=()))
+        assert plain == wanted
+        assert one.data == other.data

@@ -1,0 +1,76 @@
+// uPlot with the look of these pages.
+
+import uPlot from "uplot";
+import "uplot/dist/uPlot.min.css";
+
+import { make } from "../shared/dom";
+import { number } from "./text";
+
+export const INK = "#1c1c22";
+export const FAINT = "#9a9aa5";
+const GRID = { stroke: "#e7e5df", width: 1 };
+const WHOLE = [...Array(9).keys()].flatMap((k) => [1, 2, 5].map((n) => n * 10 ** k)); // steps of ticks
+const FONT = "11px system-ui, sans-serif";
+
+/** Return what all charts have in common. */
+export function options(xLabel: string, yLabel: string, height: number): uPlot.Options {
+  const axis = { stroke: INK, grid: GRID, ticks: GRID, font: FONT, labelFont: FONT, labelSize: 18, labelGap: 0 };
+  const ticks = (_: uPlot, splits: number[]): string[] => splits.map((split) => number(split));
+  return {
+    width: 300,
+    height,
+    scales: { x: { time: false } },
+    axes: [
+      { ...axis, label: xLabel, size: 30, values: ticks, space: 60, incrs: WHOLE },
+      { ...axis, label: yLabel, size: 52, values: ticks },
+    ],
+    series: [],
+    cursor: { points: { size: 6 }, drag: { x: true, y: false } },
+    padding: [10, 22, 0, 0],
+  };
+}
+
+/** A chart in a place of the page, as wide as the place. It is made anew when its options change. */
+export class Chart {
+  readonly place: HTMLElement;
+  private plot: uPlot | null = null;
+  private key = "";
+
+  constructor(id = "") {
+    this.place = make("div", id ? { id, class: "chart" } : { class: "chart" });
+    new ResizeObserver(() => this.resize()).observe(this.place);
+  }
+
+  /** Draw data; `make` gives the options, asked for only where `key` is another than before. */
+  draw(key: string, data: uPlot.AlignedData, make: () => uPlot.Options): void {
+    if (this.plot && key === this.key) {
+      this.plot.setData(data);
+      return;
+    }
+    this.clear();
+    this.key = key;
+    this.plot = new uPlot(make(), data, this.place);
+    this.resize();
+  }
+
+  /** Say something where the chart would be. */
+  say(text: string): void {
+    if (this.key === `say ${text}`) return;
+    this.clear();
+    this.key = `say ${text}`;
+    this.place.append(make("p", { class: "faint" }, text));
+  }
+
+  private clear(): void {
+    this.plot?.destroy();
+    this.plot = null;
+    this.place.replaceChildren();
+  }
+
+  private resize(): void {
+    const width = Math.floor(this.place.clientWidth);
+    if (this.plot && width > 0 && width !== this.plot.width) {
+      this.plot.setSize({ width, height: this.plot.height });
+    }
+  }
+}

@@ -1,0 +1,111 @@
+// What happened, as a list: the kinds that are looked for, and a click jumps there.
+
+import { make, say, swatch } from "../shared/dom";
+import { INK } from "./paint";
+import type { Event, Stage } from "./stage";
+import type { Store } from "./state";
+
+/** Events that are listed at once; all are on the timeline and can be reached with "," and ".". */
+const MOST = 1500;
+
+export class Events {
+  readonly element: HTMLElement;
+  private readonly list: HTMLElement;
+  private readonly note = make("p", { class: "note", role: "status" });
+  /** Numbers of all events, the first to happen first. */
+  private readonly sorted: number[];
+  private readonly hidden = new Set<number>();
+  private shown: { t: number; button: HTMLElement }[] = [];
+  private current: HTMLElement | null = null;
+
+  constructor(
+    private readonly stage: Stage,
+    team: number,
+    private readonly store: Store,
+  ) {
+    this.sorted = stage.events.map((_, k) => k);
+    this.sorted.sort((a, b) => stage.events[a]!.t - stage.events[b]!.t || a - b);
+    this.list = make("div", { id: `events-${team}`, class: "events", role: "group" });
+    this.list.setAttribute("aria-label", "events, the first to happen first");
+    this.element = make("section", { class: "card of-events" }, make("h3", {}, "Events"));
+    const filters = make("div", { class: "filters" });
+    stage.event_kinds.forEach((_, kind) => filters.append(this.filter(kind)));
+    this.element.append(filters, this.list, this.note);
+    this.fill();
+    store.listen(({ t, playing }) => this.follow(t, playing));
+  }
+
+  /** Return the iterations at which something happened that is not filtered out, in order. */
+  get times(): number[] {
+    return this.sorted
+      .map((k) => this.stage.events[k]!)
+      .filter((one) => this.isWanted(one))
+      .map(({ t }) => t);
+  }
+
+  private isWanted(event: Event): boolean {
+    return !this.hidden.has(event.kind);
+  }
+
+  private filter(kind: number): HTMLElement {
+    const { name, colour } = this.stage.event_kinds[kind]!;
+    const n = this.stage.events.filter((event) => event.kind === kind).length;
+    const box = make("input", { type: "checkbox", checked: true, "data-kind": kind });
+    box.addEventListener("change", () => {
+      if (box.checked) this.hidden.delete(kind);
+      else this.hidden.add(kind);
+      this.fill();
+    });
+    return make("label", {}, box, swatch(colour || INK), `${name} (${n})`);
+  }
+
+  private fill(): void {
+    const wanted = this.sorted.filter((k) => this.isWanted(this.stage.events[k]!));
+    this.shown = wanted.slice(0, MOST).map((k) => {
+      const event = this.stage.events[k]!;
+      return { t: event.t, button: this.button(event, k) };
+    });
+    this.list.replaceChildren(...this.shown.map(({ button }) => button));
+    const all = this.stage.events.length;
+    if (!all) say(this.note, "Nothing happened in this epoch that would be listed.");
+    else if (wanted.length > MOST) say(this.note, `The first ${MOST} of ${wanted.length}.`);
+    else say(this.note, wanted.length < all ? `${wanted.length} of ${all}.` : "");
+    this.current = null;
+    this.follow(this.store.now.t, true);
+  }
+
+  private button(event: Event, k: number): HTMLElement {
+    const button = make("button", {
+      type: "button",
+      "data-event": k,
+      "data-t": event.t,
+      title: event.text,
+    });
+    const { colour } = this.stage.event_kinds[event.kind]!;
+    button.append(
+      make("b", {}, String(event.t)),
+      swatch(colour || INK),
+      make("span", {}, event.text),
+    );
+    button.addEventListener("click", () => this.store.set({ t: event.t }));
+    return button;
+  }
+
+  /** Mark what happened last; while playing it is kept in sight. */
+  private follow(t: number, playing: boolean): void {
+    let [low, high] = [0, this.shown.length];
+    while (low < high) {
+      const middle = (low + high) >> 1;
+      if (this.shown[middle]!.t <= t) low = middle + 1;
+      else high = middle;
+    }
+    const current = this.shown[low - 1]?.button ?? null;
+    if (current === this.current) return;
+    this.current?.removeAttribute("aria-current");
+    current?.setAttribute("aria-current", "true");
+    this.current = current;
+    // Who is at work in the list does not want it to move.
+    if (!current || !playing || this.list.matches(":hover, :focus-within")) return;
+    this.list.scrollTop = current.offsetTop - this.list.clientHeight / 2;
+  }
+}

@@ -1,0 +1,48 @@
+// Colours of robots, and the few that the page itself uses.
+
+import type { Stage } from "./stage";
+import type { State } from "./state";
+
+// The same as in conevo/replay/palette.py.
+export const INK = "#1c1c22";
+export const FAINT = "#9a9aa5";
+export const GROUND = "#fbfaf7";
+const HUES = ["#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00"];
+
+/** Return a colour for the k-th of some things that have none of their own. */
+export const hue = (k: number): string => HUES[k % HUES.length]!;
+
+/** Return the colour of a body: that of its kind, or of the robot's action or caste. */
+export function colourOf(stage: Stage, body: number, t: number, by: State["colourBy"]): string {
+  const robot = stage.robots[body];
+  if (!robot) return stage.body_kinds[stage.body[body]!]!.colour || FAINT;
+  if (by === "caste") return stage.castes[robot.caste]!.colour || FAINT;
+  return stage.actions[stage.action.at(t, body)]?.colour || FAINT;
+}
+
+/** A canvas as sharp as the screen, drawn in CSS pixels. */
+export class Sheet {
+  readonly pen: CanvasRenderingContext2D;
+  width = 0;
+  height = 0;
+
+  constructor(
+    readonly canvas: HTMLCanvasElement,
+    hasTransparency = true,
+  ) {
+    this.pen = canvas.getContext("2d", { alpha: hasTransparency })!;
+  }
+
+  /** Make room for a size in CSS pixels; all that was drawn is gone. */
+  resize(width: number, height: number): void {
+    const sharpness = Math.min(window.devicePixelRatio || 1, 2);
+    [this.width, this.height] = [width, height];
+    this.canvas.width = Math.max(Math.round(width * sharpness), 1);
+    this.canvas.height = Math.max(Math.round(height * sharpness), 1);
+    this.pen.setTransform(sharpness, 0, 0, sharpness, 0, 0);
+  }
+
+  clear(): void {
+    this.pen.clearRect(0, 0, this.width, this.height);
+  }
+}

@@ -1,0 +1,242 @@
+// What one robot is, reads and does: numbers, activations, and the history of its actions.
+
+import { make, say, swatch } from "../shared/dom";
+import type { Channel } from "./data";
+import { FAINT, hue, Sheet } from "./paint";
+import type { Stage } from "./stage";
+import type { State, Store } from "./state";
+
+/** A value that changes with time, its text and its bar. */
+interface Cell {
+  readonly value: HTMLElement;
+  readonly bar: HTMLElement | null;
+  readonly read: (t: number, robot: number) => string;
+  readonly part: (t: number, robot: number) => number;
+}
+
+export class RobotPanel {
+  readonly element: HTMLElement;
+  private robot = -1;
+  private cells: Cell[] = [];
+  private outputs: HTMLElement[] = [];
+  private readonly history = new Sheet(make("canvas", { class: "history", role: "img" }), false);
+  private readonly head = make("div", { class: "playhead" });
+
+  constructor(
+    private readonly stage: Stage,
+    private readonly team: number,
+    private readonly store: Store,
+  ) {
+    this.element = make("aside", {
+      id: `robot-${team}`,
+      class: "card robot",
+      "aria-label": "robot",
+    });
+    this.build();
+    store.listenSlowly((now) => this.update(now));
+    this.history.canvas.addEventListener("pointerdown", (event) => this.seek(event));
+    this.history.canvas.addEventListener("pointermove", (event) => this.seek(event));
+  }
+
+  private update(state: State): void {
+    const robot = state.selected?.team === this.team ? state.selected.robot : -1;
+    if (robot !== this.robot) {
+      this.robot = robot;
+      this.build();
+    }
+    if (robot < 0) return;
+    const { t } = state;
+    for (const { value, bar, read, part } of this.cells) {
+      say(value, read(t, robot));
+      bar?.style.setProperty("--part", part(t, robot).toFixed(3));
+    }
+    this.markHighest(t);
+    this.head.style.left = `${(100 * (t + 0.5)) / this.stage.iterations}%`;
+  }
+
+  private build(): void {
+    this.cells = [];
+    this.outputs = [];
+    const { stage, robot } = this;
+    if (robot < 0) {
+      const hint =
+        "Click a robot in the world or its row in the timeline, or press the down arrow.";
+      this.element.replaceChildren(make("h3", {}, "Robot"), make("p", { class: "note" }, hint));
+      return;
+    }
+    const { caste } = stage.robots[robot]!;
+    const close = make(
+      "button",
+      { type: "button", class: "plain", "aria-label": "deselect the robot" },
+      "×",
+    );
+    close.addEventListener("click", () => this.store.set({ selected: null }));
+    const title = make(
+      "h3",
+      {},
+      swatch(stage.castes[caste]!.colour || FAINT),
+      `Robot ${robot}`,
+      close,
+    );
+    this.element.replaceChildren(
+      title,
+      this.numbers(robot),
+      ...this.actions(robot),
+      ...this.network(robot),
+    );
+    this.drawHistory();
+  }
+
+  private numbers(robot: number): HTMLElement {
+    const { stage } = this;
+    const one = stage.robots[robot]!;
+    const numbers = make("dl", { class: "numbers" });
+    const unit = stage.unit ? ` ${stage.unit}` : "";
+    const add = (name: string, read: ((t: number, robot: number) => string) | string) => {
+      const value = make("dd", { "data-field": name });
+      if (typeof read === "string") value.textContent = read;
+      else this.cells.push({ value, bar: null, read, part: () => 0 });
+      numbers.append(make("div", {}, make("dt", {}, name), value));
+    };
+    add("action", (t, r) => stage.actions[stage.action.at(t, r)]?.name ?? "none");
+    add("caste", stage.castes[one.caste]!.name);
+    add("specialization", one.specialization.toFixed(3));
+    add("fitness", one.fitness.toPrecision(4));
+    if (stage.energy) add("energy", (t, r) => stage.energy!.at(t, r).toFixed(1));
+    add("x", (t, r) => stage.x.at(t, r).toFixed(3) + unit);
+    add("y", (t, r) => stage.y.at(t, r).toFixed(3) + unit);
+    if (stage.heading) add("heading", (t, r) => `${degrees(stage.heading!.at(t, r)).toFixed(0)}°`);
+    if (stage.held) add("holding", (t, r) => this.holding(t, r));
+    return numbers;
+  }
+
+  private holding(t: number, robot: number): string {
+    const k = this.stage.held!.at(t, robot);
+    if (k < 0) return "nothing";
+    const group = this.stage.things[0]!;
+    return `${group.kinds[group.kind.at(k)]!.name} ${k}`;
+  }
+
+  /** Return the strip of the robot's actions and the share of each. */
+  private actions(robot: number): HTMLElement[] {
+    const { stage } = this;
+    const counts = new Array<number>(stage.actions.length).fill(0);
+    let [none, switches] = [0, 0];
+    for (let t = 0; t < stage.iterations; t++) {
+      const action = stage.action.at(t, robot);
+      if (action < 0) none += 1;
+      else counts[action]! += 1;
+      if (t > 0 && action !== stage.action.at(t - 1, robot)) switches += 1;
+    }
+    const shares = make("ul", { class: "shares" });
+    const add = (name: string, colour: string, n: number) => {
+      const bar = make("i", { class: "bar" });
+      bar.style.setProperty("--part", String(n / stage.iterations));
+      bar.style.setProperty("--colour", colour);
+      const share = `${((100 * n) / stage.iterations).toFixed(1)} %`;
+      shares.append(make("li", {}, make("span", {}, name), bar, make("b", {}, share)));
+    };
+    stage.actions.forEach((kind, action) => add(kind.name, kind.colour || FAINT, counts[action]!));
+    if (none) add("none", FAINT, none);
+    const times = switches === 1 ? "1 switch" : `${switches} switches`;
+    this.history.canvas.setAttribute("aria-label", `actions of robot ${robot} over time, ${times}`);
+    const strip = make("div", { class: "strip" }, this.history.canvas, this.head);
+    return [make("h4", {}, `Actions: ${times}`), strip, shares];
+  }
+
+  private drawHistory(): void {
+    const { canvas, pen } = this.history;
+    const [width, height] = [canvas.clientWidth || 300, 16];
+    this.history.resize(width, height);
+    for (let x = 0; x < width; x++) {
+      const t = Math.floor(((x + 0.5) * this.stage.iterations) / width);
+      pen.fillStyle = this.stage.actions[this.stage.action.at(t, this.robot)]?.colour || FAINT;
+      pen.fillRect(x, 0, 1, height);
+    }
+  }
+
+  private network(robot: number): HTMLElement[] {
+    const { stage } = this;
+    const { heuristic, n_hidden } = stage.robots[robot]!;
+    if (heuristic) {
+      const text = `Controlled by the heuristic ${heuristic}: it has no network.`;
+      return [make("p", { class: "note" }, text), ...this.sensors()];
+    }
+    const parts = this.sensors();
+    if (stage.hidden) {
+      const n = Math.min(n_hidden, stage.hidden.shape[2]!);
+      const names = Array.from({ length: n }, (_, k) => `neuron ${k}`);
+      parts.push(
+        make("h4", {}, "Hidden layer"),
+        this.values("hidden", stage.hidden, names, 0, FAINT),
+      );
+    }
+    if (stage.outputs) {
+      const names = Array.from(
+        { length: stage.outputs.shape[2]! },
+        (_, k) => stage.output_names[k] ?? `output ${k}`,
+      );
+      parts.push(make("h4", {}, "Outputs"), this.values("output", stage.outputs, names, 0, FAINT));
+    }
+    return parts;
+  }
+
+  private sensors(): HTMLElement[] {
+    const { sensors, sensor_groups } = this.stage;
+    if (!sensors) return [];
+    return sensor_groups.flatMap((group, index) => {
+      const title = make("h4", {}, `Sensors: ${group.name}`);
+      // The colour is that of the wedges in the world.
+      if (group.angles.length) title.prepend(swatch(hue(index)));
+      return [title, this.values("sensor", sensors, group.names, group.first, hue(index))];
+    });
+  }
+
+  /** Return a list of activations, each with its bar. */
+  private values(
+    of: string,
+    channel: Channel,
+    names: string[],
+    first: number,
+    colour: string,
+  ): HTMLElement {
+    const list = make("ul", { class: "values" });
+    const [least, most] = channel.range();
+    const extent = Math.max(-least, most, 1);
+    names.forEach((name, k) => {
+      const value = make("b", { [`data-${of}`]: first + k });
+      const bar = make("i", { class: "bar" });
+      bar.style.setProperty("--colour", colour);
+      const item = make("li", { title: name }, make("span", {}, name), bar, value);
+      list.append(item);
+      if (of === "output") this.outputs.push(item);
+      this.cells.push({
+        value,
+        bar,
+        read: (t, r) => channel.at(t, r, first + k).toFixed(3),
+        part: (t, r) => Math.min(Math.abs(channel.at(t, r, first + k)) / extent, 1),
+      });
+    });
+    return list;
+  }
+
+  /** Mark the highest output: it decides. */
+  private markHighest(t: number): void {
+    const { outputs } = this.stage;
+    // Where outputs are fewer than actions, they are no votes: wheels have speeds.
+    if (!outputs || !this.outputs.length || this.outputs.length < this.stage.actions.length) return;
+    const values = this.outputs.map((_, k) => outputs.at(t, this.robot, k));
+    // Several may be as high, as far as kept values tell.
+    const most = Math.max(...values);
+    this.outputs.forEach((item, k) => item.classList.toggle("highest", values[k] === most));
+  }
+
+  private seek(event: PointerEvent): void {
+    if (!(event.buttons & 1)) return;
+    const box = this.history.canvas.getBoundingClientRect();
+    const T = this.stage.iterations;
+    this.store.set({ t: Math.floor(((event.clientX - box.left) / box.width) * T) });
+  }
+}
+
+const degrees = (angle: number): number => ((((angle * 180) / Math.PI) % 360) + 360) % 360;

@@ -1,0 +1,111 @@
+// What stands beside a world: its key, gauges, what is to be built, and facts about the epoch.
+
+import { make, say, swatch } from "../shared/dom";
+import { short } from "./marks";
+import { FAINT, INK } from "./paint";
+import type { Stage } from "./stage";
+import type { Store } from "./state";
+
+/** Return the cards of a stage; what it has nothing for stays out of sight. */
+export function cards(
+  stage: Stage,
+  store: Store,
+): Record<"key" | "gauges" | "plan" | "facts", HTMLElement> {
+  return {
+    key: card("key", "In the world", key(stage)),
+    gauges: card("gauges", "Now", gauges(stage, store)),
+    plan: card("plan", "To be built", plan(stage, store)),
+    facts: card("facts", "This epoch", facts(stage)),
+  };
+}
+
+function card(name: string, title: string, content: HTMLElement): HTMLElement {
+  const isEmpty = !content.childElementCount;
+  return make(
+    "section",
+    { class: `card of-${name}`, hidden: isEmpty },
+    make("h3", {}, title),
+    content,
+  );
+}
+
+/** What can be seen in the world besides the robots. */
+function key(stage: Stage): HTMLElement {
+  const list = make("ul", { class: "key" });
+  const add = (name: string, fill: string, line: string, shape: string) => {
+    const sign = swatch(fill || "transparent");
+    sign.classList.add(shape);
+    if (line) sign.style.borderColor = line;
+    list.append(make("li", {}, sign, name));
+  };
+  for (const { name, colour, shape } of stage.body_kinds) {
+    if (colour) add(name, colour, INK, shape === "square" ? "diamond" : "disc");
+  }
+  if (stage.action.range()[0] < 0) add("robot without an action", FAINT, INK, "disc");
+  for (const { kinds, shape, states } of stage.things) {
+    for (const { name, colour } of kinds) add(name, colour, "", shape);
+    for (const { name, colour } of states) if (colour) add(name, "", colour, shape);
+  }
+  for (const { label, fill, line, shape } of stage.backdrop) {
+    if (label && fill) add(label, fill, line, shape);
+  }
+  for (const { name, when } of stage.rings) {
+    add(name, when === "action" ? "#e9e9ec" : "", FAINT, when === "action" ? "disc" : "dashed");
+  }
+  return list;
+}
+
+function gauges(stage: Stage, store: Store): HTMLElement {
+  const list = make("ul", { class: "values" });
+  const rows = stage.gauges.map(({ name, colour }) => {
+    const [bar, value] = [make("i", { class: "bar" }), make("b")];
+    if (colour) bar.style.setProperty("--colour", colour);
+    list.append(make("li", {}, make("span", {}, name), bar, value));
+    return { bar, value };
+  });
+  store.listenSlowly(({ t }) => {
+    stage.gauges.forEach(({ values, most }, k) => {
+      const now = values.at(t);
+      const part = most > 0 ? Math.min(Math.max(now / most, 0), 1) : 0;
+      rows[k]!.bar.style.setProperty("--part", part.toFixed(3));
+      say(rows[k]!.value, short(now));
+    });
+  });
+  return list;
+}
+
+function plan(stage: Stage, store: Store): HTMLElement {
+  const kinds = stage.things[0]?.kinds ?? [];
+  const list = make("ul", { class: "plan" });
+  const parts: { built: number; element: HTMLElement }[] = [];
+  const counts: { built: number[]; element: HTMLElement }[] = [];
+  for (const row of stage.plan) {
+    const line = make("span", { class: "parts" });
+    row.parts.forEach((part, k) => {
+      const { name, colour } = kinds[part]!;
+      const element = make("i", { title: name, role: "img", "aria-label": name });
+      element.style.setProperty("--colour", colour);
+      parts.push({ built: row.built[k]!, element });
+      line.append(element);
+    });
+    const count = make("b");
+    counts.push({ built: row.built, element: count });
+    const order = row.is_ordered ? "in this order" : "in any order";
+    list.append(make("li", { title: order }, make("span", {}, row.name), line, count));
+  }
+  store.listenSlowly(({ t }) => {
+    for (const { built, element } of parts) element.classList.toggle("built", t >= built);
+    for (const { built, element } of counts) {
+      say(element, `${built.filter((at) => t >= at).length} of ${built.length}`);
+    }
+  });
+  return list;
+}
+
+function facts(stage: Stage): HTMLElement {
+  const list = make("dl", { class: "facts" });
+  for (const [name, value] of stage.facts as [string, string][]) {
+    list.append(make("div", {}, make("dt", {}, name), make("dd", {}, value)));
+  }
+  return list;
+}

@@ -1,0 +1,102 @@
+// What the reader of the page has chosen, and who is told when it changes.
+
+import type { Stage } from "./stage";
+import { type Look, wholeOf } from "./view";
+
+/** Iterations per second that can be chosen. */
+export const SPEEDS = [5, 15, 30, 60, 120, 240, 480, 960];
+
+export interface State {
+  /** The frame that is shown, 0 to T - 1. */
+  readonly t: number;
+  readonly playing: boolean;
+  readonly speed: number;
+  readonly colourBy: "action" | "caste";
+  /** How the rows of the timeline are sorted. */
+  readonly order: "number" | "caste";
+  readonly trails: boolean;
+  readonly ranges: boolean;
+  /** What part of the world is looked at, the same for all teams. */
+  readonly look: Look;
+  readonly selected: { readonly team: number; readonly robot: number } | null;
+}
+
+type Listener = (now: State, before: State) => void;
+
+/** The state of the page. Listeners are told once per animation frame, however much has changed. */
+export class Store {
+  now: State;
+  private told: State;
+  private readonly listeners: Listener[] = [];
+  private asked = 0;
+
+  constructor(readonly stages: readonly Stage[]) {
+    this.now = this.told = {
+      t: 0,
+      playing: false,
+      speed: 60,
+      colourBy: "action",
+      order: "number",
+      trails: true,
+      ranges: false,
+      look: this.whole,
+      selected: null,
+    };
+  }
+
+  /** The look at the whole world. */
+  get whole(): Look {
+    return wholeOf(this.stages[0]!.bounds);
+  }
+
+  /** The number of iterations. */
+  get length(): number {
+    return this.stages[0]!.iterations;
+  }
+
+  listen(listener: Listener): void {
+    this.listeners.push(listener);
+  }
+
+  /** Listen as often as a reader can follow numbers: ten times a second while playing. */
+  listenSlowly(listener: (now: State) => void): void {
+    let last = -Infinity;
+    this.listen((now) => {
+      const time = performance.now();
+      if (now.playing && time - last < 100) return;
+      last = time;
+      listener(now);
+    });
+  }
+
+  /** Change something; what is out of range is brought into it. */
+  set(change: Partial<State>): void {
+    const next = { ...this.now, ...change };
+    const t = Math.min(Math.max(Math.floor(next.t) || 0, 0), this.length - 1);
+    const { selected } = next;
+    const isThere = selected && this.stages[selected.team]?.robots[selected.robot];
+    let { look } = next;
+    if (look !== this.now.look) look = look.zoom > 1 ? this.within(look) : this.whole;
+    this.now = { ...next, t, look, selected: isThere ? selected : null };
+    this.asked ||= requestAnimationFrame(() => this.tell());
+  }
+
+  /** Return a look that does not leave the world. */
+  private within(look: Look): Look {
+    const [x0, y0, x1, y1] = this.stages[0]!.bounds as [number, number, number, number];
+    const keep = (value: number, low: number, high: number) => {
+      const half = (high - low) / (2 * look.zoom);
+      return Math.min(Math.max(value, low + half), high - half);
+    };
+    return { zoom: look.zoom, x: keep(look.x, x0, x1), y: keep(look.y, y0, y1) };
+  }
+
+  /** Tell all listeners now. */
+  tell(): void {
+    cancelAnimationFrame(this.asked);
+    this.asked = 0;
+    const [now, before] = [this.now, this.told];
+    this.told = now;
+    for (const listener of this.listeners) listener(now, before);
+  }
+}

@@ -1,0 +1,132 @@
+// One team: its world, what is said beside it, and its timeline.
+
+import { make } from "../shared/dom";
+import { Events } from "./events";
+import { Marks } from "./marks";
+import { RobotPanel } from "./robot";
+import { cards } from "./side";
+import type { Stage } from "./stage";
+import type { Store } from "./state";
+import { Timeline } from "./timeline";
+import type { Tooltip } from "./tooltip";
+import { World } from "./world";
+
+/** When what stands beside the world goes below it, as in the style sheet. */
+const STACKED = "(max-width: 900px)";
+/** Pixels beside the world that it leaves to what is said about it. */
+const BESIDE = 250;
+/** What the column of S says. */
+const DEGREE =
+  "S: switches to another action, out of those that could be; S = 0 is a perfect specialist";
+
+export class Team {
+  readonly element: HTMLElement;
+  readonly world: World;
+  readonly events: Events;
+  readonly timeline: Timeline;
+  private readonly marks: Marks;
+  private readonly stageBox = make("div", { class: "world" });
+  private readonly times: HTMLElement;
+  private readonly head = make("div", { class: "playhead" });
+  /** Of the timeline, in CSS pixels. */
+  private width = 0;
+
+  constructor(
+    readonly stage: Stage,
+    team: number,
+    private readonly store: Store,
+    tooltip: Tooltip,
+  ) {
+    const canvas = make("canvas", { id: `world-${team}`, role: "img" });
+    canvas.setAttribute("aria-label", `the world of ${stage.title}, seen from above`);
+    this.world = new World(canvas, stage, team, store, tooltip);
+    this.timeline = new Timeline(stage, team, store, tooltip);
+    this.marks = new Marks(stage, team, store, tooltip);
+    this.events = new Events(stage, team, store);
+    const panel = new RobotPanel(stage, team, store);
+
+    const whole = make("button", { type: "button", class: "whole", hidden: true }, "whole world");
+    whole.addEventListener("click", () => store.set({ look: store.whole }));
+    this.stageBox.append(canvas, whole);
+    const { key, gauges, plan, facts } = cards(stage, store);
+    const about = make("div", {}, panel.element, key, facts);
+    const side = make(
+      "div",
+      { class: "side" },
+      about,
+      make("div", {}, gauges, plan, this.events.element),
+    );
+    this.times = make(
+      "div",
+      { class: "times" },
+      this.timeline.canvas,
+      this.marks.canvas,
+      this.head,
+    );
+    const { left, right } = this.timeline;
+    const caption = make(
+      "p",
+      {},
+      "What every robot did, from the first iteration to the last; dark ticks: switches",
+    );
+    const ends = make("div", {}, right, this.marks.right);
+    const lines = make(
+      "div",
+      { class: "lines" },
+      make("i"),
+      caption,
+      make("p", { title: DEGREE }, "S, caste"),
+      left,
+      this.times,
+      ends,
+    );
+    const title = make("h2", {}, make("b", {}, stage.title), make("span", {}, stage.subtitle));
+    this.element = make("section", { class: "team", "aria-label": stage.title }, title);
+    this.element.append(this.stageBox, make("div", { class: "beside" }, side), lines);
+
+    store.listen((now) => {
+      this.world.draw(now);
+      this.placeHead(now.t);
+      whole.hidden = now.look.zoom <= 1;
+    });
+  }
+
+  /** Move the playhead; by a transform, which lays nothing out again. */
+  private placeHead(t: number): void {
+    const x = (this.width * (t + 0.5)) / this.stage.iterations;
+    this.head.style.transform = `translateX(${x.toFixed(1)}px)`;
+  }
+
+  /** Follow the sizes that the page gives; the first drawing comes with them. */
+  watch(): void {
+    const { element, stageBox, times, world, timeline, marks, stage } = this;
+    const resize = () => {
+      const isStacked = matchMedia(STACKED).matches;
+      const room = times.parentElement!.clientWidth;
+      const most = isStacked ? room : Math.max(room - BESIDE, room * 0.4);
+      const { aspect } = world.view;
+      const width = Math.max(Math.floor(Math.min(most, stageBox.clientHeight * aspect)), 1);
+      const height = Math.max(Math.floor(width / aspect), 1);
+      element.style.setProperty("--world", `${width}px`);
+      world.canvas.style.width = `${width}px`;
+      world.canvas.style.height = `${height}px`;
+      world.resize(width, height);
+    };
+    const stretch = () => {
+      const rows = stage.robots.length;
+      const height = Math.min(Math.max(window.innerHeight * 0.2, 5 * rows), 16 * rows);
+      const { width } = times.getBoundingClientRect();
+      this.width = width;
+      this.placeHead(this.store.now.t);
+      timeline.canvas.style.height = `${Math.round(height)}px`;
+      timeline.resize(width, Math.round(height));
+      marks.canvas.style.height = `${marks.height}px`;
+      marks.resize(width);
+    };
+    stretch();
+    resize();
+    new ResizeObserver(stretch).observe(times);
+    const observer = new ResizeObserver(resize);
+    for (const one of [stageBox, times]) observer.observe(one);
+  }
+}

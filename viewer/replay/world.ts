@@ -1,0 +1,128 @@
+// The world of one team on its canvas, as it is in the frame that is shown.
+
+import { drawBodies, drawHeld, drawMark, drawTrails } from "./bodies";
+import { drawGround, drawLabels } from "./ground";
+import { Sheet } from "./paint";
+import { drawRings, drawWedges } from "./ranges";
+import type { Stage } from "./stage";
+import type { State, Store } from "./state";
+import { Heap } from "./things";
+import type { Tooltip } from "./tooltip";
+import { type Look, nearest, View } from "./view";
+import { letZoom } from "./zoom";
+
+export class World {
+  readonly view: View;
+  private readonly sheet: Sheet;
+  /** The ground is drawn once for a size, and copied. */
+  private readonly ground = new Sheet(document.createElement("canvas"), false);
+  private readonly heaps: Heap[];
+  /** What the ground was drawn for. */
+  private look: Look | null = null;
+  /** The body below the pointer, and the frame in which it was there. */
+  private hovered = -1;
+  private hoveredAt = 0;
+
+  constructor(
+    readonly canvas: HTMLCanvasElement,
+    private readonly stage: Stage,
+    private readonly team: number,
+    private readonly store: Store,
+    private readonly tooltip: Tooltip,
+  ) {
+    this.view = new View(stage.bounds);
+    this.sheet = new Sheet(canvas, false);
+    this.heaps = stage.things.map((things) => new Heap(things));
+    letZoom(canvas, this.view, store);
+    canvas.addEventListener("click", (event) => this.click(event));
+    canvas.addEventListener("pointermove", (event) => this.hover(event));
+    canvas.addEventListener("pointerleave", () => this.leave());
+  }
+
+  /** Take the size that the page gives to the canvas, in CSS pixels. */
+  resize(width: number, height: number): void {
+    this.sheet.resize(width, height);
+    this.ground.resize(width, height);
+    this.look = null;
+    this.draw(this.store.now);
+  }
+
+  private drawGround(look: Look): void {
+    const { pen, width, height } = this.ground;
+    this.look = look;
+    this.view.fit(width, height, look);
+    pen.fillStyle = "#ffffff";
+    pen.fillRect(0, 0, width, height);
+    drawGround(pen, this.stage, this.view);
+  }
+
+  draw(state: State): void {
+    const { stage, view } = this;
+    const { pen, width, height } = this.sheet;
+    if (!width || !height) return;
+    if (this.hovered >= 0 && state.t !== this.hoveredAt) {
+      this.hovered = -1;
+      this.tooltip.hide();
+    }
+    const selected = state.selected?.team === this.team ? state.selected.robot : -1;
+    if (state.look !== this.look) this.drawGround(state.look);
+    pen.drawImage(this.ground.canvas, 0, 0, width, height);
+    for (const heap of this.heaps) heap.draw(pen, view, state.t);
+    drawLabels(pen, stage, view);
+    drawRings(pen, stage, view, state, selected);
+    if (selected >= 0) drawWedges(pen, stage, view, state.t, selected);
+    if (state.trails) drawTrails(pen, stage, view, state);
+    drawBodies(pen, stage, view, state);
+    drawHeld(pen, stage, view, this.heaps[0], state.t);
+    if (this.hovered >= 0 && this.hovered !== selected) {
+      drawMark(pen, stage, view, state.t, this.hovered, false);
+    }
+    if (selected >= 0) drawMark(pen, stage, view, state.t, selected, true);
+  }
+
+  /** Return where a body is now, in pixels of the browser's window. */
+  place(body: number): { x: number; y: number } {
+    const box = this.canvas.getBoundingClientRect();
+    const { t } = this.store.now;
+    const x = box.left + this.view.x(this.stage.x.at(t, body));
+    return { x, y: box.top + this.view.y(this.stage.y.at(t, body)) };
+  }
+
+  private below(event: MouseEvent, among: number): number {
+    const box = this.canvas.getBoundingClientRect();
+    const [x, y] = [event.clientX - box.left, event.clientY - box.top];
+    return nearest(this.stage, this.view, this.store.now.t, x, y, among);
+  }
+
+  private click(event: MouseEvent): void {
+    const robot = this.below(event, this.stage.robots.length);
+    this.store.set({ selected: robot < 0 ? null : { team: this.team, robot } });
+  }
+
+  private hover(event: PointerEvent): void {
+    const body = this.below(event, this.stage.body.length);
+    this.canvas.style.cursor = body >= 0 && body < this.stage.robots.length ? "pointer" : "";
+    if (body < 0) return this.leave();
+    this.tooltip.show(event.clientX, event.clientY, this.words(body));
+    if (body !== this.hovered) {
+      this.hovered = body;
+      this.hoveredAt = this.store.now.t;
+      this.draw(this.store.now);
+    }
+  }
+
+  private words(body: number): string {
+    const { stage } = this;
+    const robot = stage.robots[body];
+    if (!robot) return stage.body_kinds[stage.body[body]!]!.name;
+    const action = stage.actions[stage.action.at(this.store.now.t, body)]?.name ?? "no action";
+    return `robot ${body}: ${action} (${stage.castes[robot.caste]!.name})`;
+  }
+
+  private leave(): void {
+    this.tooltip.hide();
+    if (this.hovered < 0) return;
+    this.hovered = -1;
+    this.draw(this.store.now);
+  }
+}
