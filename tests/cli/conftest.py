@@ -22,8 +22,9 @@ class Said:
 
 @pytest.fixture
 def say(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]):
-    """Return a function that runs a command in an empty directory."""
+    """Return a function that runs a command in an empty directory; no browser opens."""
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("webbrowser.open", lambda address: True)
 
     def run(*arguments: str) -> Said:
         monkeypatch.setattr(sys, "argv", ["conevo", *arguments])

@@ -35,7 +35,7 @@ def test_a_session_from_run_to_the_commands_it_recommends(say, tmp_path: Path) -
     assert "Testing phase, 3 fresh scenarios" in said.out
     assert "5 of 5 generations" in said.out
     recommended = re.findall(r"^  (conevo .*)$", said.out, flags=re.MULTILINE)
-    assert [line.split()[1] for line in recommended] == ["show", "test", "run", "run"]
+    assert [line.split()[1] for line in recommended] == ["show", "replay", "test", "run", "run"]
     for line in recommended:
         again = say(*shlex.split(line)[1:])
         assert again.code == 0, again.err

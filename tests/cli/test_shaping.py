@@ -35,7 +35,7 @@ def test_a_shaping_from_run_to_the_commands_it_recommends(say, tmp_path: Path) -
         assert f"stage {stage} of 3: rover-v1/complex-{stage}, CONE, preset smoke" in said.out
     assert said.out.count("generation 5/5  value") == 3
     recommended = re.findall(r"^  (conevo .*)$", said.out, flags=re.MULTILINE)
-    assert [line.split()[1] for line in recommended] == ["show", "test", "test"]
+    assert [line.split()[1] for line in recommended] == ["show", "replay", "test", "test"]
     for line in recommended:
         again = say(*shlex.split(line)[1:])
         assert again.code == 0, again.err

@@ -120,8 +120,9 @@ def test_speed_is_in_iterations_per_second(team):
     for speed, n in ((30, 15), (120, 50), (480, 180)):
         team.select_option("#speed", str(speed))
         assert state(team)["speed"] == speed
-        # Where a machine is too busy to draw, time is lost: the best of some tries counts.
-        assert max(team.evaluate(paced, n) for _ in range(3)) == pytest.approx(speed, rel=0.25)
+        # Where a machine is too busy to draw, time is lost: one of some tries must be right.
+        tries = (team.evaluate(paced, n) for _ in range(4))
+        assert any(rate == pytest.approx(speed, rel=0.2) for rate in tries), speed
 
 
 def test_scrubbing_shows_that_iteration(team):

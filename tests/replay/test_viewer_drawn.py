@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -25,6 +26,7 @@ from replay.viewing import (
     seek,
     shown,
     state,
+    until,
     where,
 )
 
@@ -148,6 +150,40 @@ def test_robots_have_the_colour_of_their_action_or_caste(tab, epoch, tmp_path):
                 assert known.count(colour) > 0.8 * len(known), (robot, t, by)
 
 
+def test_zooming_keeps_robots_under_the_mouse(team):
+    """By keys around the selected robot, by the wheel where the mouse is; dragging moves."""
+    seek(team, 75)
+    whole = [where(team, robot) for robot in range(R)]
+    team.evaluate("conevo.select(0, 2)")
+    for _ in range(3):
+        team.keyboard.press("z")
+    state(team)
+    box, near = inside(team, "#world-0"), where(team, 2)
+    assert np.hypot(*np.subtract(where(team, 1), near)) > 3 * np.hypot(*np.subtract(*whole[1:3]))
+    assert box["x"] < near[0] < box["x"] + box["width"]
+    assert box["y"] < near[1] < box["y"] + box["height"]
+    team.keyboard.press("Escape")
+    team.mouse.click(*near)
+    assert state(team)["selected"] == {"team": 0, "robot": 2}
+    team.keyboard.press("Escape")
+    team.mouse.move(near[0] + 60, near[1] + 40)
+    team.mouse.down()
+    team.mouse.move(near[0] + 30, near[1] + 20, steps=5)
+    team.mouse.up()
+    assert state(team)["selected"] is None
+    assert np.subtract(where(team, 2), near) == pytest.approx([-30, -20], abs=8)
+    team.keyboard.press("0")
+    state(team)
+    assert np.array([where(team, robot) for robot in range(R)]) == pytest.approx(np.array(whole))
+    team.mouse.move(*whole[3])
+    team.mouse.wheel(0, -400)
+    until(team, "() => conevo.state().look.zoom > 1.5")
+    state(team)
+    assert where(team, 3) == pytest.approx(whole[3], abs=1)
+    seen = patch(team, *where(team, 3))
+    assert seen.count(team.evaluate("conevo.colour(0, 3)")) >= 4
+
+
 def test_robots_that_do_nothing_are_faint(team):
     seek(team, 110)
     assert team.evaluate("conevo.colour(0, 3)") == palette.FAINT
@@ -168,14 +204,19 @@ def test_a_trail_follows_its_robot(team):
     assert patch(team, *behind) != with_trail
 
 
-def test_nothing_is_lost_of_the_numbers_of_everybody(team):
-    """Every value of the made-up team at a few iterations, read without the mouse."""
+def test_nothing_is_lost_of_the_numbers_of_everybody(tab, tmp_path):
+    """Every value of a made-up team at a few iterations, small and large ones."""
     stage = made_up()
+    large = tuple(replace(one, fitness=98765.4321 * 10**k) for k, one in enumerate(stage.robots))
+    stage = replace(stage, robots=large)
+    open_page(tab, replay_page([stage]), tmp_path / "large.html")
     for t in (0, 77, T - 1):
-        seek(team, t)
+        seek(tab, t)
         for robot in range(R):
-            team.evaluate("r => conevo.select(0, r)", robot)
-            said = shown(team)
+            tab.evaluate("r => conevo.select(0, r)", robot)
+            said = shown(tab)
+            number, tolerance = number_in(said["field"]["fitness"])
+            assert number == pytest.approx(stage.robots[robot].fitness, abs=tolerance)
             for name, channel in (
                 ("sensor", stage.sensors),
                 ("hidden", stage.hidden),

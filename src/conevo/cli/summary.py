@@ -130,6 +130,7 @@ def next_commands(run: Run) -> list[str]:
     again = f"conevo run --config {run.path}/config.toml --seed {seed + 1}"
     commands = {
         f"conevo show {run.path}": "its generations",
+        f"conevo replay {run.path}": "see its team in the browser",
         f"conevo test {run.path} --scenarios 100": "test its team longer",
         again: "the same with another seed",
         repeat + "".join(changes): "the same with another method",
