@@ -64,7 +64,12 @@ def made_up(title: str = "Made-up team", shift: float = 0.0, **changes: Any) -> 
         actions=tuple(map(Kind, ("look", "walk", "grip", "rest"), palette.several(4))),
         castes=(Kind("scout", palette.SKY), Kind("non-specialized", palette.FAINT)),
         robots=tuple(
-            Robot(caste=k % 2, specialization=0.1 + 0.2 * k, fitness=10.5 * k, n_hidden=3 - k % 2)
+            Robot(
+                caste=k % 2,
+                specialization=0.1 + 0.2 * k,
+                fitness=10.5 * k,
+                neurons=(0, 2, 1)[: 3 - k % 2],
+            )
             for k in range(R)
         ),
         body_kinds=(BodyKind("robot", 0.15), BodyKind("prey", 0.15, "square", palette.VERMILION)),
@@ -196,7 +201,7 @@ def crowd(robots: int = 30, rocks: int = 2000, iterations: int = 2500) -> Stage:
         seconds=0.0,
         bounds=(0.0, 0.0, 1.0, 1.0),
         iterations=iterations,
-        robots=tuple(Robot(k % 2, 0.5, float(k), n_hidden=10) for k in range(robots)),
+        robots=tuple(Robot(k % 2, 0.5, float(k), neurons=tuple(range(10))) for k in range(robots)),
         body_kinds=(BodyKind("rover", 0.004),),
         body=(0,) * robots,
         x=Channel.of(x),

@@ -49,8 +49,9 @@ def test_a_stage_shows_what_was_recorded(task, is_heuristic):
     assert castes == about["labels"]
     assert stage.castes[-1] == Kind("non-specialized", palette.FAINT)
     assert {kind.name for kind in stage.castes} == {*about["castes"], "non-specialized"}
-    for name in ("specialization", "fitness", "heuristic", "n_hidden"):
+    for name in ("specialization", "fitness", "heuristic"):
         assert [getattr(robot, name) for robot in stage.robots] == about[name]
+    assert [list(robot.neurons) for robot in stage.robots] == about["neurons"]
     assert (stage.iterations, len(stage.robots)) == (t, r)
     assert sorted(stage.events, key=lambda event: event.t) == list(stage.events)
     x0, y0, x1, y1 = stage.bounds
@@ -74,7 +75,7 @@ def test_a_stage_becomes_json_and_every_sensor_has_a_name(task):
 def test_a_team_of_heuristic_robots_has_no_activations():
     trajectory = epoch(TASKS[0])
     r = trajectory.about["n_robots"]
-    stage = stage_of(renamed(trajectory, heuristic=["low"] * r, n_hidden=[0] * r))
+    stage = stage_of(renamed(trajectory, heuristic=["low"] * r, neurons=[[]] * r))
     assert stage.hidden is stage.outputs is None
     assert stage.sensors is not None
     assert dict(stage.facts)["heuristic robots"] == f"{r} low"

@@ -107,7 +107,7 @@ def check_network(epoch, t, robot, said):
         "hidden": filled if has_network else (),
         "output": range(channels["outputs"].shape[2]) if has_network else (),
     }
-    assert len(said["hidden"]) == (about["n_hidden"][robot] if has_network else 0)
+    assert len(said["hidden"]) == (len(about["neurons"][robot]) if has_network else 0)
     for (name, wanted), channel in zip(
         slots.items(), ("sensors", "hidden", "outputs"), strict=True
     ):
@@ -223,9 +223,10 @@ def test_nothing_is_lost_of_the_numbers_of_everybody(tab, tmp_path):
                 ("output", stage.outputs),
             ):
                 values = channel.values[t, robot]
-                if name == "hidden":
-                    values = values[: stage.robots[robot].n_hidden]
-                for k, value in enumerate(values):
+                slots = stage.robots[robot].neurons if name == "hidden" else range(len(values))
+                assert set(said[name]) == {str(k) for k in slots}
+                for k in slots:
+                    value = values[k]
                     number, tolerance = number_in(said[name][str(k)])
                     assert number == pytest.approx(value, abs=tolerance), (name, k, robot, t)
 

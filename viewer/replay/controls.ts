@@ -1,6 +1,6 @@
 // Buttons, sliders and the legend: everything of the reader's choice.
 
-import { find, make, say, swatch } from "../shared/dom";
+import { find, make, named, say, swatch } from "../shared/dom";
 import type { Clock } from "./clock";
 import { FAINT } from "./paint";
 import type { Kind } from "./stage";
@@ -68,7 +68,7 @@ export class Controls {
     const entries = [...kinds.values()].map(({ name, colour }) => {
       const sign = swatch(colour || FAINT);
       sign.classList.add("disc");
-      return make("li", {}, sign, name);
+      return make("li", {}, sign, named(name));
     });
     this.legend.replaceChildren(...entries);
   }

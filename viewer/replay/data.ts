@@ -1,5 +1,7 @@
 // Numbers of a trajectory as they are kept: small codes, each standing for a value.
 
+const LARGEST = 1e15; // of a value: beyond it even whole numbers would not be exact
+
 type Codes = Uint8Array | Uint16Array | Uint32Array;
 
 /** The data are not what they should be; the message is for the reader of the page. */
@@ -48,6 +50,10 @@ export class Pool {
     const Kind = kinds[bytes as 1 | 2 | 4];
     if (!Kind || at % bytes || at + bytes * count > this.memory.byteLength) {
       throw new Damaged("a channel lies outside of the data");
+    }
+    const top = low + step * (2 ** (8 * bytes) - 1);
+    if (!(Math.abs(low) <= LARGEST && Math.abs(top) <= LARGEST)) {
+      throw new Damaged("a channel has numbers beyond all measure");
     }
     return new Channel(new Kind(this.memory, at, count), shape, low, step);
   }

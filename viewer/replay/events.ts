@@ -1,6 +1,6 @@
 // What happened, as a list: the kinds that are looked for, and a click jumps there.
 
-import { make, say, swatch } from "../shared/dom";
+import { make, named, say, swatch } from "../shared/dom";
 import { INK } from "./paint";
 import type { Event, Stage } from "./stage";
 import type { Store } from "./state";
@@ -56,7 +56,7 @@ export class Events {
       else this.hidden.add(kind);
       this.fill();
     });
-    return make("label", {}, box, swatch(colour || INK), `${name} (${n})`);
+    return make("label", {}, box, swatch(colour || INK), named(name), `(${n})`);
   }
 
   private fill(): void {

@@ -101,7 +101,7 @@ export class RobotPanel {
     add("action", (t, r) => stage.actions[stage.action.at(t, r)]?.name ?? "none");
     add("caste", stage.castes[one.caste]!.name);
     add("specialization", one.specialization.toFixed(3));
-    add("fitness", one.fitness.toPrecision(4));
+    add("fitness", one.fitness.toFixed(Math.abs(one.fitness) < 1000 ? 3 : 1));
     if (stage.energy) add("energy", (t, r) => stage.energy!.at(t, r).toFixed(1));
     add("x", (t, r) => stage.x.at(t, r).toFixed(3) + unit);
     add("y", (t, r) => stage.y.at(t, r).toFixed(3) + unit);
@@ -157,18 +157,17 @@ export class RobotPanel {
 
   private network(robot: number): HTMLElement[] {
     const { stage } = this;
-    const { heuristic, n_hidden } = stage.robots[robot]!;
+    const { heuristic, neurons } = stage.robots[robot]!;
     if (heuristic) {
       const text = `Controlled by the heuristic ${heuristic}: it has no network.`;
       return [make("p", { class: "note" }, text), ...this.sensors()];
     }
     const parts = this.sensors();
     if (stage.hidden) {
-      const n = Math.min(n_hidden, stage.hidden.shape[2]!);
-      const names = Array.from({ length: n }, (_, k) => `neuron ${k}`);
+      const names = neurons.map((slot) => `neuron ${slot}`);
       parts.push(
         make("h4", {}, "Hidden layer"),
-        this.values("hidden", stage.hidden, names, 0, FAINT),
+        this.values("hidden", stage.hidden, names, neurons, FAINT),
       );
     }
     if (stage.outputs) {
@@ -176,7 +175,11 @@ export class RobotPanel {
         { length: stage.outputs.shape[2]! },
         (_, k) => stage.output_names[k] ?? `output ${k}`,
       );
-      parts.push(make("h4", {}, "Outputs"), this.values("output", stage.outputs, names, 0, FAINT));
+      const all = names.map((_, k) => k);
+      parts.push(
+        make("h4", {}, "Outputs"),
+        this.values("output", stage.outputs, names, all, FAINT),
+      );
     }
     return parts;
   }
@@ -188,23 +191,25 @@ export class RobotPanel {
       const title = make("h4", {}, `Sensors: ${group.name}`);
       // The colour is that of the wedges in the world.
       if (group.angles.length) title.prepend(swatch(hue(index)));
-      return [title, this.values("sensor", sensors, group.names, group.first, hue(index))];
+      const members = group.names.map((_, k) => group.first + k);
+      return [title, this.values("sensor", sensors, group.names, members, hue(index))];
     });
   }
 
-  /** Return a list of activations, each with its bar. */
+  /** Return a list of activations of some units, each with its bar. */
   private values(
     of: string,
     channel: Channel,
     names: string[],
-    first: number,
+    units: number[],
     colour: string,
   ): HTMLElement {
     const list = make("ul", { class: "values" });
     const [least, most] = channel.range();
     const extent = Math.max(-least, most, 1);
-    names.forEach((name, k) => {
-      const value = make("b", { [`data-${of}`]: first + k });
+    units.forEach((unit, k) => {
+      const name = names[k]!;
+      const value = make("b", { [`data-${of}`]: unit });
       const bar = make("i", { class: "bar" });
       bar.style.setProperty("--colour", colour);
       const item = make("li", { title: name }, make("span", {}, name), bar, value);
@@ -213,8 +218,8 @@ export class RobotPanel {
       this.cells.push({
         value,
         bar,
-        read: (t, r) => channel.at(t, r, first + k).toFixed(3),
-        part: (t, r) => Math.min(Math.abs(channel.at(t, r, first + k)) / extent, 1),
+        read: (t, r) => channel.at(t, r, unit).toFixed(3),
+        part: (t, r) => Math.min(Math.abs(channel.at(t, r, unit)) / extent, 1),
       });
     });
     return list;

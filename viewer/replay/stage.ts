@@ -73,7 +73,7 @@ const robot = read.object({
   specialization: read.number,
   fitness: read.number,
   heuristic: read.text,
-  n_hidden: read.count,
+  neurons: read.list(read.count),
 });
 /** What is said about a robot over the whole epoch. */
 export type Robot = read.Of<typeof robot>;
@@ -204,6 +204,11 @@ function check(stage: Stage, where: string): void {
   shaped(stage.sensors, "sensors", T, R, null);
   shaped(stage.hidden, "hidden", T, R, null);
   shaped(stage.outputs, "outputs", T, R, null);
+  const slots = stage.hidden?.shape[2] ?? Infinity;
+  demand(
+    robots.every((one) => one.heuristic || one.neurons.every((slot) => slot < slots)),
+    "a robot has neurons that nobody has recorded",
+  );
 
   for (const group of stage.things) {
     const K = group.kind.shape[0] ?? 0;

@@ -34,6 +34,11 @@ export function say(element: HTMLElement, text: string): void {
   if (element.textContent !== text) element.textContent = text;
 }
 
+/** Return a name for a legend, cut if it is longer than anybody would want to read there. */
+export function named(text: string): HTMLElement {
+  return make("span", { class: "name", title: text }, text);
+}
+
 /** Return a small square of a colour, for legends. */
 export function swatch(colour: string): HTMLElement {
   const square = make("i", { class: "swatch", "aria-hidden": "true" });

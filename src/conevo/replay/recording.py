@@ -161,7 +161,7 @@ def record_epoch(
         "specialization": portrait.specialization,
         "fitness": [float(value) for value in outcome.fitness[0, 0]],
         "heuristic": [names[mode + 1] for mode in modes],
-        "n_hidden": [int(n) for n in (team >= 0).sum(axis=1)],
+        "neurons": [np.flatnonzero(slots >= 0).tolist() for slots in team],
         "performance": portrait.performance,
     }
     return about, channels

@@ -133,14 +133,14 @@ class Robot:
     """What is said about a robot over the whole epoch.
 
     caste: index into the stage's castes. specialization: S. fitness. heuristic: its heuristic
-    controller, "" for its network. n_hidden: neurons it has.
+    controller, "" for its network. neurons: slots in which it has hidden neurons.
     """
 
     caste: int
     specialization: float
     fitness: float
     heuristic: str = ""
-    n_hidden: int = 0
+    neurons: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)

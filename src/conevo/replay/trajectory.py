@@ -67,7 +67,8 @@ class About(TypedDict):
     label, run_id, method, seed: of the run. generation: in which the team was the fittest one.
     epoch: number of the scenario among those that the seed draws; scenario: its key. labels [R]:
     caste of each robot in this epoch. specialization, fitness [R]: S and fitness in it. heuristic
-    [R]: name of a robot's heuristic controller, "" for its network. n_hidden [R]: neurons.
+    [R]: name of a robot's heuristic controller, "" for its network. neurons [R]: slots in which a
+    robot has hidden neurons.
     """
 
     format: int
@@ -93,7 +94,7 @@ class About(TypedDict):
     specialization: list[float]
     fitness: list[float]
     heuristic: list[str]
-    n_hidden: list[int]
+    neurons: list[list[int]]
     performance: dict[str, float]
 
 
@@ -205,7 +206,7 @@ def _check(about: About) -> None:
     r, castes = about["n_robots"], (*about["castes"], "non-specialized")
     if not (r >= 1 and about["iterations"] >= 1):
         raise ValueError("no robots or no iterations")
-    for name in ("labels", "specialization", "fitness", "heuristic", "n_hidden"):
+    for name in ("labels", "specialization", "fitness", "heuristic", "neurons"):
         if len(about[name]) != r:
             raise ValueError(f"{name} of {len(about[name])} robots, not {r}")
     if unknown := set(about["labels"]) - set(castes):

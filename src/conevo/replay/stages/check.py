@@ -79,7 +79,9 @@ def _check_team(stage: Stage) -> None:
         _colour(kind.colour, or_none=True)
     _indices("caste", [robot.caste for robot in stage.robots], len(stage.castes))
     for robot in stage.robots:
-        _finite("a robot", (robot.specialization, robot.fitness, robot.n_hidden))
+        _finite("a robot", (robot.specialization, robot.fitness))
+        if stage.hidden is not None and not robot.heuristic:
+            _indices("neuron", robot.neurons, stage.hidden.codes.shape[2])
     _channel("x", stage.x, (t, b))
     _channel("y", stage.y, (t, b))
     _channel("heading", stage.heading, (t, b))

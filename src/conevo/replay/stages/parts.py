@@ -159,9 +159,12 @@ def begun(
 
 def _robots(parts: Parts, castes: list[str]) -> tuple[Robot, ...]:
     about = parts.about
-    names = ("labels", "specialization", "fitness", "heuristic", "n_hidden")
+    names = ("labels", "specialization", "fitness", "heuristic", "neurons")
     rows: Any = zip(*(about[name] for name in names), strict=True)  # type: ignore[literal-required]
-    return tuple(Robot(castes.index(label), *rest) for label, *rest in rows)
+    return tuple(
+        Robot(castes.index(label), s, fitness, heuristic, tuple(neurons))
+        for label, s, fitness, heuristic, neurons in rows
+    )
 
 
 def octants(name: str, first: int, reach: float) -> SensorGroup:

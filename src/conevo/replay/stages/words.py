@@ -41,7 +41,8 @@ def facts(about: About) -> tuple[tuple[str, str], ...]:
     by_hand = [name for name in about["heuristic"] if name]
     if by_hand:
         found.append(("heuristic robots", _tally(by_hand)))
-    neurons = [n for n, h in zip(about["n_hidden"], about["heuristic"], strict=True) if not h]
+    robots = zip(about["neurons"], about["heuristic"], strict=True)
+    neurons = [len(slots) for slots, heuristic in robots if not heuristic]
     if neurons:
         low, high = min(neurons), max(neurons)
         found.append(("hidden neurons", str(low) if low == high else f"{low} to {high}"))
