@@ -10,6 +10,7 @@ import signal
 import subprocess
 import sys
 import urllib.request
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -143,6 +144,27 @@ def test_a_film_a_poster_and_what_their_options_do(say, here) -> None:
     with Image.open(said.out.strip()) as film:
         assert film.n_frames == 4
         assert film.width > 2 * 200
+
+
+@pytest.mark.parametrize(
+    ("label", "name"),
+    [
+        ("../../away", "away-generation-0-epoch-0"),
+        ("/etc/cron.d/x", "etc-cron.d-x-generation-0-epoch-0"),
+        ("<script>alert(1)</script>", "script-alert-1-script--generation-0-epoch-0"),
+        ("...", "generation-0-epoch-0"),
+        ("x" * 1500, "x" * 200),
+    ],
+)
+def test_a_file_from_elsewhere_does_not_choose_its_place(say, here, label, name) -> None:
+    say("replay", "cone", "--generation", "0", "--no-browser", "--out", "a.html", "--keep", "a.npz")
+    kept = Trajectory.load(here / "a.npz")
+    replace(kept, about=kept.about | {"label": label}).save(here / "b.npz")
+    before = set(here.rglob("*"))
+    said = say("replay", "b.npz", "--no-browser")
+    assert (said.code, said.err, said.out) == (0, "", f"replays/{name}.html\n")
+    folder = here / "replays"
+    assert set(here.rglob("*")) - before == {folder, folder / f"{name}.html"}
 
 
 BAD = [

@@ -198,6 +198,7 @@ def test_a_session_on_the_command_line(
     (tmp_path / "my worlds").mkdir()
     written(tmp_path / "my worlds" / "light.py", ('"dark-1",', '"dark-1", "dark-2"'))
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("webbrowser.open", lambda address: True)
     sets = [w for k, v in tiny_settings("homcne").items() if k != "world.n_robots"
             for w in ("--set", f"{k}={v}")]  # fmt: skip
     more = ["--method", "homcne", "--preset", "smoke", "--threads", "1", *sets]
@@ -206,7 +207,7 @@ def test_a_session_on_the_command_line(
     assert "light-v1/dark-1, HomCNE, preset smoke, seed 1" in out
     assert "generation 5/5  nearness" in out
     recommended = re.findall(r"^  (conevo .*)$", out, flags=re.MULTILINE)
-    assert [line.split()[1] for line in recommended] == ["show", "test", "run", "run"]
+    assert [line.split()[1] for line in recommended] == ["show", "replay", "test", "run", "run"]
     for line in recommended:
         assert say(capsys, *shlex.split(line)[1:])[::2] == (0, "")
     code, out, err = say(capsys, "run", "my worlds/light.py:dark-2", "--shape", "--quiet", *more)

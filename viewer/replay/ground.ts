@@ -23,7 +23,7 @@ export function drawGround(pen: Pen, stage: Stage, view: View): void {
 /** Write the names of areas; nothing else may hide them. */
 export function drawLabels(pen: Pen, stage: Stage, view: View): void {
   for (const part of stage.backdrop) {
-    if (part.label && part.fill && part.shape !== "raster") drawLabel(pen, part, view);
+    if (part.label && part.fill && part.shape === "rect") drawLabel(pen, part, view);
   }
 }
 
@@ -67,10 +67,8 @@ function drawRaster(pen: Pen, part: Backdrop, view: View): void {
 }
 
 function drawLabel(pen: Pen, part: Backdrop, view: View): void {
-  const [a, b, c, d] = part.numbers as [number, number, number, number];
-  const isDisc = part.shape === "disc";
-  const x = isDisc ? view.x(a) + view.scale * c + 4 : view.x(a) + 4;
-  const y = isDisc ? view.y(b) : view.y(d) + 10;
+  const [left, , , top] = part.numbers as [number, number, number, number];
+  const [x, y] = [view.x(left) + 4, view.y(top) + 10];
   pen.font = "11px system-ui, sans-serif";
   pen.textAlign = "left";
   pen.textBaseline = "middle";

@@ -51,6 +51,14 @@ export class View {
     return this.top - this.scale * y;
   }
 
+  /** Return the outline of the world. */
+  path(): Path2D {
+    const [x0, y0, x1, y1] = this.bounds as [number, number, number, number];
+    const path = new Path2D();
+    path.rect(this.x(x0), this.y(y1), this.scale * (x1 - x0), this.scale * (y1 - y0));
+    return path;
+  }
+
   /** Return the point of the world at a point of the canvas. */
   at(x: number, y: number): [number, number] {
     return [(x - this.left) / this.scale, (this.top - y) / this.scale];

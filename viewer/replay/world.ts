@@ -69,8 +69,11 @@ export class World {
     pen.drawImage(this.ground.canvas, 0, 0, width, height);
     for (const heap of this.heaps) heap.draw(pen, view, state.t);
     drawLabels(pen, stage, view);
+    pen.save();
+    pen.clip(view.path());
     drawRings(pen, stage, view, state, selected);
     if (selected >= 0) drawWedges(pen, stage, view, state.t, selected);
+    pen.restore();
     if (state.trails) drawTrails(pen, stage, view, state);
     drawBodies(pen, stage, view, state);
     drawHeld(pen, stage, view, this.heaps[0], state.t);
