@@ -29,6 +29,8 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("made")
     evolve_tiny(folder / "cone", **LONG)
     evolve_tiny(folder / "homcne", "homcne")
+    more = {"world__iterations": 100, "world__n_robots": 10}
+    evolve_tiny(folder / "later", "homcne", **more)  # its champion is not of generation 0
     evolve_tiny(folder / "pursuit", task="pursuit/team-10")
     evolve_tiny(folder / "gacc", task="gacc/complex-9")
     return folder
@@ -211,6 +213,33 @@ def test_wrong_words_are_one_line_and_leave_nothing(say, here, words, reason) ->
     assert said.err.count("\n") == 1
     assert re.search(reason, said.err), said.err
     assert sorted(here.rglob("*")) == before
+
+
+def test_watch_shows_the_champion_of_the_moment(say, here, monkeypatch) -> None:
+    """Its replay is made again when another team has become the fittest."""
+    path = here / "runs" / "later"
+    assert champion(path) != 0
+    whole = {file: (path / file).read_bytes() for file in ("generations.jsonl", "champion.npz")}
+    first = path / "teams" / "generation-0000.npz"
+    pages = []
+
+    def serve(watched, port, replay, on_ready) -> None:
+        (path / "generations.jsonl").write_bytes(whole["generations.jsonl"].split(b"\n")[0] + b"\n")
+        (path / "champion.npz").write_bytes(first.read_bytes())
+        for _ in range(2):
+            watched.snapshot()
+            pages.append(replay("later"))
+        for file, content in whole.items():
+            (path / file).write_bytes(content)
+        watched.snapshot()
+        pages.append(replay("later"))
+
+    monkeypatch.setattr("conevo.replay.live.server.serve", serve)
+    assert say("watch", "later", "--no-browser").code == 0
+    said = [data_of(page)["teams"][0]["subtitle"] for page in pages]
+    assert ["generation 0," in one for one in said] == [True, True, False]
+    assert f"generation {champion(path)}," in said[2]
+    assert pages[0] is pages[1]
 
 
 @pytest.mark.slow

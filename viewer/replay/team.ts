@@ -114,7 +114,7 @@ export class Team {
     };
     const stretch = () => {
       const rows = stage.robots.length;
-      const height = Math.min(Math.max(window.innerHeight * 0.16, 4 * rows), 16 * rows);
+      const height = Math.min(Math.max(window.innerHeight * 0.18, 4 * rows), 16 * rows);
       const { width } = times.getBoundingClientRect();
       this.width = width;
       this.placeHead(this.store.now.t);
