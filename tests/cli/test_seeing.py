@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from conevo.cli.seeing import bar
 from conevo.replay.trajectory import Trajectory
 from runs.tiny import evolve_tiny
 
@@ -167,6 +168,16 @@ def test_a_file_from_elsewhere_does_not_choose_its_place(say, here, label, name)
     assert (said.code, said.err, said.out) == (0, "", f"replays/{name}.html\n")
     folder = here / "replays"
     assert set(here.rglob("*")) - before == {folder, folder / f"{name}.html"}
+
+
+def test_a_name_with_brackets_is_shown_as_it_is(monkeypatch, capsys) -> None:
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True, raising=False)
+    with bar("drawing a{b}[red]c.gif") as show:
+        show(1, 3)
+        show(2, 3)
+    said = capsys.readouterr().err
+    assert "drawing a{b}[red]c.gif" in said
+    assert "2/3" in said
 
 
 BAD = [

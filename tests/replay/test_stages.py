@@ -77,7 +77,7 @@ def test_a_team_of_heuristic_robots_has_no_activations():
     r = trajectory.about["n_robots"]
     stage = stage_of(renamed(trajectory, heuristic=["low"] * r, neurons=[[]] * r))
     assert stage.hidden is stage.outputs is None
-    assert stage.sensors is not None
+    assert np.array_equal(stage.sensors.values, trajectory.channels["sensors"].values)
     assert dict(stage.facts)["heuristic robots"] == f"{r} low"
     assert "hidden neurons" not in dict(stage.facts)
 
@@ -270,7 +270,7 @@ def test_a_world_of_any_size_with_castes_of_its_own():
     y = values(trajectory, "y")
     assert stage.bounds == pytest.approx((-4, y.min() - 1, 18, y.max() + 1))
     assert np.allclose(stage.heading.values, x, atol=1e-3)
-    assert stage.energy is not None
+    assert np.allclose(stage.energy.values, x, atol=1e-3)
     assert [one.name for one in stage.castes] == ["rest", "walker", "non-specialized"]
     assert [robot.caste for robot in stage.robots] == [1, 0, 2]
     assert stage.castes[0].colour == stage.actions[0].colour

@@ -125,9 +125,11 @@ def bar(text: str) -> Iterator[Callable[[int, int], None]]:
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-    columns = (TextColumn(text), BarColumn(), TextColumn("{task.completed}/{task.total}"))
+    name = TextColumn("{task.description}", markup=False)  # a file's name may hold brackets
+    done_of_all = TextColumn("{task.completed}/{task.total}")
+    console = Console(stderr=True)
     progress = Progress(
-        *columns, TimeRemainingColumn(), console=Console(stderr=True), transient=True
+        name, BarColumn(), done_of_all, TimeRemainingColumn(), console=console, transient=True
     )
 
     def show(done: int, total: int) -> None:
