@@ -207,6 +207,17 @@ BAD = [
 ]
 
 
+def test_of_two_epochs_the_damaged_one_is_named(say, here) -> None:
+    say("replay", "cone", "--no-browser", "--out", "a.html", "--keep", "a.npz")
+    kept = Trajectory.load(here / "a.npz")
+    few = {name: channel for name, channel in kept.channels.items() if name != "energy"}
+    replace(kept, channels=few).save(here / "b.npz")
+    for words in (("replay", "a.npz", "--beside", "b.npz"), ("film", "b.npz", "--gif")):
+        said = say(*words)
+        assert (said.code, said.out) == (2, "")
+        assert said.err == "conevo: error: b.npz: the trajectory is damaged: energy is missing\n"
+
+
 @pytest.mark.parametrize(("words", "reason"), BAD, ids=[" ".join(words) for words, _ in BAD])
 def test_wrong_words_are_one_line_and_leave_nothing(say, here, words, reason) -> None:
     (here / "bad.npz").write_bytes(b"PK\x03\x04<script>alert(1)</script>")

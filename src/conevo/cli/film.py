@@ -50,10 +50,9 @@ def film(
 
     An MP4 if ffmpeg is there, else a GIF, unless told otherwise. No film is written over another.
     """
-    from conevo.cli.seeing import REPLAYS, bar, name_of, trajectories
+    from conevo.cli.seeing import REPLAYS, bar, name_of, stages, trajectories
     from conevo.replay.film import SIZES, choose_format, frames_of, write_film, write_poster
     from conevo.replay.picture import Painter
-    from conevo.replay.stages import stage_of
     from conevo.runs.durable import refuse_file
 
     wanted = {"gif": gif, "mp4": mp4, "png": poster is not None}
@@ -65,7 +64,7 @@ def film(
     seen = trajectories(what, **which)
     path = Path(out) if out else REPLAYS / f"{name_of(seen)}.{kind}"
     refuse_file(path)
-    painter = Painter([stage_of(one) for one in seen], size or SIZES[kind], colour)
+    painter = Painter(stages(seen, what, which["beside"]), size or SIZES[kind], colour)
     if poster is not None:
         write_poster(painter, path, poster)
     else:

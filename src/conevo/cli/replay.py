@@ -24,13 +24,12 @@ def replay(what: str, out: str | None, keep: str | None, no_browser: bool, **whi
     RUN may be finished or running; FILE is an epoch that --keep has kept. The page is one file that
     needs no network. It is never written over another one.
     """
-    from conevo.cli.seeing import REPLAYS, name_of, trajectories
+    from conevo.cli.seeing import REPLAYS, name_of, stages, trajectories
     from conevo.replay.page import replay_page
-    from conevo.replay.stages import stage_of
     from conevo.runs.durable import write_new
 
     seen = trajectories(what, **which)
-    page = replay_page([stage_of(one) for one in seen]).encode()
+    page = replay_page(stages(seen, what, which["beside"])).encode()
     path = Path(out) if out else REPLAYS / f"{name_of(seen)}.html"
     files = {path: page}
     if keep is not None:
