@@ -4,15 +4,14 @@ A table stands between ``<!-- table: NAME -->`` and ``<!-- end -->``; everything
 replaced. ``tests/test_docs.py`` fails while a page is behind the package.
 """
 
-import dataclasses
 import re
 import tomllib
 from importlib import import_module, resources
 from pathlib import Path
-from typing import Annotated, Literal, get_args, get_origin, get_type_hints
 
 from conevo import METHODS, WORLDS
 from conevo.runs.config import PRESETS, resolve
+from conevo.runs.settings import declared, preset_purpose
 from conevo.worlds import rocks
 from conevo.worlds.gacc import GaccParams, GaccWorld
 from conevo.worlds.gacc_plans import TYPES
@@ -23,102 +22,6 @@ from conevo.worlds.rover import RoverParams
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = ("README.md", "docs/quickstart.md", "docs/worlds.md")
 MARKED = re.compile(r"(<!-- table: ([^>]+?) -->\n).*?(<!-- end -->)", re.DOTALL)
-
-# What a parameter of the multi-rover world means, and its unit. "side": side of the square.
-ROVER_MEANING = {
-    "n_robots": ("rovers", "rovers in a team"),
-    "iterations": ("iterations", "length of an epoch"),
-    "energy": ("energy", "of a rover at the start of an epoch"),
-    "low_range": ("side", "radius of a detection with setting low"),
-    "med_range": ("side", "the same, med"),
-    "hi_range": ("side", "the same, hi"),
-    "low_accuracy": ("probability", "that a rover succeeds on a rock in range with setting low"),
-    "med_accuracy": ("probability", "the same, med"),
-    "hi_accuracy": ("probability", "the same, hi"),
-    "low_cost": ("energy", "of a detection with setting low"),
-    "med_cost": ("energy", "the same, med"),
-    "hi_cost": ("energy", "the same, hi"),
-    "rover_sensor_range": ("side", "how far the rover sensors see"),
-    "rover_sensor_cost": ("energy", "of the rover sensors, in every iteration"),
-    "move_range": ("side", "the largest step"),
-    "move_cost": ("energy", "of a move, refused or not"),
-    "report_cost": ("energy", "of reporting, in an iteration with a detection"),
-    "min_distance": ("side", "lower bound of distances in eqs 5.1 and 5.4"),
-    "separation": ("side", "a rover may not come closer than this to another"),
-    "fitness": ("", "what a rover is credited with: eq. 5.4, or value times area"),
-    "n_hidden": ("neurons", "hidden neurons of a controller at the start"),
-    "max_hidden": ("neurons", "hidden neurons a controller can grow to"),
-}
-# The same of the arena that predators and prey share, and of each of their two worlds.
-ARENA_MEANING = {
-    "iterations": ("0.1 s", "length of an epoch"),
-    "arena_cm": ("cm", "side of the arena; the thesis prints 1000"),
-    "sensor_range_cm": ("cm", "how far a sensor sees, from its place on the rim"),
-    "sensor_angle_deg": ("degrees", "half angle of the cone that a sensor sees"),
-    "max_speed_cm": ("cm per iteration", "speed of a predator at full command"),
-    "prey_speed": ("predators' speed", "speed of a prey at full command"),
-}
-HIDDEN_MEANING = {
-    "n_hidden": ("neurons", "hidden neurons of a controller at the start"),
-    "max_hidden": ("neurons", "hidden neurons a controller can grow to"),
-}
-PURSUIT_MEANING = {
-    **ARENA_MEANING,
-    "prey": ("", "who is pursued: the shipped evolved prey, one of two simple ones, or a file's"),
-    "prey_digest": ("", "digest of a prey file; a run fills it in and checks it"),
-    "n_obstacles": ("obstacles", "cylinders in the arena"),
-    "capture_window": ("iterations", "over which a captured prey has hardly moved"),
-    "capture_share": ("", "less than this share of what its wheels commanded"),
-    "capture_distance_cm": ("cm", "or less than this"),
-    "capture_predators": ("predators", "that must be within light range of it"),
-    **HIDDEN_MEANING,
-}
-PREY_MEANING = {
-    **ARENA_MEANING,
-    "least": ("", "fewest obstacles, and fewest predators, of an epoch"),
-    "most": ("", "most obstacles, and most predators"),
-    **HIDDEN_MEANING,
-}
-GACC_MEANING = {
-    "n_robots": ("robots", "robots in a team"),
-    "iterations": ("iterations", "length of an epoch"),
-    "energy": ("energy", "of a robot at the start of an epoch"),
-    "home_side": ("side", "side of the home area, in the middle of the square"),
-    "zone_side": ("side", "side of the construction zone, in the middle of the home area"),
-    "home_range": ("side", "how far from its centre the home area is sensed"),
-    "home_sight": (
-        "side",
-        "how far a robot in the home area sees who needs help there, and objects",
-    ),
-    "object_range": ("side", "how far the object and obstacle sensors see"),
-    "object_accuracy": ("probability", "that an object or an obstacle in range is sensed"),
-    "object_cost": ("energy", "of an activation of these sensors"),
-    "robot_range": ("side", "how far the robot sensors see"),
-    "robot_cost": ("energy", "of the robot sensors, in every iteration"),
-    "grip_distance": ("side", "how far from a robot an object may be that it grips"),
-    "grip_cost": ("energy", "of an activation of the gripper, waiting with an object included"),
-    "move_range": ("side", "the largest step"),
-    "move_cost": ("energy", "of a move, refused or not"),
-    "wait": ("iterations", "how long a robot waits with an object for help"),
-    "needs_detection": ("", "whether an object must have been detected before it can be gripped"),
-    "min_distance": ("side", "lower bound of distances in eqs 6.1 to 6.3"),
-    "separation": ("side", "a robot may not come closer than this to another"),
-    "obstacle_least": ("side", "shortest side of an obstacle"),
-    "obstacle_most": ("side", "longest side of an obstacle"),
-    "obstacle_gap": ("side", "least distance of an obstacle from walls, home area and the others"),
-    **HIDDEN_MEANING,
-}
-MEANING = {
-    RoverParams: ROVER_MEANING,
-    PursuitParams: PURSUIT_MEANING,
-    PreyParams: PREY_MEANING,
-    GaccParams: GACC_MEANING,
-}
-TEXTS = {
-    "prey": "`shaped`, `heuristic`, `random`, or the path of a file",
-    "prey_digest": "twelve hex digits, or empty",
-}
-BOUNDS = {"ge": ">=", "gt": ">", "le": "<=", "lt": "<"}
 
 
 def table(head, rows):
@@ -160,7 +63,7 @@ def presets(task, has_purpose=True):
         rows.append(
             [
                 f"`{preset}`",
-                *([_purpose(preset)] if has_purpose else []),
+                *([preset_purpose(preset)] if has_purpose else []),
                 f"{run.generations:,}",
                 f"{run.budget_evaluations:,}" if run.budget_evaluations else "none",
                 f"{run.epochs} x {config.world_params.iterations:,}",
@@ -175,14 +78,6 @@ def presets(task, has_purpose=True):
     head += " | evaluation | genotypes per sub-population | test scenarios"
     heads = head.split(" | ")
     return table(heads if has_purpose else [heads[0], *heads[2:]], rows)
-
-
-def _purpose(preset):
-    """Return the beginning of a preset file's first comment."""
-    comment = " ".join(
-        line.strip("# ") for line in _preset_text(preset).split("\n\n")[0].splitlines()
-    )
-    return re.split(r"[.:](?: |$)", comment)[0]
 
 
 def card(module):
@@ -238,26 +133,13 @@ def rover_settings():
 
 def parameters(params):
     """Return every parameter of a world with unit, default and bounds."""
-    hints = get_type_hints(params, include_extras=True)
     rows = []
-    for field in dataclasses.fields(params):
-        unit, meaning = MEANING[params][field.name]
-        value = str(field.default).lower() if hints[field.name] is bool else field.default
+    for one in declared(params):
+        value = str(one.default).lower() if isinstance(one.default, bool) else one.default
         default = f"`{value}`" if value != "" else ""
-        allowed = TEXTS.get(field.name) or _allowed(hints[field.name])
-        rows.append([f"`{field.name}`", default, unit, allowed, meaning])
+        meaning = one.meaning.replace("``", "`")
+        rows.append([f"`{one.name}`", default, one.unit, one.allowed, meaning])
     return table(["parameter", "default", "unit", "allowed", "what it is"], rows)
-
-
-def _allowed(hint):
-    """Return the values that a type annotation allows."""
-    if get_origin(hint) is Literal:
-        return ", ".join(f"`{value}`" for value in get_args(hint))
-    if hint is bool:
-        return "`true`, `false`"
-    assert get_origin(hint) is Annotated, hint
-    bounds = [(f, getattr(b, f)) for b in get_args(hint)[1:] for f in BOUNDS if hasattr(b, f)]
-    return ", ".join(f"{BOUNDS[name]} {limit:,}" for name, limit in bounds)
 
 
 def team_types():

@@ -1,4 +1,4 @@
-"""``conevo list``: worlds, methods and runs."""
+"""``conevo list``: worlds, methods, presets, settings and runs."""
 
 from __future__ import annotations
 
@@ -14,23 +14,46 @@ __all__ = ["listing"]
 Rows = list[dict[str, str]]
 
 
-@click.command("list", short_help="List worlds, methods or runs.")
-@click.argument("what", type=click.Choice(["worlds", "methods", "runs"]))
-@click.argument("folder", required=False)
+@click.command("list", short_help="List worlds, methods, presets, settings or runs.")
+@click.argument("what", type=click.Choice(["worlds", "methods", "presets", "settings", "runs"]))
+@click.argument("subject", metavar="[WORLD/ENVIRONMENT | FOLDER]", required=False)
+@click.option("--method", metavar="NAME", help="Whose settings, or sizes in presets (cone).")
+@click.option("--preset", metavar="NAME", help="Under which preset settings are listed (desk).")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON array.")
-def listing(what: str, folder: str | None, as_json: bool) -> None:
-    """List worlds with their environments, methods, or the runs in FOLDER (default runs/)."""
+def listing(
+    what: str, subject: str | None, method: str | None, preset: str | None, as_json: bool
+) -> None:
+    """List worlds with their environments, methods, presets, settings, or runs.
+
+    settings WORLD/ENVIRONMENT: every setting of a run there, with its value under the preset, its
+    default, unit, allowed values and meaning. presets [WORLD/ENVIRONMENT]: how much each preset
+    evolves there (default: rover/complex-1). runs [FOLDER]: the runs in FOLDER (default: runs/).
+
+    Try: conevo list settings rover/complex-1 --method cone
+    """
     from conevo.cli.text import table
 
-    if folder is not None and what != "runs":
-        raise UsageError(f"'conevo list {what}' takes no folder")
-    rows = _runs(folder) if what == "runs" else _worlds() if what == "worlds" else _methods()
+    if subject is not None and what in ("worlds", "methods"):
+        raise UsageError(f"'conevo list {what}' takes no further argument, got {subject!r}")
+    if method is not None and what not in ("presets", "settings"):
+        raise UsageError(f"'conevo list {what}' takes no --method")
+    if preset is not None and what != "settings":
+        raise UsageError(f"'conevo list {what}' takes no --preset")
+    if what in ("presets", "settings"):
+        from conevo.cli.settings_text import preset_rows, print_settings, setting_rows
+
+        if what == "settings":
+            print_settings(setting_rows(subject, method, preset), as_json)
+            return
+        rows = preset_rows(subject, method)
+    else:
+        rows = _runs(subject) if what == "runs" else _worlds() if what == "worlds" else _methods()
     if as_json:
         click.echo(json.dumps(rows))
     elif rows:
         click.echo(table(list(rows[0]), [list(row.values()) for row in rows]))
     else:
-        click.echo(f"no runs in {folder or 'runs'}/; begin with: conevo run rover/complex-1")
+        click.echo(f"no runs in {subject or 'runs'}/; begin with: conevo run rover/complex-1")
 
 
 def _worlds() -> Rows:

@@ -28,7 +28,7 @@ VERBS = {
     "report": "Write what a campaign says: page, tables, figures, numbers.",
     "query": "Ask the tables of a campaign anything, in SQL.",
     "show": "Print a finished or running run.",
-    "list": "List worlds, methods or runs.",
+    "list": "List worlds, methods, presets, settings or runs.",
 }
 MODULES = {"list": "listing", "shape-prey": "shape_prey"}
 

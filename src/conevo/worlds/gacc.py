@@ -113,6 +113,33 @@ class GaccParams:
 
     Nitschke 2009, table 6.4, unless marked. Choice: tables 6.1 and 6.2 have lost the settings of
     detection sensors and grippers; all types have the same.
+
+    Attributes:
+        n_robots (robots): robots in a team.
+        iterations (iterations): length of an epoch.
+        energy (energy): of a robot at the start of an epoch.
+        home_side (side): side of the home area, in the middle of the square.
+        zone_side (side): side of the construction zone, in the middle of the home area.
+        home_range (side): how far from its centre the home area is sensed.
+        home_sight (side): how far a robot in the home area sees who needs help there, and objects.
+        object_range (side): how far the object and obstacle sensors see.
+        object_accuracy (probability): that an object or an obstacle in range is sensed.
+        object_cost (energy): of an activation of these sensors.
+        robot_range (side): how far the robot sensors see.
+        robot_cost (energy): of the robot sensors, in every iteration.
+        grip_distance (side): how far from a robot an object may be that it grips.
+        grip_cost (energy): of an activation of the gripper, waiting with an object included.
+        move_range (side): the largest step.
+        move_cost (energy): of a move, refused or not.
+        wait (iterations): how long a robot waits with an object for help.
+        needs_detection: whether an object must have been detected before it can be gripped.
+        min_distance (side): lower bound of distances in eqs 6.1 to 6.3.
+        separation (side): a robot may not come closer than this to another.
+        obstacle_least (side): shortest side of an obstacle.
+        obstacle_most (side): longest side of an obstacle.
+        obstacle_gap (side): least distance of an obstacle from walls, home area and the others.
+        n_hidden (neurons): hidden neurons of a controller at the start.
+        max_hidden (neurons): hidden neurons a controller can grow to.
     """
 
     n_robots: Annotated[int, Ge(2), Le(64)] = 30

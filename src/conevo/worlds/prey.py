@@ -48,10 +48,11 @@ class PreyParams(ArenaParams):
     """Parameters of the world, beside those of the arena.
 
     Attributes:
-        least: of the obstacles and of the predators of an epoch (section 4.3).
-        most: of the same.
-        n_hidden: hidden units at the start (section 4.1).
-        max_hidden: hidden units at most. Choice: twice the initial number.
+        least: fewest obstacles, and fewest predators, of an epoch (section 4.3).
+        most: most obstacles, and most predators, of an epoch.
+        n_hidden (neurons): hidden neurons of a controller at the start (section 4.1).
+        max_hidden (neurons): hidden neurons a controller can grow to. Choice: twice the initial
+            number.
     """
 
     least: Annotated[int, Ge(0), Le(6)] = 2

@@ -65,14 +65,17 @@ class PursuitParams(ArenaParams):
     Attributes:
         prey: "shaped" (the evolved prey that are shipped), "heuristic", "random", or a file that
             ``conevo shape-prey`` made.
-        prey_digest: of the networks in a prey file; filled in, and checked when it is given.
-        n_obstacles: cylinders in the arena. The thesis has them when prey are shaped only.
-        capture_window: iterations over which a prey must hardly have moved. Choice: 10, one second.
-        capture_share: less than this share of what its wheels commanded. Choice: a tenth.
-        capture_distance_cm: or less than this. Choice: 0.2.
-        capture_predators: how many predators must be in light range (section 4.1: two).
-        n_hidden: hidden units at the start (section 4.1).
-        max_hidden: hidden units at most. Choice: twice the initial number.
+        prey_digest: digest of a prey file; a run fills it in and checks it.
+        n_obstacles (obstacles): cylinders in the arena. The thesis has them only when prey are
+            shaped.
+        capture_window (iterations): over which a captured prey has hardly moved. Choice: 10, one
+            second.
+        capture_share: it moved less than this share of what its wheels commanded. Choice: a tenth.
+        capture_distance_cm (cm): or it moved less than this. Choice: 0.2.
+        capture_predators (predators): that must be within light range (section 4.1: two).
+        n_hidden (neurons): hidden neurons of a controller at the start (section 4.1).
+        max_hidden (neurons): hidden neurons a controller can grow to. Choice: twice the initial
+            number.
     """
 
     prey: str = "shaped"

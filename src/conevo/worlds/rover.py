@@ -67,6 +67,30 @@ class RoverParams:
 
     Nitschke 2009, table 5.4, unless marked. Choice: the sensor settings (range, accuracy, cost) are
     lost from table 5.2; these keep its printed nominal range 0.05 for the middle one.
+
+    Attributes:
+        n_robots (rovers): rovers in a team.
+        iterations (iterations): length of an epoch.
+        energy (energy): of a rover at the start of an epoch.
+        low_range (side): radius of a detection with setting low.
+        med_range (side): radius of a detection with setting med.
+        hi_range (side): radius of a detection with setting hi.
+        low_accuracy (probability): that a rover succeeds on a rock in range with setting low.
+        med_accuracy (probability): that a rover succeeds on a rock in range with setting med.
+        hi_accuracy (probability): that a rover succeeds on a rock in range with setting hi.
+        low_cost (energy): of a detection with setting low.
+        med_cost (energy): of a detection with setting med.
+        hi_cost (energy): of a detection with setting hi.
+        rover_sensor_range (side): how far the rover sensors see.
+        rover_sensor_cost (energy): of the rover sensors, in every iteration.
+        move_range (side): the largest step.
+        move_cost (energy): of a move, refused or not.
+        report_cost (energy): of reporting, in an iteration with a detection.
+        min_distance (side): lower bound of distances in eqs 5.1 and 5.4.
+        separation (side): a rover may not come closer than this to another.
+        fitness: what a rover is credited with: eq. 5.4, or value times area.
+        n_hidden (neurons): hidden neurons of a controller at the start.
+        max_hidden (neurons): hidden neurons a controller can grow to.
     """
 
     n_robots: Annotated[int, Ge(2), Le(64)] = 20

@@ -1,0 +1,89 @@
+"""Presets and settings as tables, and what a run would be as a configuration file."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import textwrap
+from typing import Any
+
+import click
+
+from conevo.cli.text import count, table
+from conevo.errors import UsageError
+from conevo.runs.config import PRESETS, RunConfig, resolve
+from conevo.runs.settings import preset_purpose, settings_of
+
+__all__ = ["preset_rows", "print_settings", "setting_rows"]
+
+TASK = "rover/complex-1"  # whose sizes are listed unless another is named
+SENTENCE = re.compile(r"\. (?=[A-Z])")
+NARROWEST = 30  # columns for meanings, however narrow the terminal is
+
+
+def preset_rows(task: str | None, method: str | None) -> list[dict[str, str]]:
+    """Return what each preset is for, and how much it evolves in a task."""
+    rows = []
+    for preset in PRESETS:
+        config = resolve(task or TASK, method, preset)
+        run = config.run
+        rows.append(
+            {
+                "preset": preset,
+                "generations": count(run.generations),
+                "budget": count(run.budget_evaluations) if run.budget_evaluations else "none",
+                "epochs": str(run.epochs),
+                "iterations": count(config.world_params.iterations),
+                "genotypes": str(getattr(config.method_config, "genotypes", "-")),
+                "tests": str(run.n_tests),
+                "for": preset_purpose(preset),
+            }
+        )
+    return rows
+
+
+def setting_rows(task: str | None, method: str | None, preset: str | None) -> list[dict[str, Any]]:
+    """Return every setting of a run, with its value under a preset.
+
+    Raises:
+        UsageError: no task, or an unknown name.
+    """
+    if task is None:
+        raise UsageError(f"whose settings? For example: conevo list settings {TASK}")
+    return [
+        {
+            "setting": f"{section}.{setting.name}",
+            "value": value,
+            "default": setting.default,
+            "unit": setting.unit,
+            "allowed": setting.allowed,
+            "meaning": setting.meaning,
+        }
+        for section, setting, value in settings_of(resolve(task, method, preset))
+    ]
+
+
+def print_settings(rows: list[dict[str, Any]], as_json: bool) -> None:
+    """Print settings, with the first sentence of each meaning wrapped to the terminal's width."""
+    if as_json:
+        click.echo(json.dumps(rows))
+        return
+    head = ["setting", "value", "default", "allowed", "unit"]
+    texts = [[_text(row[name]) for name in head] for row in rows]
+    first, *lines = table(head, texts).splitlines()
+    width = max(map(len, [first, *lines]))
+    room = max(shutil.get_terminal_size((120, 24)).columns - width - 2, NARROWEST)
+    click.echo(f"{first.ljust(width)}  meaning")
+    for line, row in zip(lines, rows, strict=True):
+        wrapped = textwrap.wrap(SENTENCE.split(row["meaning"])[0], room) or [""]
+        click.echo(f"{line.ljust(width)}  {wrapped[0]}".rstrip())
+        for more in wrapped[1:]:
+            click.echo(" " * (width + 2) + more)
+
+
+def _text(value: Any) -> str:
+    """Return a value as a configuration file has it, without quotes; "-" for none."""
+    if value is None:
+        return "-"
+    return str(value).lower() if isinstance(value, bool) else str(value)
