@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable
 
-__all__ = ["ConevoError", "EnvironmentFailure", "UsageError", "unknown_name"]
+__all__ = ["ConevoError", "EnvironmentFailure", "UsageError", "shown", "unknown_name"]
 
 
 class ConevoError(Exception):
@@ -24,6 +24,15 @@ class EnvironmentFailure(ConevoError):
     exit_code = 3
 
 
+def shown(value: object, most: int = 60) -> str:
+    """Return a value as messages show it: at most ``most`` characters, whatever it is."""
+    try:
+        text = repr(value)
+    except (RecursionError, ValueError):  # nested too deeply, or an integer of very many digits
+        text = f"a huge {type(value).__name__}"
+    return text if len(text) <= most else f"{text[: most - 3]}..."
+
+
 def unknown_name(kind: str, name: str, allowed: Iterable[str], where: str = "") -> UsageError:
     """Return the error for an unknown name, naming the nearest known one.
 
@@ -34,8 +43,8 @@ def unknown_name(kind: str, name: str, allowed: Iterable[str], where: str = "") 
         where: where it was found ("in config.toml"), empty if obvious.
     """
     names = sorted(allowed)
-    near = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
+    near = difflib.get_close_matches(name[:200], names, n=1, cutoff=0.5)
     hint = f"; did you mean {near[0]!r}?" if near else ""
     place = f" {where}" if where else ""
-    shown = ", ".join(names) if len(names) <= 40 else ", ".join(names[:40]) + ", ..."
-    return UsageError(f"unknown {kind} {name!r}{place}{hint} (known: {shown or 'none'})")
+    listed = ", ".join(names) if len(names) <= 40 else ", ".join(names[:40]) + ", ..."
+    return UsageError(f"unknown {kind} {shown(name, 200)}{place}{hint} (known: {listed or 'none'})")

@@ -1,0 +1,377 @@
+"""Reading files that others may have damaged, replaced or made up: each is whole, or one line.
+
+Everything that conevo reads from a run, a campaign, a world, a prey file, a recording or a
+configuration is read here. Only regular files are opened (a link to one is followed), so that a
+pipe or a device in place of a file makes nobody wait. Sizes are looked at before memory is taken:
+that of the file, and those that the headers of an archive and its arrays state.
+
+Errors name the file and what was expected:
+
+- ``DamagedFile``: it is there, and is not what it should be.
+- ``EnvironmentFailure``: the operating system refuses to read it.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import math
+import os
+import re
+import stat
+import tomllib
+import zipfile
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from conevo.errors import EnvironmentFailure, UsageError, shown
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+__all__ = [
+    "DamagedFile",
+    "check",
+    "parse_json",
+    "parse_toml",
+    "read_arrays",
+    "read_bytes",
+    "read_json",
+    "read_json_lines",
+    "read_text",
+    "read_toml",
+    "whole_lines",
+]
+
+MIB = 2**20
+MOST_TEXT = 16 * MIB  # bytes of a JSON or text file; what is made of it takes up to twenty times
+MOST_TOML = 2 * MIB  # its parser does about one MiB in a second
+MOST_LOG = 512 * MIB
+MOST_ARRAYS = 1024 * MIB  # bytes of an archive when it is unpacked
+MEMBERS = 1000  # of an archive
+DEPTH = 32  # lists and tables within each other; conevo's own files have six
+KINDS = {
+    stat.S_IFDIR: "Is a directory",
+    stat.S_IFIFO: "it is a pipe, not a regular file",
+    stat.S_IFSOCK: "it is a socket, not a regular file",
+    stat.S_IFCHR: "it is a device, not a regular file",
+    stat.S_IFBLK: "it is a device, not a regular file",
+}
+
+
+class DamagedFile(UsageError):
+    """A file that is there and is not what it should be: damaged, too large or of another kind."""
+
+
+# --- bytes and text -------------------------------------------------------------------------------
+
+
+def read_bytes(path: Path, limit: int = MOST_ARRAYS, name: str = "") -> bytes:
+    """Return the content of a regular file.
+
+    Args:
+        path: the file, or a link to it.
+        limit: bytes that it may have.
+        name: what messages call it, by default its path.
+
+    Raises:
+        DamagedFile: it is not a regular file, or is larger.
+        EnvironmentFailure: it cannot be read.
+    """
+    name = name or str(path)
+    try:
+        # Looked at before it is opened: opening alone makes some devices act.
+        _refuse_special(os.stat(path), name)
+        handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+        with os.fdopen(handle, "rb") as file:
+            found = os.fstat(handle)
+            _refuse_special(found, name)
+            _refuse_large(found.st_size, limit, name)
+            return file.read(found.st_size)
+    except OSError as error:
+        raise EnvironmentFailure(f"cannot read {name}: {error.strerror or error}") from error
+    except ValueError as error:  # a null byte in the path
+        raise UsageError(f"cannot read {shown(name)}: {error}") from error
+
+
+def read_text(path: Path, limit: int = MOST_TEXT) -> str:
+    """Return a text: UTF-8, with or without a byte order mark.
+
+    Raises:
+        DamagedFile: it is another encoding, not a text, not a regular file, or too large.
+        EnvironmentFailure: it cannot be read.
+    """
+    return _decode(read_bytes(path, limit), str(path))
+
+
+def _decode(content: bytes, name: str) -> str:
+    if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        raise DamagedFile(f"{name} is UTF-16 text; save it as UTF-8")
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise DamagedFile(
+            f"{name} is damaged or not a text (byte {error.start} is not UTF-8)"
+        ) from error
+    if "\0" in text:
+        raise DamagedFile(f"{name} is damaged or not a text (it has null bytes)")
+    return text
+
+
+def _refuse_special(found: os.stat_result, name: str) -> None:
+    if not stat.S_ISREG(found.st_mode):
+        kind = KINDS.get(stat.S_IFMT(found.st_mode), "it is not a regular file")
+        raise DamagedFile(f"cannot read {name}: {kind}")
+
+
+def _refuse_large(size: int, limit: int, name: str) -> None:
+    if size > limit:
+        raise DamagedFile(f"{name} is too large: more than {limit:,} bytes")
+
+
+# --- JSON and TOML --------------------------------------------------------------------------------
+
+
+def read_json(path: Path, model: type | None = None, limit: int = MOST_TEXT) -> dict[str, Any]:
+    """Return the object in a JSON file.
+
+    Args:
+        path: the file.
+        model: what the object must be, see ``check``; anything if None.
+        limit: bytes that the file may have.
+
+    Raises:
+        DamagedFile: it is not such an object, not a regular file, or too large.
+        EnvironmentFailure: it cannot be read.
+    """
+    return parse_json(read_bytes(path, limit), str(path), model)
+
+
+def read_json_lines(path: Path, model: type | None = None) -> list[dict[str, Any]]:
+    """Return the objects in a file that holds one per line; a torn last line does not count.
+
+    Raises:
+        DamagedFile: a line is not such an object; it is named by its number.
+        EnvironmentFailure: it cannot be read.
+    """
+    lines = whole_lines(read_bytes(path, MOST_LOG))
+    return [
+        parse_json(line, f"{path}", model, f" in line {number}")
+        for number, line in enumerate(lines, 1)
+    ]
+
+
+def whole_lines(content: bytes) -> list[bytes]:
+    """Return the lines that end with a newline."""
+    return content.split(b"\n")[:-1]
+
+
+def parse_json(
+    content: bytes, name: str, model: type | None = None, where: str = ""
+) -> dict[str, Any]:
+    """Return the object in a JSON text.
+
+    A number that is not finite, a key that is there twice and deep nesting are refused: other
+    programs would read something else, or nothing.
+
+    Args:
+        content: the text, UTF-8.
+        name: what messages call it, a path.
+        model: what the object must be, see ``check``; anything if None.
+        where: the place within it, for messages (" in line 3").
+
+    Raises:
+        DamagedFile: it is not such an object.
+    """
+    text = _decode(content, name)
+    try:
+        found = _DECODER.decode(text)
+        if not isinstance(found, dict):
+            raise ValueError(f"an object expected, not {shown(found)}")
+        if text.count("[") + text.count("{") > DEPTH:
+            _refuse_deep(found)
+    except RecursionError:
+        raise DamagedFile(f"{name} is damaged{where}: it is nested too deeply") from None
+    except ValueError as error:
+        raise DamagedFile(f"{name} is damaged{where}: {_one_line(error)}") from error
+    if model is not None:
+        check(found, model, f"{name} is damaged{where}")
+    return found
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """Return the tables of a TOML file.
+
+    Raises:
+        DamagedFile: it is not valid TOML, not a regular file, or too large.
+        EnvironmentFailure: it cannot be read.
+    """
+    return parse_toml(read_text(path, MOST_TOML), str(path))
+
+
+def parse_toml(text: str, name: str) -> dict[str, Any]:
+    """Return the tables of a TOML text; ``name`` is what messages call it.
+
+    Raises:
+        DamagedFile: it is not valid TOML.
+    """
+    try:
+        found = tomllib.loads(text)
+        _refuse_deep(found)
+    except RecursionError:
+        raise DamagedFile(f"{name} is not valid TOML: it is nested too deeply") from None
+    except ValueError as error:
+        raise DamagedFile(f"{name} is not valid TOML: {_one_line(error)}") from error
+    return found
+
+
+def check(value: object, model: type, problem: str) -> None:
+    """Raise DamagedFile if a value is not what a model describes.
+
+    Args:
+        value: plain data.
+        model: a TypedDict or another type that pydantic knows. Types are strict, numbers finite;
+            keys that it does not have are left alone, as a later version may write them.
+        problem: how the message begins; the field and what is allowed follow.
+    """
+    from pydantic import ValidationError
+
+    try:
+        _adapter(model).validate_python(value)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        field = ".".join(map(str, first["loc"]))
+        message = first["msg"].replace("Input should be", "must be")
+        given = "" if first["type"] == "missing" else f" = {shown(first['input'])}"
+        raise DamagedFile(f"{problem}: {field}{given}: {message}") from error
+    except RecursionError:
+        raise DamagedFile(f"{problem}: it is nested too deeply") from None
+
+
+@cache
+def _adapter(model: type) -> Any:
+    from pydantic import ConfigDict, TypeAdapter, with_config
+
+    return TypeAdapter(with_config(ConfigDict(strict=True, allow_inf_nan=False))(model))
+
+
+def _refuse_deep(value: object) -> None:
+    level = [value]
+    for _ in range(DEPTH):
+        level = [
+            inner
+            for outer in level
+            for inner in (outer.values() if isinstance(outer, dict) else outer)  # type: ignore[attr-defined]
+            if isinstance(inner, dict | list)
+        ]
+        if not level:
+            return
+    raise RecursionError
+
+
+def _refuse_constant(text: str) -> None:
+    raise ValueError(f"{text} is not a finite number")
+
+
+def _finite(text: str) -> float:
+    number = float(text)
+    if not math.isfinite(number):
+        raise ValueError(f"{text[:40]} is not a finite number")
+    return number
+
+
+def _integer(text: str) -> int:
+    if len(text) > 20 or not -(2**63) <= int(text) < 2**64:
+        raise ValueError(f"{text[:40]} is beyond 64 bits")
+    return int(text)
+
+
+def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    found = dict(pairs)
+    if len(found) < len(pairs):
+        names = [name for name, _ in pairs]
+        twice = next(name for name in names if names.count(name) > 1)
+        raise ValueError(f"{shown(twice)} is there twice")
+    return found
+
+
+_DECODER = json.JSONDecoder(
+    object_pairs_hook=_unique,
+    parse_float=_finite,
+    parse_int=_integer,
+    parse_constant=_refuse_constant,
+)
+
+
+# --- arrays ---------------------------------------------------------------------------------------
+
+
+def read_arrays(path: Path, limit: int = MOST_ARRAYS) -> dict[str, npt.NDArray[Any]]:
+    """Return the arrays of an npz file by name.
+
+    Nothing is unpacked before the sizes that its headers state are known to be within the limit,
+    and never more than these; no object is ever unpickled.
+
+    Args:
+        path: the file.
+        limit: bytes that it may have, packed and unpacked.
+
+    Raises:
+        DamagedFile: it is damaged, not an npz file of numbers, not a regular file, or too large.
+        EnvironmentFailure: it cannot be read.
+    """
+    content = read_bytes(path, limit)
+    try:
+        with zipfile.ZipFile(io.BytesIO(content)) as archive:
+            members = archive.infolist()
+            _refuse_members(members, limit)
+            found: dict[str, npt.NDArray[Any]] = {}
+            for member in members:
+                with archive.open(member) as file:
+                    content = file.read(member.file_size + 1)
+                found[member.filename.removesuffix(".npy")] = _array(content)
+            return found
+    except Exception as error:  # whatever a damaged file makes its readers say
+        reason = _one_line(error) or type(error).__name__
+        raise DamagedFile(f"{path} is damaged or not an npz file ({reason})") from error
+
+
+def _refuse_members(members: list[zipfile.ZipInfo], limit: int) -> None:
+    """Raise ValueError if an archive may not be unpacked."""
+    if len(members) > MEMBERS:
+        raise ValueError(f"it has more than {MEMBERS} members")
+    if len({member.filename for member in members}) < len(members):
+        raise ValueError("it has a member twice")
+    if any(one.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED) for one in members):
+        raise ValueError("a member is packed otherwise than numpy does")  # and without a bound
+    size = sum(member.file_size for member in members)
+    if size > limit:
+        raise ValueError(f"unpacked it would have {size:,} bytes, more than {limit:,}")
+
+
+def _array(content: bytes) -> npt.NDArray[Any]:
+    """Return the array in an npy file: of the size that the file has, whatever its header says."""
+    import numpy as np
+
+    stream = io.BytesIO(content)
+    version = np.lib.format.read_magic(stream)
+    if version != (1, 0):
+        raise ValueError(f"an array of version {version}")
+    shape, is_fortran, dtype = np.lib.format.read_array_header_1_0(stream)
+    if dtype.kind not in "biuf" or dtype.subdtype is not None:
+        raise ValueError(f"an array of type {dtype}, not of numbers")
+    size = len(content) - stream.tell()
+    if min(shape, default=0) < 0 or math.prod(shape) * dtype.itemsize != size:
+        raise ValueError("an array of another size than it says")
+    flat: npt.NDArray[Any] = np.frombuffer(content, dtype=dtype, offset=stream.tell())
+    if dtype.kind == "b" and flat.view(np.uint8).max(initial=0) > 1:
+        raise ValueError("truth values that are neither true nor false")
+    return flat.reshape(shape, order="F" if is_fortran else "C").copy(order="K")
+
+
+def _one_line(error: BaseException) -> str:
+    """Return what an error says, in one short line."""
+    text = " ".join(str(error).split())
+    text = re.sub(r"Exceeds the limit .*", "a number of more than 4300 digits", text)
+    return text if len(text) <= 200 else f"{text[:200]}..."

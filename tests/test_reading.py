@@ -1,0 +1,325 @@
+"""Reading what others may have damaged: whole, or one line that names the file."""
+
+from __future__ import annotations
+
+import io
+import os
+import socket
+import struct
+import tracemalloc
+import zipfile
+import zlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typing_extensions import TypedDict
+
+from conevo.errors import EnvironmentFailure, UsageError, shown
+from conevo.reading import (
+    DamagedFile,
+    check,
+    read_arrays,
+    read_bytes,
+    read_json,
+    read_json_lines,
+    read_text,
+    read_toml,
+)
+
+
+def refused(read, path: Path, data: bytes) -> str:
+    """Return the one line with which a file of this content is refused."""
+    path.write_bytes(data)
+    with pytest.raises(DamagedFile) as caught:
+        read(path)
+    line = str(caught.value)
+    assert "\n" not in line
+    assert str(path) in line
+    assert len(line) < len(str(path)) + 300
+    return line.replace(str(path), "FILE")
+
+
+# --- regular files --------------------------------------------------------------------------------
+
+
+def test_only_regular_files_are_opened_and_nothing_waits(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "link").symlink_to(tmp_path / "pipe")
+    with socket.socket(socket.AF_UNIX) as listener:
+        listener.bind(str(tmp_path / "socket"))
+        for path, words in (
+            (tmp_path / "pipe", "it is a pipe, not a regular file"),
+            (tmp_path / "link", "it is a pipe, not a regular file"),
+            (tmp_path / "folder", "Is a directory"),
+            (tmp_path / "socket", "it is a socket, not a regular file"),
+            (Path("/dev/zero"), "it is a device, not a regular file"),
+        ):
+            for read in (read_bytes, read_text, read_json, read_json_lines, read_toml, read_arrays):
+                with pytest.raises(DamagedFile) as caught:
+                    read(path)
+                assert str(caught.value) == f"cannot read {path}: {words}"
+
+
+def test_what_the_system_refuses_is_the_machines_fault(tmp_path: Path) -> None:
+    (tmp_path / "loop").symlink_to(tmp_path / "loop")
+    for path, words in (
+        ("none", "No such file"),
+        ("loop", "Too many levels"),
+        ("a" * 300, "too lo"),
+    ):
+        with pytest.raises(EnvironmentFailure, match=f"cannot read .*: .*{words}"):
+            read_bytes(tmp_path / path)
+    with pytest.raises(UsageError, match="null byte"):
+        read_bytes(tmp_path / "a\0b")
+
+
+def test_a_link_to_a_file_is_followed(tmp_path: Path) -> None:
+    (tmp_path / "file").write_bytes(b"content")
+    (tmp_path / "link").symlink_to("file")
+    assert read_bytes(tmp_path / "link") == b"content"
+
+
+def test_a_size_is_looked_at_before_memory_is_taken(tmp_path: Path) -> None:
+    path = tmp_path / "large"
+    with path.open("wb") as file:
+        file.truncate(2**40)  # a hole: it takes no room on the disk
+    for read in (read_bytes, read_text, read_json, read_json_lines, read_toml, read_arrays):
+        with pytest.raises(DamagedFile, match="large is too large: more than"):
+            read(path)
+
+
+# --- text -----------------------------------------------------------------------------------------
+
+
+def test_text_is_utf_8_with_or_without_a_byte_order_mark(tmp_path: Path) -> None:
+    path = tmp_path / "text"
+    for data in ("é = 1\n".encode(), "é = 1\n".encode("utf-8-sig")):
+        path.write_bytes(data)
+        assert read_text(path) == "é = 1\n"
+    for encoding in ("utf-16", "utf-16-le", "utf-16-be"):
+        data = "a = 1\n".encode(encoding)
+        words = "UTF-16" if encoding == "utf-16" else "null bytes"
+        for read in (read_text, read_toml, read_json):
+            assert words in refused(read, path, data)
+    assert "byte 4 is not UTF-8" in refused(read_text, path, b"a = \xff")
+
+
+NESTED = b"[" * 50_000 + b"]" * 50_000
+JSON = {
+    b"": "Expecting value",
+    b"[1]": "an object expected, not [1]",
+    b"null": "an object expected, not None",
+    NESTED: "nested too deeply",
+    b'{"a": ' * 50_000: "nested too deeply",
+    b'{"a": ' + b"[" * 40 + b"]" * 40 + b"}": "nested too deeply",
+    b'{"a": NaN}': "NaN is not a finite number",
+    b'{"a": -Infinity}': "-Infinity is not a finite number",
+    b'{"a": 1e999}': "1e999 is not a finite number",
+    b'{"a": ' + b"9" * 5000 + b"}": "999... is beyond 64 bits".replace("...", ""),
+    b'{"a": 18446744073709551616}': "18446744073709551616 is beyond 64 bits",
+    b'{"a": 1, "a": 2}': "'a' is there twice",
+    b'{"a": 1}x': "Extra data",
+}
+
+
+@pytest.mark.parametrize("content", JSON, ids=[str(k) for k in range(len(JSON))])
+def test_json_that_is_none_is_one_line(content: bytes, tmp_path: Path) -> None:
+    path = tmp_path / "a.json"
+    line = refused(read_json, path, content)
+    assert line.startswith("FILE is damaged: ")
+    assert JSON[content] in line
+    line = refused(read_json_lines, path, b'{"a": 1}\n' + content + b"\n")
+    assert line.startswith("FILE is damaged in line 2: ")
+
+
+def test_json_is_what_it_says(tmp_path: Path) -> None:
+    path = tmp_path / "a.json"
+    text = '{"a": [1, 18446744073709551615, -0.5, true, null, "é"], "b": {"c": {}}}'
+    path.write_text("\ufeff" + text)
+    right = {"a": [1, 2**64 - 1, -0.5, True, None, "é"], "b": {"c": {}}}
+    assert read_json(path) == right
+    path.write_text(f"{text}\n{text}\n" + '{"torn": ')
+    assert read_json_lines(path) == [right, right]
+
+
+TOML = {
+    b"a = " + NESTED: "nested too deeply",
+    b"a = " + b"{b = " * 50_000: "nested too deeply",
+    b"a = " + b"[" * 40 + b"]" * 40: "nested too deeply",
+    b"a = " + b"9" * 5000: "a number of more than 4300 digits",
+    b"a = 1\na = 2": "Cannot overwrite",
+    b"a =": "Invalid value",
+}
+
+
+@pytest.mark.parametrize("content", TOML, ids=[str(k) for k in range(len(TOML))])
+def test_toml_that_is_none_is_one_line(content: bytes, tmp_path: Path) -> None:
+    line = refused(read_toml, tmp_path / "a.toml", content)
+    assert line.startswith("FILE is not valid TOML: ")
+    assert TOML[content] in line
+
+
+def test_toml_with_a_byte_order_mark_is_read(tmp_path: Path) -> None:
+    (tmp_path / "a.toml").write_bytes("[run]\nseed = 3\n".encode("utf-8-sig"))
+    assert read_toml(tmp_path / "a.toml") == {"run": {"seed": 3}}
+
+
+# --- models ---------------------------------------------------------------------------------------
+
+
+class Inner(TypedDict):
+    """A part."""
+
+    mean: float | None
+
+
+class Outer(TypedDict):
+    """A whole."""
+
+    n: int
+    parts: list[Inner]
+
+
+def test_a_model_names_the_field_and_what_is_allowed(tmp_path: Path) -> None:
+    path = tmp_path / "a.json"
+    path.write_text('{"n": 1, "parts": [{"mean": 2, "later": 1}], "more": []}')
+    assert read_json(path, Outer)["more"] == []  # a later version's keys are left alone
+    for content, words in (
+        (b'{"n": 1}', "parts: Field required"),
+        (b'{"n": true, "parts": []}', "n = True: must be a valid integer"),
+        (b'{"n": 1.0, "parts": []}', "n = 1.0: must be a valid integer"),
+        (b'{"n": 1, "parts": [{"mean": "2"}]}', "parts.0.mean = '2': must be a valid number"),
+        (b'{"n": 1, "parts": [[]]}', "parts.0 = []: must be a valid dictionary"),
+    ):
+        assert words in refused(lambda p: read_json(p, Outer), path, content)
+    with pytest.raises(DamagedFile, match="here: n = nan: must be a finite number"):
+        check({"n": float("nan")}, TypedDict("One", {"n": float}), "here")  # type: ignore[misc]
+
+
+def test_values_are_shown_in_few_characters() -> None:
+    deep: list[object] = []
+    for _ in range(100_000):
+        deep = [deep]
+    assert shown("a") == "'a'"
+    assert shown("a" * 100) == "'" + "a" * 56 + "..."
+    assert shown(10**5000) == "a huge int"
+    assert shown(deep) == "a huge list"
+
+
+# --- arrays ---------------------------------------------------------------------------------------
+
+
+def npz(**arrays: np.ndarray) -> bytes:
+    """Return an npz file."""
+    out = io.BytesIO()
+    np.savez(out, **arrays)
+    return out.getvalue()
+
+
+def member(shape: tuple[int, ...], descr: str = "|u1", content: bytes = b"") -> bytes:
+    """Return an npz file whose only array says what it likes."""
+    head, out = io.BytesIO(), io.BytesIO()
+    np.lib.format.write_array_header_1_0(
+        head, {"descr": descr, "fortran_order": False, "shape": shape}
+    )
+    with zipfile.ZipFile(out, "w") as archive:
+        archive.writestr("a.npy", head.getvalue() + content)
+    return out.getvalue()
+
+
+def test_arrays_come_back_bit_for_bit(tmp_path: Path) -> None:
+    path = tmp_path / "a.npz"
+    rng = np.random.default_rng(1)
+    arrays = {
+        "a": rng.random((3, 4)),
+        "b": np.asarray(rng.random((3, 4, 5), np.float32), order="F"),
+        "c": rng.random(7) < 0.5,
+        "d": np.array(3, np.uint64),
+        "e": np.zeros((2, 0), np.int32),
+    }
+    for write in (np.savez, np.savez_compressed):
+        write(path, **arrays)
+        found = read_arrays(path)
+        assert list(found) == list(arrays)
+        for name, array in arrays.items():
+            assert (found[name].dtype, found[name].shape) == (array.dtype, array.shape)
+            assert found[name].tobytes() == array.tobytes()
+            assert found[name].flags.writeable
+            assert found[name].flags.f_contiguous == array.flags.f_contiguous
+
+
+ARRAYS = {
+    b"": "not a zip file",
+    b"PK\x05\x06" + bytes(18): None,
+    npz(a=np.array([{}], dtype=object)): "an array of type object, not of numbers",
+    npz(a=np.array(["text"])): "an array of type <U4, not of numbers",
+    member((2**40,)): "an array of another size than it says",
+    member((-1, -4), content=b"abcd"): "an array of another size than it says",
+    member((2,), content=b"abcd"): "an array of another size than it says",
+    member((2,), "|b1", b"\x01\x02"): "truth values that are neither true nor false",
+    member((2,), "|V1", b"ab"): "not of numbers",
+    npz(a=np.zeros(1000))[:-300]: "not a zip file",
+}
+
+
+@pytest.mark.parametrize("content", ARRAYS, ids=[str(k) for k in range(len(ARRAYS))])
+def test_archives_that_are_none_are_one_line(content: bytes, tmp_path: Path) -> None:
+    path = tmp_path / "a.npz"
+    if ARRAYS[content] is None:  # an archive of nothing is one
+        path.write_bytes(content)
+        assert read_arrays(path) == {}
+    else:
+        line = refused(read_arrays, path, content)
+        assert line.startswith("FILE is damaged or not an npz file (")
+        assert ARRAYS[content] in line
+
+
+def bomb(says: int) -> bytes:
+    """Return a small npz file that unpacks to 300 MB, whatever its records say."""
+    out = io.BytesIO()
+    with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("a.npy", b"")
+    size = 300 * 2**20
+    packer = zlib.compressobj(9, zlib.DEFLATED, -15)
+    packed = b"".join(packer.compress(bytes(2**20)) for _ in range(size // 2**20))
+    packed += packer.flush()
+    name = b"a.npy"
+    sizes = struct.pack("<III", 0, len(packed), says)
+    local = b"PK\x03\x04" + struct.pack("<5H", 20, 0, 8, 0, 33) + sizes
+    local += struct.pack("<HH", len(name), 0) + name + packed
+    central = b"PK\x01\x02" + struct.pack("<6H", 20, 20, 0, 8, 0, 33) + sizes
+    central += struct.pack("<HHHHHII", len(name), 0, 0, 0, 0, 0, 0) + name
+    end = b"PK\x05\x06" + struct.pack("<4HIIH", 0, 0, 1, 1, len(central), len(local), 0)
+    return local + central + end
+
+
+@pytest.mark.parametrize(
+    ("says", "words"),
+    [(300 * 2**20, "unpacked it would have 314,572,800 bytes"), (100, "damaged or not an npz")],
+)
+def test_a_small_file_that_unpacks_to_a_large_one_costs_nothing(
+    says: int, words: str, tmp_path: Path
+) -> None:
+    path, data = tmp_path / "a.npz", bomb(says)
+    assert len(data) < 2**20
+    tracemalloc.start()
+    try:
+        assert words in refused(lambda p: read_arrays(p, 64 * 2**20), path, data)
+        assert tracemalloc.get_traced_memory()[1] < 16 * 2**20
+    finally:
+        tracemalloc.stop()
+
+
+def test_a_member_that_is_there_twice_or_packed_otherwise_is_refused(tmp_path: Path) -> None:
+    path, out = tmp_path / "a.npz", io.BytesIO()
+    with zipfile.ZipFile(out, "w") as archive:
+        archive.writestr("a.npy", b"")
+        with pytest.warns(UserWarning, match="Duplicate"):
+            archive.writestr("a.npy", b"")
+    assert "it has a member twice" in refused(read_arrays, path, out.getvalue())
+    out = io.BytesIO()
+    with zipfile.ZipFile(out, "w", zipfile.ZIP_LZMA) as archive:
+        archive.writestr("a.npy", b"")
+    assert "packed otherwise than numpy does" in refused(read_arrays, path, out.getvalue())
