@@ -19,7 +19,6 @@ import html
 import json
 import re
 import shutil
-import tempfile
 from collections.abc import Iterator, Mapping
 from importlib import resources
 from pathlib import Path
@@ -39,6 +38,7 @@ from conevo.analysis.sections.overview import Campaign, overview, read_campaign,
 from conevo.analysis.sections.performance import performance
 from conevo.analysis.sections.scope import Scope, scopes
 from conevo.errors import UsageError
+from conevo.runs.drafts import draft_of
 from conevo.runs.durable import writing
 
 __all__ = ["sections_of", "write_report"]
@@ -70,17 +70,14 @@ def write_report(campaign: Path, out: Path) -> Path:
     files[MANIFEST] = _json({"files": digests})
     with writing(out):
         out.parent.mkdir(parents=True, exist_ok=True)
-        draft = Path(tempfile.mkdtemp(prefix=f".{out.name}.", dir=out.parent))
-        try:
-            draft.chmod(0o755)
+        with draft_of(out) as draft:
+            draft.mkdir()
             for name, content in files.items():
                 path = draft / name
                 path.parent.mkdir(exist_ok=True)
                 path.write_bytes(content)
             shutil.rmtree(out, ignore_errors=True)
             draft.rename(out)
-        finally:
-            shutil.rmtree(draft, ignore_errors=True)
     return out / "index.html"
 
 

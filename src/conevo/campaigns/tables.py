@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import json
 import shutil
-import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -18,6 +17,7 @@ from conevo.campaigns.places import Places
 from conevo.campaigns.plan import PlannedRun
 from conevo.runs.config import RunConfig
 from conevo.runs.directory import as_json, read_json
+from conevo.runs.drafts import draft_of
 from conevo.runs.durable import replace_file, sync_directory, writing
 
 __all__ = ["is_sealed", "seal_tables"]
@@ -50,18 +50,16 @@ def seal_tables(places: Places, finished: Sequence[PlannedRun], spent: Mapping[s
         return
     import duckdb
 
-    with writing(places.tables):
-        draft = Path(tempfile.mkdtemp(prefix=".tables.", dir=places.root))
-    try:
+    with writing(places.tables), draft_of(places.tables) as draft:
+        draft.mkdir()
         files = {name: (draft / f"{name}.jsonl").open("w", encoding="utf-8") for name in SCHEMA}
-        with writing(places.tables):
-            cells: dict[str, list[RunConfig]] = {}
-            for planned in finished:
-                cost = max(spent.get(planned.label, 0.0), _last_cost(places, planned.label))
-                for table, row in _rows(places, planned, _configs(planned, cells), cost):
-                    files[table].write(json.dumps(row, allow_nan=False) + "\n")
-            for file in files.values():
-                file.close()
+        cells: dict[str, list[RunConfig]] = {}
+        for planned in finished:
+            cost = max(spent.get(planned.label, 0.0), _last_cost(places, planned.label))
+            for table, row in _rows(places, planned, _configs(planned, cells), cost):
+                files[table].write(json.dumps(row, allow_nan=False) + "\n")
+        for file in files.values():
+            file.close()
         for table, columns in SCHEMA.items():
             source, target = draft / f"{table}.jsonl", draft / f"{table}.parquet"
             duckdb.sql(
@@ -70,12 +68,9 @@ def seal_tables(places: Places, finished: Sequence[PlannedRun], spent: Mapping[s
             )
             source.unlink()
         replace_file(draft / MANIFEST, as_json(_manifest(finished)))
-        with writing(places.tables):
-            shutil.rmtree(places.tables, ignore_errors=True)
-            draft.rename(places.tables)
-            sync_directory(places.root)
-    finally:
-        shutil.rmtree(draft, ignore_errors=True)
+        shutil.rmtree(places.tables, ignore_errors=True)
+        draft.rename(places.tables)
+        sync_directory(places.root)
 
 
 def _manifest(finished: Sequence[PlannedRun]) -> Row:

@@ -7,7 +7,6 @@ early leaves neither. Nothing is written over another file.
 from __future__ import annotations
 
 import math
-import os
 import re
 import shutil
 import subprocess
@@ -23,7 +22,8 @@ from PIL import GifImagePlugin, Image
 
 from conevo.errors import EnvironmentFailure, UsageError
 from conevo.replay.picture import Painter
-from conevo.runs.durable import refuse_file, sync_directory, writing
+from conevo.runs.drafts import draft_of
+from conevo.runs.durable import refuse_file, sync_directory, sync_file, writing
 
 __all__ = [
     "FPS",
@@ -234,21 +234,16 @@ def find_ffmpeg() -> str | None:
 
 @contextmanager
 def _appearing(path: Path) -> Iterator[Path]:
-    """Yield a hidden name beside ``path``; the file that is written there then becomes ``path``."""
+    """Yield a hidden place; the file that is written there then becomes ``path``."""
     refuse_file(path)
-    draft = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    try:
-        with writing(path):
-            path.parent.mkdir(parents=True, exist_ok=True)
+    with writing(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with draft_of(path) as draft:
             yield draft
-            with draft.open("rb") as file:
-                os.fsync(file.fileno())
+            sync_file(draft)
             refuse_file(path)
             draft.rename(path)
             sync_directory(path.parent)
-    finally:
-        with suppress(OSError):
-            draft.unlink(missing_ok=True)
 
 
 # --- MP4 ------------------------------------------------------------------------------------------

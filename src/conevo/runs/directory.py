@@ -10,12 +10,9 @@
 
 from __future__ import annotations
 
-import fcntl
 import hashlib
 import json
 import os
-import shutil
-import tempfile
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -23,6 +20,8 @@ from pathlib import Path
 from typing import Any
 
 from conevo.errors import EnvironmentFailure, UsageError
+from conevo.runs import locks
+from conevo.runs.drafts import draft_of, remove_abandoned, remove_torn
 from conevo.runs.durable import replace_file, sync_directory, writing
 
 __all__ = [
@@ -38,6 +37,7 @@ __all__ = [
 ]
 
 CONFIG, SHAPING, CAMPAIGN, LOCK, SEAL = "config.toml", "shaping.toml", "plan.toml", "lock", "DONE"
+LONGEST_WRITE = 3600.0  # seconds, of a file that other processes may be writing
 KINDS = {CONFIG: "run", SHAPING: "shaping", CAMPAIGN: "campaign"}
 
 
@@ -50,26 +50,21 @@ def kind_of(path: Path) -> str:
 def appearing(path: Path) -> Iterator[Path]:
     """Yield a hidden directory to be filled; it then takes the name ``path``, all at once.
 
-    A kill before that leaves at most the hidden directory, which nothing reads.
-
     Raises:
         UsageError: something is there already; it is left as it is.
-        EnvironmentFailure: the directory cannot be written.
+        EnvironmentFailure: the directory cannot be written, or its file system has no locks.
     """
     refuse_existing(path)
     with writing(path):
         path.parent.mkdir(parents=True, exist_ok=True)
-        draft = Path(tempfile.mkdtemp(prefix=f".{path.name}.", dir=path.parent))
-    try:
-        yield draft
-        with writing(path):
-            draft.chmod(0o777 & ~_umask())
+        with draft_of(path, must_lock=True) as draft:
+            draft.mkdir()
+            try:
+                yield draft
+            except EnvironmentFailure as error:
+                raise EnvironmentFailure(str(error).replace(str(draft), str(path))) from error
             _appear(draft, path)
             sync_directory(path.parent)
-    except EnvironmentFailure as error:
-        raise EnvironmentFailure(str(error).replace(str(draft), str(path))) from error
-    finally:
-        shutil.rmtree(draft, ignore_errors=True)  # gone by now if all went well
 
 
 def _appear(draft: Path, path: Path) -> None:
@@ -119,20 +114,26 @@ class Directory:
 
     @contextmanager
     def locked(self) -> Iterator[None]:
-        """Keep every other process from writing here.
+        """Keep every other process from writing here; what killed ones have left is removed.
 
         Raises:
             UsageError: another process is at work in this directory.
+            EnvironmentFailure: it cannot be written, or its file system has no locks.
         """
         path = self.path / LOCK
         with writing(path):
             handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
         try:
-            if not _try_lock(handle, fcntl.LOCK_EX):
+            try:
+                is_ours = locks.take(handle)
+            except OSError as error:
+                raise locks.no_locks(self.path, error) from error
+            if not is_ours:
                 raise UsageError(f"{self.path} is in use by {self.user}; wait for it or end it")
             with writing(path):
                 os.truncate(handle, 0)
                 os.pwrite(handle, f"process {os.getpid()}".encode(), 0)
+            self._tidy()
             yield
         finally:
             os.close(handle)
@@ -140,14 +141,16 @@ class Directory:
     @property
     def is_in_use(self) -> bool:
         """Whether a process is at work here now."""
-        try:
-            handle = os.open(self.path / LOCK, os.O_RDONLY)
-        except OSError:
-            return False
-        try:
-            return not _try_lock(handle, fcntl.LOCK_SH, tries=1)  # others that look refuse nobody
-        finally:
-            os.close(handle)
+        return locks.is_held(self.path / LOCK)
+
+    def _tidy(self) -> None:
+        """Remove what killed processes have left here; a campaign's runs are their workers'."""
+        remove_abandoned(self.path)
+        for folder in (self.path, self.path / "teams", self.path / "inputs"):
+            remove_torn(folder)
+        remove_abandoned(self.path / "runs")
+        for folder in (self.path / "studies", self.path / "ended"):
+            remove_torn(folder, older_than=time.time() - LONGEST_WRITE)
 
     @property
     def user(self) -> str:
@@ -200,21 +203,3 @@ def read_json(path: Path) -> dict[str, Any]:
     except ValueError as error:
         raise UsageError(f"{path} is damaged: {error}") from error
     return found
-
-
-def _try_lock(handle: int, kind: int, tries: int = 5) -> bool:
-    """Take a lock if it is free; the tries outlast another process that only looks."""
-    for _ in range(tries):
-        try:
-            fcntl.flock(handle, kind | fcntl.LOCK_NB)
-        except OSError:
-            time.sleep(0.02)
-        else:
-            return True
-    return False
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask

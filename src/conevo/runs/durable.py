@@ -8,8 +8,17 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from conevo.errors import EnvironmentFailure, UsageError
+from conevo.runs.drafts import draft_of
 
-__all__ = ["append_line", "refuse_file", "replace_file", "sync_directory", "write_new", "writing"]
+__all__ = [
+    "append_line",
+    "refuse_file",
+    "replace_file",
+    "sync_directory",
+    "sync_file",
+    "write_new",
+    "writing",
+]
 
 
 @contextmanager
@@ -54,7 +63,11 @@ def write_new(files: Mapping[Path, bytes]) -> None:
     for path, data in missing.items():
         with writing(path):
             path.parent.mkdir(parents=True, exist_ok=True)
-        replace_file(path, data)
+            with draft_of(path) as draft:
+                draft.write_bytes(data)
+                sync_file(draft)
+                draft.rename(path)
+                sync_directory(path.parent)
 
 
 def refuse_file(path: Path) -> None:
@@ -71,8 +84,17 @@ def append_line(path: Path, line: str) -> None:
         os.fsync(file.fileno())
 
 
+def sync_file(path: Path) -> None:
+    """Wait until what is in a file is on the disk."""
+    _sync(path)
+
+
 def sync_directory(path: Path) -> None:
     """Wait until the names in a directory are on the disk."""
+    _sync(path)
+
+
+def _sync(path: Path) -> None:
     handle = os.open(path, os.O_RDONLY)
     try:
         os.fsync(handle)

@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import shutil
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -252,8 +251,6 @@ class Shaping:
         self.refuse_finished()
         with self._directory.locked():
             self.refuse_finished()
-            for draft in self.path.glob(".stage-*"):  # of a process that was killed
-                shutil.rmtree(draft, ignore_errors=True)
             for number in range(1, len(self.configs) + 1):
                 run = self._stage(number, threads)
                 if run.status != "finished":

@@ -5,7 +5,6 @@ Links, pipes and devices are never opened: what is read lies in the folder that 
 
 from __future__ import annotations
 
-import fcntl
 import json
 import math
 import os
@@ -16,6 +15,7 @@ from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 from conevo.errors import EnvironmentFailure, UsageError
+from conevo.runs import locks
 
 __all__ = ["Generations", "Log", "Stamp", "Whole", "is_locked", "readable", "stamp"]
 
@@ -51,11 +51,7 @@ def stamp(path: Path) -> Stamp | None:
 
 
 def is_locked(path: Path) -> bool:
-    """Whether a process holds a directory's lock file.
-
-    A shared lock is refused only while another holds it alone, so one try tells; it is given back
-    at once, and those that want the lock for themselves try more than once.
-    """
+    """Whether a process holds a directory's lock file."""
     try:
         handle = _open(path)
     except EnvironmentFailure:
@@ -63,12 +59,9 @@ def is_locked(path: Path) -> bool:
     if handle is None:
         return False
     try:
-        fcntl.flock(handle, fcntl.LOCK_SH | fcntl.LOCK_NB)
-    except OSError:
-        return True
+        return locks.is_taken(handle)
     finally:
         os.close(handle)
-    return False
 
 
 class Whole(Generic[T]):

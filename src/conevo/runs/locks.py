@@ -1,0 +1,75 @@
+"""Locks (flock): one writer at a time, and whether the process that writes is still alive."""
+
+from __future__ import annotations
+
+import os
+import time
+from pathlib import Path
+
+from conevo.errors import EnvironmentFailure
+
+try:
+    import fcntl
+except ImportError as error:  # Windows
+    raise EnvironmentFailure(
+        "conevo needs Linux, on Windows WSL: this Python has no file locks (no module fcntl)"
+    ) from error
+
+__all__ = ["is_held", "is_taken", "no_locks", "take"]
+
+TRIES = 5  # of a lock that others may hold for a moment, just to look
+
+
+def take(handle: int, tries: int = TRIES) -> bool:
+    """Take the lock of an open file for this process alone, until the file is closed.
+
+    Returns:
+        Whether it is ours; if not, another process has it.
+
+    Raises:
+        OSError: the file system has no locks, or refuses for another reason.
+    """
+    return _flock(handle, fcntl.LOCK_EX, tries)
+
+
+def is_taken(handle: int) -> bool:
+    """Whether another process has taken the lock of an open file.
+
+    A shared lock is refused only where another process holds it alone, and processes that only
+    look do not refuse each other. Where a file system has no locks, no process holds one.
+    """
+    try:
+        return not _flock(handle, fcntl.LOCK_SH, tries=1)
+    except OSError:
+        return False
+
+
+def is_held(path: Path) -> bool:
+    """Whether a process holds the lock file at ``path``; False if there is none."""
+    try:
+        handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+    except OSError:
+        return False
+    try:
+        return is_taken(handle)
+    finally:
+        os.close(handle)
+
+
+def no_locks(directory: Path, error: OSError) -> EnvironmentFailure:
+    """Return the error for a directory whose file system has no locks."""
+    return EnvironmentFailure(
+        f"cannot lock {directory}: {error.strerror or error}; without locks two processes could "
+        f"write there at once, so choose a place on another file system with --out"
+    )
+
+
+def _flock(handle: int, kind: int, tries: int) -> bool:
+    for _ in range(tries):
+        try:
+            fcntl.flock(handle, kind | fcntl.LOCK_NB)
+        except BlockingIOError:  # EWOULDBLOCK: in use; anything else is not
+            time.sleep(0.02 if tries > 1 else 0.0)
+        else:
+            return True
+    return False
