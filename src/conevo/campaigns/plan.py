@@ -194,6 +194,8 @@ class Plan:
                 overrides |= one.settings
                 shape = shape if one.shape is None else one.shape
         overrides |= further
+        if seed := {"seed", "run.seed"} & set(overrides):
+            raise UsageError(f"{seed.pop()} {self.place}: a campaign's seeds are campaign.seeds")
         tasks = tasks_up_to(world) if shape else [world]
         configs = [
             resolve(t, method, self.preset, overrides=overrides, place=self.place) for t in tasks

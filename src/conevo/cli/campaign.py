@@ -192,7 +192,7 @@ def _planned(
 
     from conevo.campaigns.plan_file import read_plan, read_preset
     from conevo.cli.find import campaign_at
-    from conevo.runs.config import parse_assignment
+    from conevo.runs.config import parse_assignments
 
     wanted = preset is not None or seeds is not None or bool(settings)
     there = campaign_at(out or name)
@@ -204,7 +204,7 @@ def _planned(
         plan = read_plan(Path(name))
     else:
         plan = read_preset(name)
-    return None, plan.at(preset, seeds, dict(parse_assignment(text) for text in settings))
+    return None, plan.at(preset, seeds, parse_assignments(settings))
 
 
 def _create(plan: Any, name: str, out: str | None) -> Campaign:

@@ -6,11 +6,13 @@ import shlex
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
 from conevo.cli.carry import carry_on, style_of
+from conevo.errors import UsageError
 
 if TYPE_CHECKING:
     from conevo.runs.config import RunConfig
@@ -74,13 +76,30 @@ class Order:
     verbose: bool
 
     def __post_init__(self) -> None:
-        from conevo.runs.config import parse_assignment
+        from conevo.runs.config import parse_assignments
 
         self.style = style_of(self.as_json, self.quiet, self.verbose)
-        self.overrides = dict(parse_assignment(text) for text in self.settings)
-        if self.budget_evaluations is not None:
-            self.overrides["run.budget_evaluations"] = self.budget_evaluations
+        self.overrides = parse_assignments(self.settings)
+        names = (("method", self.method), ("preset", self.preset), ("seed", self.seed))
+        for name, value in names:
+            self._refuse_twice(f"run.{name}", f"--{name}", value)
+        self.take("run.budget_evaluations", "--budget-evaluations", self.budget_evaluations)
         self.command = shlex.join(["conevo", *sys.argv[1:]])
+
+    def take(self, key: str, option: str, value: Any) -> None:
+        """Add what an option sets to the settings, if it is given.
+
+        Raises:
+            UsageError: --set has it, too.
+        """
+        self._refuse_twice(key, option, value)
+        if value is not None:
+            self.overrides[key] = value
+
+    def _refuse_twice(self, key: str, option: str, value: Any) -> None:
+        given = {key, key.partition(".")[2]} & set(self.overrides)
+        if value is not None and given:
+            raise UsageError(f"{option} and --set {given.pop()} are mutually exclusive")
 
     def resolve(self, world: str | None) -> RunConfig:
         """Return the configuration for a world, or for the one that the file names."""
@@ -95,6 +114,18 @@ class Order:
             overrides=self.overrides,
             place=PLACE,
         )
+
+    def print_only(self, configs: Sequence[RunConfig]) -> None:
+        """Print what would be started, stage by stage; writes and starts nothing."""
+        from conevo.cli.settings_text import print_dry_run
+        from conevo.runs.directory import refuse_existing
+        from conevo.runs.run import RUNS
+        from conevo.runs.shaping import label
+
+        name = configs[0].label if len(configs) == 1 else label(configs)
+        path = Path(self.out) if self.out else RUNS / name
+        refuse_existing(path)
+        print_dry_run(configs, path, self.as_json)
 
     def run(self, config: RunConfig) -> None:
         """Start a run and carry it on to its end."""

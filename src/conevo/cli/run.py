@@ -24,8 +24,11 @@ __all__ = ["run"]
     "--shape", is_flag=True,
     help="In stages: the environments of the same name from number 1 up to this one.",
 )  # fmt: skip
+@click.option(
+    "--dry-run", is_flag=True, help="Print all settings and what they cost; start nothing."
+)
 @output_options
-def run(world: str | None, prey: str | None, shape: bool, **options: Any) -> None:
+def run(world: str | None, prey: str | None, shape: bool, dry_run: bool, **options: Any) -> None:
     """Evolve a team for WORLD/ENVIRONMENT (see: conevo list worlds) and test it.
 
     Everything is kept in one directory. Ctrl-C leaves a run that conevo resume continues. With
@@ -36,11 +39,17 @@ def run(world: str | None, prey: str | None, shape: bool, **options: Any) -> Non
     if prey is not None:
         if not hasattr(config.world_params, "prey"):
             raise UsageError(f"--prey {prey!r}: {config.world} has no prey to be chosen")
-        order.overrides["world.prey"] = prey
+        order.take("world.prey", "--prey", prey)
         config = order.resolve(world)
     if shape:
         from conevo.runs.shaping import tasks_up_to
 
-        order.shape(tasks_up_to(config.address))
+        tasks = tasks_up_to(config.address)
+        if dry_run:
+            order.print_only([order.resolve(task) for task in tasks])
+        else:
+            order.shape(tasks)
+    elif dry_run:
+        order.print_only([config])
     else:
         order.run(config)

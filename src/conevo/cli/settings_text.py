@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import re
 import shutil
 import textwrap
+from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import click
 
+from conevo.cli.summary import title
 from conevo.cli.text import count, table
 from conevo.errors import UsageError
 from conevo.runs.config import PRESETS, RunConfig, resolve
+from conevo.runs.lab import price_of
 from conevo.runs.settings import preset_purpose, settings_of
 
-__all__ = ["preset_rows", "print_settings", "setting_rows"]
+__all__ = ["preset_rows", "print_dry_run", "print_settings", "setting_rows"]
 
 TASK = "rover/complex-1"  # whose sizes are listed unless another is named
 SENTENCE = re.compile(r"\. (?=[A-Z])")
@@ -80,6 +85,29 @@ def print_settings(rows: list[dict[str, Any]], as_json: bool) -> None:
         click.echo(f"{line.ljust(width)}  {wrapped[0]}".rstrip())
         for more in wrapped[1:]:
             click.echo(" " * (width + 2) + more)
+
+
+def print_dry_run(configs: Sequence[RunConfig], path: Path, as_json: bool) -> None:
+    """Print what a run, or every stage of a shaping, would be.
+
+    As text it is a configuration file that ``conevo run --config`` takes (of a shaping: that of the
+    last stage), below comments on where it would be written and what it would cost.
+    """
+    prices = [price_of(config) for config in configs]
+    if as_json:
+        stages = [
+            {"run_id": one.run_id, **dataclasses.asdict(price), "config": one.tables()}
+            for one, price in zip(configs, prices, strict=True)
+        ]
+        click.echo(json.dumps({"path": str(path), "runs": stages}))
+        return
+    click.echo(f"# {path} (nothing was written)")
+    for one, price in zip(configs, prices, strict=True):
+        click.echo(
+            f"# {title(one)}: {count(price.evaluations)} team evaluations in the first generation, "
+            f"at most {count(price.generations)} generations, about {price.team_steps:.2g} team-steps"
+        )
+    click.echo(configs[-1].to_toml().rstrip())
 
 
 def _text(value: Any) -> str:

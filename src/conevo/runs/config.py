@@ -55,7 +55,14 @@ if TYPE_CHECKING:
     from conevo.worlds.protocol import World
     from conevo.worlds.registry import WorldEntry
 
-__all__ = ["PRESETS", "RunConfig", "RunSettings", "parse_assignment", "resolve"]
+__all__ = [
+    "PRESETS",
+    "RunConfig",
+    "RunSettings",
+    "parse_assignment",
+    "parse_assignments",
+    "resolve",
+]
 
 PRESETS = ("smoke", "desk", "night", "thesis")
 SECTIONS = ("run", "world", "method")
@@ -230,6 +237,10 @@ def resolve(
     for key, value in short.items():
         single.setdefault(_section_of(key, parts, place), {})[key] = value
     if seed is not None:
+        if twice := single.get("run", {}).get("seed"):
+            raise UsageError(
+                f"run.seed = {twice.value!r} {twice.place}: the seed is given as {seed}"
+            )
         single.setdefault("run", {})["seed"] = _Value(seed, "as the seed")
     base = _read_preset(names["preset"], entry.name, names["method"])
     built = {name: _build(name, part, [base, *layers, single]) for name, part in parts.items()}
@@ -263,6 +274,21 @@ def parse_assignment(text: str) -> tuple[str, Any]:
         return key.strip(), value.strip()
 
 
+def parse_assignments(texts: Iterable[str]) -> dict[str, Any]:
+    """Return the settings of several "key=value".
+
+    Raises:
+        UsageError: one has no "=", or two set the same key.
+    """
+    found: dict[str, Any] = {}
+    for text in texts:
+        key, value = parse_assignment(text)
+        if key in found:
+            raise UsageError(f"--set {text!r}: {key} is set twice")
+        found[key] = value
+    return found
+
+
 def _read_file(path: Path) -> Layer:
     try:
         tables = tomllib.loads(path.read_text(encoding="utf-8"))
@@ -294,6 +320,8 @@ def _split_keys(given: Mapping[str, Any], place: str) -> tuple[Layer, dict[str, 
             short[key] = _Value(value, place)
         elif section not in SECTIONS:
             raise unknown_name("section", section, SECTIONS, f"in {key!r} {place}")
+        elif name in given:
+            raise UsageError(f"{key} {place}: the same setting is given as {name}, too")
         else:
             dotted.setdefault(section, {})[name] = _Value(value, place)
     return dotted, short

@@ -9,11 +9,52 @@ from conevo.evolution.methods.registry import METHODS
 from conevo.evolution.protocol import Layout, Method, State
 from conevo.runs.config import RunConfig
 from conevo.runs.evaluation import Evaluate, make_evaluator
-from conevo.runs.loop import check_budget
+from conevo.runs.loop import check_budget, price
 from conevo.worlds.protocol import World
 from conevo.worlds.rollout import Rollout
 
-__all__ = ["Lab"]
+__all__ = ["Lab", "Price", "layout_of", "price_of"]
+
+
+def layout_of(world: World) -> Layout:
+    """Return the size of the problem that a world sets a method."""
+    spec = world.controller
+    return Layout(world.n_robots, spec.n_hidden, spec.max_hidden, spec.n_genes)
+
+
+@dataclass(frozen=True)
+class Price:
+    """How much a run evolves.
+
+    Attributes:
+        evaluations: team evaluations of the first generation; later ones take a few more when the
+            size of controllers is in question.
+        generations: as many as its settings and its budget allow, at most.
+        team_steps: iterations of a team in all of them, if all take as many evaluations as the
+            first; testing phase left out.
+    """
+
+    evaluations: int
+    generations: int
+    team_steps: int
+
+
+def price_of(config: RunConfig) -> Price:
+    """Return how much a run would evolve; simulates nothing and loads no kernel.
+
+    Raises:
+        UsageError: the budget does not pay for one generation.
+    """
+    world, run = config.build_world(), config.run
+    method = METHODS[config.method].build(config.method_config)
+    state = method.init(layout_of(world), run.seed)
+    check_budget(method, state, run.budget_evaluations)
+    first = price(method, state)
+    generations = run.generations
+    if run.budget_evaluations:
+        generations = min(generations, run.budget_evaluations // first)
+    epochs = (first - 1) * run.epochs + run.fittest_epochs
+    return Price(first, generations, generations * epochs * world.params.iterations)
 
 
 @dataclass(frozen=True)
@@ -60,8 +101,7 @@ class Lab:
             UsageError: the budget does not pay for one generation, the ancestor does not fit, or
                 the world has no room for what belongs in it.
         """
-        spec, seed = self.world.controller, self.config.run.seed
-        layout = Layout(self.world.n_robots, spec.n_hidden, spec.max_hidden, spec.n_genes)
+        layout, seed = layout_of(self.world), self.config.run.seed
         if ancestor is None:
             state = self.method.init(layout, seed)
         else:

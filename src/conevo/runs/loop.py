@@ -14,7 +14,7 @@ from conevo.evolution.protocol import Method, Scores, State
 from conevo.runs.config import RunSettings
 from conevo.runs.evaluation import Evaluate, Portrait, describe
 
-__all__ = ["check_budget", "evolve_generations"]
+__all__ = ["check_budget", "evolve_generations", "price"]
 
 Record = dict[str, Any]
 
@@ -60,22 +60,28 @@ def evolve_generations(
         on_generation(state, last)
 
 
+def price(method: Method, state: State) -> int:
+    """Return the team evaluations of the first generation.
+
+    ask and tell are pure, so it can be priced with empty scores.
+    """
+    while state.generation == 0:
+        trials = method.ask(state)
+        empty = np.zeros(trials.teams.shape[:2])
+        state = method.tell(state, trials, Scores(fitness=empty, specialization=empty))
+    return int(state.team_evaluations)
+
+
 def check_budget(method: Method, state: State, budget: int) -> None:
     """Refuse a budget that does not pay for the first generation.
-
-    ask and tell are pure, so the first generation can be priced with empty scores.
 
     Raises:
         UsageError: no generation could be finished.
     """
-    while budget and state.generation == 0:
-        trials = method.ask(state)
-        empty = np.zeros(trials.teams.shape[:2])
-        state = method.tell(state, trials, Scores(fitness=empty, specialization=empty))
-    if budget and state.team_evaluations > budget:
+    if budget and (first := price(method, state)) > budget:
         raise UsageError(
             f"run.budget_evaluations = {budget} does not pay for one generation: "
-            f"the first takes {state.team_evaluations} team evaluations"
+            f"the first takes {first} team evaluations"
         )
 
 

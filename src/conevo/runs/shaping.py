@@ -32,7 +32,7 @@ from conevo.runs.lab import Lab
 from conevo.runs.run import RUNS, Record, Run, Watch, start
 from conevo.worlds.registry import resolve as resolve_world
 
-__all__ = ["Shaping", "start_shaping", "tasks_up_to"]
+__all__ = ["Shaping", "label", "start_shaping", "tasks_up_to"]
 
 FORMAT = 1
 GENERATIONS = "generations.jsonl"
@@ -88,7 +88,7 @@ def start_shaping(
     if not tasks:
         raise UsageError("a shaping needs at least one task")
     configs = [resolve(task, method, preset, seed, config, overrides, place) for task in tasks]
-    path = Path(out) if out is not None else RUNS / _label(configs)
+    path = Path(out) if out is not None else RUNS / label(configs)
     refuse_existing(path)
     state: State | None = None
     for stage in configs:
@@ -286,7 +286,7 @@ class Shaping:
         return self.path / f"stage-{number}"
 
 
-def _label(configs: Sequence[RunConfig]) -> str:
+def label(configs: Sequence[RunConfig]) -> str:
     """Return a readable, unique directory name."""
     first, last = configs[0], configs[-1]
     tasks = f"{first.task}-to-{last.environment}".replace("/", "-")

@@ -1,0 +1,114 @@
+"""What can be set, and what a run would be: lists of presets and settings, dry runs."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import fields
+from pathlib import Path
+
+import pytest
+
+import conevo
+from conevo.evolution.methods.registry import METHODS
+from conevo.runs.config import PRESETS, RunSettings, resolve
+from conevo.runs.settings import declared
+from runs.tiny import command
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_every_setting_of_a_run_and_of_a_method_is_explained(method: str) -> None:
+    parts = (RunSettings, METHODS[method].config_class)
+    assert [one.name for part in parts for one in declared(part) if not one.meaning] == []
+
+
+def test_a_setting_is_listed_as_it_is_declared(say) -> None:
+    rows = {row["setting"]: row for row in json.loads(
+        say("list", "settings", "pursuit/team-3", "--method", "mesp", "--json").out)}  # fmt: skip
+    config = resolve("pursuit/team-3", "mesp", "desk")
+    parts = {"run": config.run, "world": config.world_params, "method": config.method_config}
+    assert list(rows) == [f"{name}.{f.name}" for name in parts for f in fields(parts[name])]
+    for name, row in rows.items():
+        section, _, key = name.partition(".")
+        assert row["value"] == getattr(parts[section], key)
+    assert rows["world.max_speed_cm"] == {
+        "setting": "world.max_speed_cm",
+        "value": 0.8,
+        "default": 0.8,
+        "unit": "cm per iteration",
+        "allowed": "> 0, <= 5",
+        "meaning": rows["world.max_speed_cm"]["meaning"],
+    }
+    assert rows["world.max_speed_cm"]["meaning"].startswith("speed of a predator at full command.")
+    assert (rows["run.epochs"]["value"], rows["run.epochs"]["default"]) == (5, 10)
+    assert rows["method.evaluation"]["allowed"] == "systematic, shared"
+    assert rows["run.target"]["allowed"] == "number or left out"
+    assert rows["run.seed"]["allowed"] == ">= 0"
+
+
+def test_settings_as_text_keep_to_the_width_of_the_terminal(say, monkeypatch) -> None:
+    monkeypatch.setenv("COLUMNS", "150")
+    out = say("list", "settings", "rover/complex-1").out
+    assert max(map(len, out.splitlines())) <= 150
+    assert "method.fresh_rounds" in out
+    assert " false " in out
+
+
+def test_a_world_of_ones_own_has_its_settings_listed(say) -> None:
+    light = Path(conevo.__file__).parents[2] / "examples" / "light.py"
+    rows = json.loads(say("list", "settings", f"{light}:dark-1", "--json").out)
+    step = next(row for row in rows if row["setting"] == "world.step")
+    assert (step["value"], step["allowed"], step["meaning"]) == (0.01, "> 0, <= 0.1", "")
+
+
+def test_presets_are_listed_with_what_they_are_for(say) -> None:
+    rows = json.loads(say("list", "presets", "pursuit/team-3", "--method", "homcne", "--json").out)
+    assert [row["preset"] for row in rows] == list(PRESETS)
+    desk = resolve("pursuit/team-3", "homcne", "desk")
+    assert rows[1]["genotypes"] == str(desk.method_config.genotypes)
+    assert rows[1]["budget"] == f"{desk.run.budget_evaluations:,}"
+    assert rows[0]["for"].startswith("Under twenty seconds")
+
+
+def tiny(*more: str) -> list[str]:
+    """Return the words of a tiny run in the default place."""
+    words = command(Path("unused"), "cone")
+    at = words.index("--out")
+    return [*words[:at], *words[at + 2 :], "--threads", "1", *more]
+
+
+def test_a_dry_run_prints_the_file_of_the_run_and_writes_nothing(say, tmp_path: Path) -> None:
+    dry = say(*tiny("--dry-run"))
+    assert (dry.code, dry.err) == (0, "")
+    assert list(tmp_path.iterdir()) == []
+    (tmp_path / "dry.toml").write_text(dry.out)
+    run = conevo.Run(say(*tiny("--quiet")).out.strip())
+    assert resolve(file=tmp_path / "dry.toml").run_id == run.config.run_id
+    assert dry.out.startswith(f"# {run.path} (nothing was written)\n")
+    first = run.generations()[0]["team_evaluations"]
+    assert f" {first:,} team evaluations in the first generation" in dry.out
+
+
+def test_the_price_of_a_dry_run_is_what_the_run_costs(say) -> None:
+    options = ("--budget-evaluations", "200", "--set", "method.evaluation=systematic")
+    [dry] = json.loads(say(*tiny("--dry-run", "--json", *options)).out)["runs"]
+    run = conevo.Run(say(*tiny("--quiet", *options)).out.strip())
+    records = run.generations()
+    assert (dry["run_id"], dry["config"]) == (run.config.run_id, run.config.tables())
+    assert dry["evaluations"] == records[0]["team_evaluations"]
+    assert dry["generations"] == len(records) > 1
+    assert dry["team_steps"] == pytest.approx(records[-1]["team_steps"], rel=0.1)  # lesions
+
+
+def test_a_dry_run_of_a_shaping_names_every_stage(say, tmp_path: Path) -> None:
+    out = say("run", "rover/complex-3", "--shape", "--preset", "smoke", "--dry-run").out
+    assert [f"# rover-v1/complex-{k}, CONE" in out for k in (1, 2, 3, 4)] == [True] * 3 + [False]
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_dry_run_refuses_the_place_that_the_run_would_be_refused(say, tmp_path: Path) -> None:
+    (tmp_path / "taken").mkdir()
+    (tmp_path / "taken" / "file").write_text("")
+    for more in ((), ("--dry-run",)):
+        said = say(*tiny("--out", "taken", *more))
+        assert (said.code, said.out) == (2, "")
+        assert "taken exists" in said.err or "taken already exists" in said.err
