@@ -159,7 +159,7 @@ BAD = [
     (["list", "worlds", "here"], "takes no further argument, got 'here'"),
     (["list", "runs", "--method", "cone"], "'conevo list runs' takes no --method"),
     (["list", "presets", "--preset", "desk"], "takes no --preset"),
-    (["list", "settings"], "for example: conevo list settings rover/complex-1"),
+    (["list", "settings"], "For example: conevo list settings rover/complex-1"),
     (["list", "settings", "rover/complx-1"], "did you mean 'complex-1'"),
     (["list", "settings", TASK, "--method", "coen"], "did you mean 'cone'"),
     (["run", TASK, "--dry-run", "--preset", "smok"], "did you mean 'smoke'"),

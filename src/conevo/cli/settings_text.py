@@ -105,7 +105,8 @@ def print_dry_run(configs: Sequence[RunConfig], path: Path, as_json: bool) -> No
     for one, price in zip(configs, prices, strict=True):
         click.echo(
             f"# {title(one)}: {count(price.evaluations)} team evaluations in the first generation, "
-            f"at most {count(price.generations)} generations, about {price.team_steps:.2g} team-steps"
+            f"at most {count(price.generations)} generations, "
+            f"about {price.team_steps:.2g} team-steps"
         )
     click.echo(configs[-1].to_toml().rstrip())
 
