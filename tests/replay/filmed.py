@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from conevo.replay import palette
+from conevo import palette
 from conevo.replay.channel import Channel
 from conevo.replay.stage import Backdrop, BodyKind, Kind, PlanRow, Ring, Robot, Stage, Things
 

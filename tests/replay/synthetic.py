@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from conevo.replay import palette
+from conevo import palette
 from conevo.replay.channel import Channel
 from conevo.replay.stage import (
     Backdrop,

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from conevo import palette
 from conevo.errors import UsageError
-from conevo.replay import palette
 from conevo.replay.channel import Channel
 from conevo.replay.drawing.panel import PAGE, Panel
 from conevo.replay.drawing.planes import RGB, YUV, Planes, disc_mask, even

@@ -8,9 +8,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from conevo import palette
 from conevo.errors import UsageError
 from conevo.kernels import khepera
-from conevo.replay import palette
 from conevo.replay.stage import Kind, Pool
 from conevo.replay.stages import building, checked, gacc, pursuit, rover, stage_of
 from conevo.replay.stages.words import enumerated, number
@@ -148,20 +148,23 @@ def test_colours_can_be_told_apart_by_everybody(vision):
     assert closest(rovers, vision) > 22
     assert closest([*pursuit.ACTIONS.values(), palette.FAINT], vision) > 22
     assert closest([*gacc.ACTIONS.values(), palette.FAINT], vision) > 11
-    assert closest([*gacc.CASTES.values(), gacc.MOVE, palette.FAINT], vision) > 11
+    assert closest([*gacc.CASTES.values(), palette.MOVE, palette.FAINT], vision) > 11
     stones = [*rover.ROCKS[:4], rover.CANAL]
     assert closest(stones, vision) > 17
     for stone in stones[:4]:
         assert min(closest([stone, robot], vision) for robot in rovers) > 17
     rims = [state.colour for state in gacc.LIFE if state.colour]
-    assert closest([*dict.fromkeys(rims), *gacc.HUES], vision) > 11
+    assert closest([*dict.fromkeys(rims), *palette.OBJECTS.values()], vision) > 11
+    assert closest([look.line for look in palette.METHODS.values()], vision) > 15
+    assert closest([look.area for look in palette.METHODS.values()], vision) > 9
     for kinds in (pursuit.EVENT_KINDS, building.EVENT_KINDS):
         assert closest([kind.colour for kind in kinds], vision) > 11
 
 
 def test_lightness_tells_what_is_done_and_hue_for_which_type():
-    lightness = [[lab([c], "all cones")[0, 0] for c in verb] for verb in
-                 (gacc.DETECT, gacc.GRIP, gacc.CONSTRUCT)]  # fmt: skip
+    colours = list(gacc.CASTES.values())
+    verbs = (colours[:3], colours[3:6], colours[6:])  # to detect, gather, construct
+    lightness = [[lab([c], "all cones")[0, 0] for c in verb] for verb in verbs]
     for light, middle, dark in zip(*lightness, strict=True):
         assert light > middle + 10 > dark + 20
     worth = [lab([c], "all cones")[0, 0] for c in rover.ROCKS[:4]]

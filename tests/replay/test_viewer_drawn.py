@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from conevo.replay import palette
+from conevo import palette
 from conevo.replay.page import replay_page
 from replay.eventful import WORLDS
 from replay.synthetic import DETECTED, HELD, PHASE, ROCKS_X, ROCKS_Y, R, T, made_up

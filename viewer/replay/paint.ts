@@ -3,7 +3,7 @@
 import type { Stage } from "./stage";
 import type { State } from "./state";
 
-// The same as in conevo/replay/palette.py.
+// The same as in conevo/palette.py.
 export const INK = "#1c1c22";
 export const FAINT = "#9a9aa5";
 export const GROUND = "#fbfaf7";

@@ -11,10 +11,10 @@ from typing import Any
 import numpy.typing as npt
 from PIL import Image, ImageDraw, ImageFont
 
+from conevo.palette import FAINT, GROUND, INK, shade
 from conevo.replay.drawing.planes import Colours, Mask, Planes, even
 from conevo.replay.drawing.scene import Scene
 from conevo.replay.drawing.strip import Strip
-from conevo.replay.palette import FAINT, GROUND, INK, shade
 from conevo.replay.stage import Kind, Measure, PlanRow, Stage
 
 __all__ = ["PAGE", "Panel"]

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 from PIL import Image, ImageDraw
 
+from conevo.palette import FAINT, GROUND, INK
 from conevo.replay.drawing.planes import (
     Colours,
     Mask,
@@ -19,7 +20,6 @@ from conevo.replay.drawing.planes import (
     square_mask,
 )
 from conevo.replay.drawing.trails import Trails
-from conevo.replay.palette import FAINT, GROUND, INK
 from conevo.replay.stage import Stage, Things
 
 __all__ = ["Scene", "colours_of"]

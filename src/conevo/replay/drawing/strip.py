@@ -6,8 +6,8 @@ import numpy as np
 import numpy.typing as npt
 from PIL import Image, ImageDraw
 
+from conevo.palette import FAINT, GROUND, INK
 from conevo.replay.drawing.planes import Colours, Planes, even
-from conevo.replay.palette import FAINT, GROUND, INK
 from conevo.replay.stage import Stage
 
 __all__ = ["Strip"]

@@ -14,23 +14,15 @@ from typing import Any
 
 from conevo.errors import UsageError
 from conevo.evolution.methods.registry import METHODS
+from conevo.palette import caste_colours, method_looks, several
 from conevo.replay.live.files import readable
 from conevo.replay.live.groups import Experiment, Group, Names, Runs, children
 from conevo.replay.live.runs import Subject
-from conevo.replay.palette import FAINT, several
-from conevo.replay.stages import gacc, pursuit, rover
 from conevo.runs.directory import kind_of
 
 __all__ = ["FORMAT", "Watched"]
 
 FORMAT = 1
-REST = "non-specialized"  # a caste of its own
-CASTES: dict[str, dict[str, str]] = {
-    "rover": rover.ACTIONS,
-    "pursuit": pursuit.ACTIONS,
-    "prey": pursuit.ACTIONS,
-    "gacc": gacc.CASTES,
-}
 
 
 class Watched:
@@ -152,32 +144,16 @@ class Watched:
 
 
 def _methods(names: Iterable[str]) -> dict[str, dict[str, str]]:
-    """Return title and colour of methods: always the same of those in the registry.
-
-    CONE comes last of them and so gets the ink: thin pale lines of no other look like its own.
-    """
-    known = sorted(METHODS.values(), key=lambda entry: entry.name == "cone")
-    titles = {entry.name: entry.title for entry in known}
+    """Return title and colour of methods, those of the registry first."""
+    titles = {entry.name: entry.title for entry in METHODS.values()}
     titles |= {name: name for name in sorted(set(names) - set(METHODS) - {""})}
-    colours = several(len(titles))
-    return {
-        name: {"title": title, "colour": colour}
-        for (name, title), colour in zip(titles.items(), colours, strict=True)
-    }
+    looks = method_looks(titles)
+    return {name: {"title": title, "colour": looks[name].line} for name, title in titles.items()}
 
 
 def _castes(runs: Iterable[Mapping[str, Any]]) -> dict[str, dict[str, str]]:
-    """Return the colour of every caste of every world, the one that it has in a replay.
-
-    In the world's order; castes of worlds outside the package come by name, the rest last.
-    """
+    """Return the colour of every caste of every world, the one that it has in a replay."""
     seen: dict[str, set[str]] = {}
     for run in runs:
         seen.setdefault(run["task"].partition("/")[0], set()).update(run["castes"])
-    found = {}
-    for world, names in seen.items():
-        known = CASTES.get(world.rpartition("-v")[0], {})
-        others = sorted(names - known.keys() - {REST})
-        free = [c for c in several(len(others) + len(known)) if c not in known.values()]
-        found[world] = {**known, **dict(zip(others, free, strict=False)), REST: FAINT}
-    return found
+    return {world: caste_colours(world, names) for world, names in seen.items()}

@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from conevo.replay.palette import BLUE, FAINT, GREEN, INK, ORANGE, VERMILION
+from conevo.palette import BLUE, FAINT, GREEN, INK, ORANGE, VERMILION
 from conevo.replay.stage import Event, Kind
 from conevo.replay.stages.parts import Parts
 from conevo.replay.stages.words import enumerated

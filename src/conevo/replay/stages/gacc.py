@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections import Counter
 
+from conevo import palette
+from conevo.palette import BLUE, FAINT, INK, VERMILION
 from conevo.replay.channel import Channel
-from conevo.replay.palette import BLUE, FAINT, GREEN, INK, ORANGE, SKY, VERMILION, shade
 from conevo.replay.stage import (
     Backdrop,
     BodyKind,
@@ -19,25 +20,12 @@ from conevo.replay.stage import (
     Things,
 )
 from conevo.replay.stages.building import EVENT_KINDS, Building
-from conevo.replay.stages.parts import MOVE, Parts, begun, columns, octants
+from conevo.replay.stages.parts import Parts, begun, columns, octants
 from conevo.worlds.gacc_plans import TYPES, plan
 
 __all__ = ["stage"]
 
-# Choice: hue says for which type of object, lightness what is done: detecting is light, gripping
-# and gathering are as light as the objects themselves, constructing is dark.
-HUES = (ORANGE, SKY, GREEN)
-DETECT, GRIP, CONSTRUCT = (tuple(shade(hue, by) for hue in HUES) for by in (0.5, 0.0, -0.35))
-ACTIONS = {
-    **{f"detect {kind}": colour for kind, colour in zip(TYPES, DETECT, strict=True)},
-    "move": MOVE,
-    **{f"grip {kind}": colour for kind, colour in zip(TYPES, GRIP, strict=True)},
-}
-CASTES = {
-    f"{kind}-{name}": colour
-    for name, colours in (("detector", DETECT), ("gatherer", GRIP), ("constructor", CONSTRUCT))
-    for kind, colour in zip(TYPES, colours, strict=True)
-}
+ACTIONS, CASTES = palette.ACTIONS["gacc"], palette.CASTES["gacc"]
 OUTPUTS = (
     *(f"detect {kind}" for kind in TYPES),
     *("move: dx", "move: dy"),
@@ -100,7 +88,7 @@ def _objects(parts: Parts) -> Things:
     k = kind.codes.size
     return Things(
         "objects",
-        tuple(Kind(f"object {n}", colour) for n, colour in zip(TYPES, HUES, strict=True)),
+        tuple(Kind(f"object {n}", colour) for n, colour in palette.OBJECTS.items()),
         kind,
         parts.channel("object_x", parts.t, k),
         parts.channel("object_y", parts.t, k),
@@ -134,8 +122,8 @@ def _demand(parts: Parts) -> tuple[Gauge, ...]:
     """Return the demand for each type, which is at most 1."""
     demand = parts.channel("demand", parts.t, len(TYPES))
     return tuple(
-        Gauge(f"demand {kind}", values, 1.0, colour)
-        for kind, colour, values in zip(TYPES, HUES, columns(demand), strict=True)
+        Gauge(f"demand {kind}", values, 1.0, palette.OBJECTS[kind])
+        for kind, values in zip(TYPES, columns(demand), strict=True)
     )
 
 

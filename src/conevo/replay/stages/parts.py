@@ -9,16 +9,15 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from conevo.palette import FAINT
 from conevo.replay.channel import Channel
-from conevo.replay.palette import FAINT
 from conevo.replay.stage import Kind, Measure, Robot, SensorGroup
 from conevo.replay.stages.words import facts, subtitle, title
 from conevo.replay.trajectory import Trajectory
 from conevo.specialization.individual import NON_SPECIALIZED
 
-__all__ = ["MOVE", "Parts", "begun", "columns", "octants"]
+__all__ = ["Parts", "begun", "columns", "octants"]
 
-MOVE = "#4a4a52"  # Choice: what robots do between what they are there for is dark grey
 _FARTHEST = 2.0**32  # beyond it whole numbers cannot be kept
 _COMPASS = ("ENE", "NNE", "NNW", "WNW", "WSW", "SSW", "SSE", "ESE")
 

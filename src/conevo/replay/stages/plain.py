@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from conevo.errors import UsageError
-from conevo.replay.palette import several
+from conevo.palette import several
 from conevo.replay.stage import BodyKind, SensorGroup, Stage
 from conevo.replay.stages.parts import Parts, begun
 from conevo.replay.stages.refusals import one_line

@@ -7,18 +7,9 @@ import math
 import numpy as np
 import numpy.typing as npt
 
+from conevo import palette
+from conevo.palette import FAINT, GREEN, GROUND, INK, shade
 from conevo.replay.channel import Channel
-from conevo.replay.palette import (
-    BLUE,
-    FAINT,
-    GREEN,
-    GROUND,
-    INK,
-    SKY,
-    VERMILION,
-    YELLOW,
-    shade,
-)
 from conevo.replay.stage import (
     Backdrop,
     BodyKind,
@@ -30,12 +21,12 @@ from conevo.replay.stage import (
     Stage,
     Things,
 )
-from conevo.replay.stages.parts import MOVE, Parts, begun
+from conevo.replay.stages.parts import Parts, begun
 from conevo.replay.stages.words import enumerated
 
 __all__ = ["stage"]
 
-ACTIONS = {"stop": MOVE, "forward": BLUE, "left": YELLOW, "right": SKY, "reverse": VERMILION}
+ACTIONS = palette.ACTIONS["pursuit"]
 RADIUS = 2.75  # of a Khepera and of an obstacle, cm; as in kernels.khepera, like the next
 LOOK = (10, 45, 90, 180, -180, -90, -45, -10)  # directions of the sensors, degrees
 SECONDS = 0.1  # of an iteration

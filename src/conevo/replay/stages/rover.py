@@ -6,17 +6,17 @@ from collections import Counter
 
 import numpy as np
 
+from conevo import palette
+from conevo.palette import INK
 from conevo.replay.channel import Channel
-from conevo.replay.palette import BLUE, INK, SKY, YELLOW
 from conevo.replay.stage import Backdrop, BodyKind, Event, Kind, Measure, Ring, Stage, Things
-from conevo.replay.stages.parts import MOVE, Parts, begun, octants
+from conevo.replay.stages.parts import Parts, begun, octants
 from conevo.replay.stages.words import enumerated
 from conevo.worlds import rocks
 
 __all__ = ["stage"]
 
-# Choice: the shorter the range of a setting, and the more accurate, the darker its colour.
-ACTIONS = {"low": YELLOW, "med": SKY, "hi": BLUE, "move": MOVE}
+ACTIONS = palette.ACTIONS["rover"]
 OUTPUTS = ("low", "med", "hi", "move: dx", "move: dy")
 # Choice: all rocks are red, as they are called, and the darker the more they are worth; type E,
 # which is never with others, looks like A, which is worth the same.

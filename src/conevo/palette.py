@@ -1,0 +1,157 @@
+"""One palette for everything that is drawn: report, live page, replay, film.
+
+The colours are the eight of Okabe and Ito (2008), which readers with any kind of colour vision can
+tell apart, and lighter or darker forms of them for what belongs together: hue is the type of a
+thing, lightness what is done with it. Methods have colours of their own, which also differ in
+lightness; a method has the same one everywhere, whatever else is drawn with it.
+"""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Iterable
+from typing import NamedTuple
+
+__all__ = [
+    "ACTIONS",
+    "BLUE",
+    "CASTES",
+    "FAINT",
+    "GREEN",
+    "GROUND",
+    "INK",
+    "METHODS",
+    "MOVE",
+    "OBJECTS",
+    "ORANGE",
+    "PURPLE",
+    "REST",
+    "SKY",
+    "VERMILION",
+    "YELLOW",
+    "Look",
+    "caste_colours",
+    "method_looks",
+    "several",
+    "shade",
+]
+
+ORANGE, SKY, GREEN, YELLOW = "#e69f00", "#56b4e9", "#009e73", "#f0e442"
+BLUE, VERMILION, PURPLE = "#0072b2", "#d55e00", "#cc79a7"
+INK, FAINT, GROUND = "#1c1c22", "#9a9aa5", "#fbfaf7"  # text, what hardly matters, the world's floor
+MOVE = "#4a4a52"  # Choice: what robots do between what they are there for is dark grey
+REST = "non-specialized"  # a caste of its own
+
+_ORDER = (BLUE, ORANGE, GREEN, PURPLE, SKY, VERMILION, YELLOW, INK)
+
+
+def several(n: int) -> tuple[str, ...]:
+    """Return n colours; from the ninth on darker forms of the first."""
+    return tuple(shade(_ORDER[k % 8], -0.4 * (k // 8)) for k in range(n))
+
+
+def shade(colour: str, by: float) -> str:
+    """Return a colour lighter (by > 0, to white at 1) or darker (by < 0, to black at -1)."""
+    goal = 255 if by > 0 else 0
+    parts = (int(colour[k : k + 2], 16) for k in (1, 3, 5))
+    return "#" + "".join(f"{round(p + (goal - p) * min(abs(by), 1.0)):02x}" for p in parts)
+
+
+class Look(NamedTuple):
+    """How a method is drawn.
+
+    Attributes:
+        number: of the look, for what tells methods apart without colour: hatches, dashes, markers.
+        area: colour of bars, of bands and inside points.
+        line: colour of lines, of rims, and of text about it.
+    """
+
+    number: int
+    area: str
+    line: str
+
+
+METHODS: dict[str, Look] = {
+    "homcne": Look(0, "#fbe6b4", ORANGE),
+    "hetcne": Look(1, "#a9d9c8", GREEN),
+    "ccga": Look(2, "#e59a70", VERMILION),
+    "mesp": Look(3, "#5d98c6", BLUE),
+    "cone": Look(4, "#53557a", INK),
+    "cone-1": Look(5, "#dcaeca", PURPLE),
+    "cone-2": Look(6, "#d8edfa", SKY),
+    "cone-3": Look(7, "#8f755a", "#6b4e30"),
+}
+"""The look of every method of the registry."""
+
+_OTHERS = (  # of methods from elsewhere
+    ("#d9e4a0", "#8a9a2b"),
+    ("#f3c1d5", "#b8487f"),
+    ("#a5e0ec", "#1f93a8"),
+    ("#f5c98b", "#a8661a"),
+    ("#b9b6e8", "#5a52b5"),
+    ("#a9d6a4", "#3c7d35"),
+)
+
+
+def method_looks(names: Iterable[str]) -> dict[str, Look]:
+    """Return the look of each method: those of the registry always have the same.
+
+    A method from elsewhere has the look that its name leads to, the next free one if another of
+    the names has that already; colours repeat after twelve of them, numbers never.
+    """
+    wanted = sorted(set(names))
+    looks = {name: METHODS[name] for name in wanted if name in METHODS}
+    taken: dict[int, str] = {}
+    for name in (name for name in wanted if name not in METHODS):
+        k = zlib.crc32(name.encode()) % len(_OTHERS)
+        while k in taken:
+            k += 1 if len(taken) >= len(_OTHERS) else (k + 1) % len(_OTHERS) - k
+        taken[k] = name
+        area, line = _OTHERS[k % len(_OTHERS)]
+        darker = -0.35 * (k // len(_OTHERS) % 2)
+        looks[name] = Look(len(METHODS) + k, shade(area, darker), shade(line, darker))
+    return looks
+
+
+# Choice: hue is the type of object, lightness what is done: detecting is light, gripping and
+# gathering are as light as the objects themselves, constructing is dark.
+OBJECTS = {"A": ORANGE, "B": SKY, "C": GREEN}
+_DETECT, _GRIP, _CONSTRUCT = 0.5, 0.0, -0.35
+_DRIVING = {"stop": MOVE, "forward": BLUE, "left": YELLOW, "right": SKY, "reverse": VERMILION}
+
+ACTIONS: dict[str, dict[str, str]] = {
+    # Choice: the shorter the range of a setting, and the more accurate, the darker its colour.
+    "rover": {"low": YELLOW, "med": SKY, "hi": BLUE, "move": MOVE},
+    "pursuit": _DRIVING,
+    "prey": _DRIVING,
+    "gacc": {
+        **{f"detect {kind}": shade(hue, _DETECT) for kind, hue in OBJECTS.items()},
+        "move": MOVE,
+        **{f"grip {kind}": shade(hue, _GRIP) for kind, hue in OBJECTS.items()},
+    },
+}
+"""World without version -> action -> colour."""
+
+CASTES: dict[str, dict[str, str]] = ACTIONS | {
+    "gacc": {
+        f"{kind}-{agent}": shade(hue, by)
+        for agent, by in (("detector", _DETECT), ("gatherer", _GRIP), ("constructor", _CONSTRUCT))
+        for kind, hue in OBJECTS.items()
+    }
+}
+"""World without version -> caste -> colour; a caste named like an action has its colour."""
+
+
+def caste_colours(world: str, names: Iterable[str]) -> dict[str, str]:
+    """Return the colour of every caste: of the world's own in its order, then of others by name.
+
+    The non-specialized are faint and come last.
+
+    Args:
+        world: name, with or without a version.
+        names: castes that were seen.
+    """
+    known = CASTES.get(world.rpartition("-v")[0] or world, {})
+    others = sorted(set(names) - known.keys() - {REST})
+    free = [c for c in several(len(others) + len(known)) if c not in known.values()]
+    return {**known, **dict(zip(others, free, strict=False)), REST: FAINT}

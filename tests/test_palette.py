@@ -1,0 +1,35 @@
+"""A method has one colour, whatever is drawn with it; a caste that of its replay."""
+
+from itertools import combinations
+
+from conevo import palette
+from conevo.evolution.methods.registry import METHODS
+from conevo.worlds.registry import WORLDS
+
+
+def test_every_method_of_the_registry_has_a_look_of_its_own() -> None:
+    assert set(palette.METHODS) == set(METHODS)
+    for parts in zip(*palette.METHODS.values(), strict=True):
+        assert len(set(parts)) == len(METHODS)
+
+
+def test_a_look_does_not_depend_on_what_else_is_drawn() -> None:
+    everything = palette.method_looks([*METHODS, "annealing"])
+    for names in combinations([*METHODS, "annealing"], 2):
+        assert palette.method_looks(names) == {name: everything[name] for name in names}
+
+
+def test_methods_from_elsewhere_never_share_a_look() -> None:
+    names = [f"method-{k}" for k in range(12)]
+    looks = palette.method_looks([*METHODS, *names])
+    assert len({look.line for look in looks.values()}) == len(METHODS) + 12
+    assert palette.method_looks(reversed(names)) == {name: looks[name] for name in names}
+
+
+def test_castes_have_the_colours_of_a_replay_and_strangers_others() -> None:
+    rover = palette.caste_colours("rover-v1", ["hi", "idle"])
+    assert rover == palette.caste_colours("rover", ["idle"])
+    assert list(rover) == ["low", "med", "hi", "move", "idle", "non-specialized"]
+    assert len(set(rover.values())) == 6
+    for entry in WORLDS.values():
+        assert entry.short_name in palette.CASTES
