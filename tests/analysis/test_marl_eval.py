@@ -208,6 +208,8 @@ def test_variants_are_algorithms_without_a_comma(campaign):
         pytest.param({"values": ()}, id="no generation"),
         pytest.param({"tests": (1.0, math.nan)}, id="a test that is not a number"),
         pytest.param({"values": (1.0, math.inf)}, id="a generation that is not finite"),
+        pytest.param({"tests": (1.0, None)}, id="a test without a value"),
+        pytest.param({"values": (1.0, None)}, id="a generation without a value"),
     ],
 )
 def test_runs_that_lack_something_are_left_out(campaign, flaw):

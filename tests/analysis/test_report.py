@@ -204,10 +204,14 @@ def test_budgets_stand_apart(tmp_path) -> None:
         sections = sections_of(tables, read_campaign(root))
     groups = [section for section in sections if section.sections]
     assert [section.name for section in groups] == ["rover-complex", "rover-complex-budget-2"]
-    assert [section.text[0] for section in groups] == [
-        f"Budget of a run: smoke, about {budget} team evaluations of 500 team-steps."
+    assert [section.title for section in groups] == [
+        f"rover-v1, complex, smoke, {budget} team evaluations of 500 team-steps"
         for budget in ("1,000", "5,000")
     ]
+    assert groups[1].text[0] == (
+        "Each of the 4 runs spent 5,000 team evaluations, 2,500,000 team-steps; preset smoke; "
+        "conevo 0.1.0."
+    )
     names = [one.name for section in sections for one in section.all_exhibits()]
     assert len(names) == len(set(names))
     for section in groups:

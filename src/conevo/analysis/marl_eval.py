@@ -105,7 +105,7 @@ def _environments(tables: Tables) -> dict[str, Cells]:
     for run, world, family, preset, task, method, variant, measure in rows:
         if run not in tests or run not in curves:
             continue
-        if not np.isfinite(tests[run] + curves[run][1]).all():
+        if not np.isfinite(np.array(tests[run] + curves[run][1], dtype=float)).all():
             continue
         environment = " ".join(part for part in (world, family, preset) if part)
         algorithm = " ".join(part for part in (method, variant) if part).replace(",", ";")

@@ -28,6 +28,7 @@ from conevo.analysis.exhibits import Exhibit, Figure, Section, Table, to_latex
 from conevo.analysis.frames import Tables
 from conevo.analysis.marl_eval import export
 from conevo.analysis.sections.behaviours import behaviours
+from conevo.analysis.sections.budgets import Spent, headings, spent_by
 from conevo.analysis.sections.castes import castes
 from conevo.analysis.sections.claims import claims
 from conevo.analysis.sections.comparisons import comparisons
@@ -83,7 +84,10 @@ def write_report(campaign: Path, out: Path) -> Path:
 
 def sections_of(tables: Tables, campaign: Campaign) -> list[Section]:
     """Return the sections of a report in order."""
-    groups = [_about(scope) for scope in scopes(tables)]
+    found = scopes(tables)
+    spent = [spent_by(tables, scope.group) for scope in found]
+    titles = headings([scope.group for scope in found], spent)
+    groups = [_about(*one) for one in zip(found, titles, spent, strict=True)]
     return [
         overview(tables, campaign),
         *groups,
@@ -93,10 +97,9 @@ def sections_of(tables: Tables, campaign: Campaign) -> list[Section]:
     ]
 
 
-def _about(scope: Scope) -> Section:
+def _about(scope: Scope, title: str, spent: Spent) -> Section:
     """Return everything about one group of runs."""
     histories = read_histories(scope.tables, scope.group)
-    world, family, budget = scope.group
     parts = [
         performance(scope),
         comparisons(scope),
@@ -107,9 +110,9 @@ def _about(scope: Scope) -> Section:
         metrics(scope),
         behaviours(scope),
     ]
-    text = [f"Budget of a run: {budget}."]
-    title = f"{world}, {family}, {budget.partition(',')[0]}"
-    return Section(title, text, (), [part for part in parts if part is not None], name=scope.stem)
+    return Section(
+        title, [spent.words], (), [part for part in parts if part is not None], name=scope.stem
+    )
 
 
 def _files(campaign: Campaign, sections: list[Section]) -> Iterator[tuple[str, bytes]]:
