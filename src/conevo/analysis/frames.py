@@ -159,14 +159,17 @@ class Tables:
         """Return the column names and the rows that one SQL statement gives.
 
         Raises:
-            UsageError: what DuckDB says about a statement that it cannot carry out.
+            UsageError: no statement, or DuckDB's reason for refusing it.
         """
         import duckdb
 
         try:
             result = self._connection.execute(sql)
-            columns = [str(column[0]) for column in result.description or []]
-            return columns, result.fetchall()
+            if not result.description:
+                raise UsageError(
+                    'no SQL statement, as in "SELECT method, count(*) FROM runs GROUP BY ALL"'
+                )
+            return [str(column[0]) for column in result.description], result.fetchall()
         except duckdb.Error as error:
             raise _refused(error) from error
 

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import errno
+import io
 import os
 import sys
 from collections.abc import Sequence
 from importlib import import_module
+from pathlib import Path
 from typing import NoReturn
 
 import click
 
-from conevo.errors import ConevoError, unknown_name
+from conevo.errors import ConevoError, UsageError, unknown_name
 
 __all__ = ["cli", "main"]
 
@@ -85,13 +87,36 @@ def cli() -> None:
     """
 
 
+def _ready_streams() -> None:
+    """Let every text be printed: closed streams lead nowhere, unprintable letters are escaped."""
+    for name in ("stdin", "stdout", "stderr"):
+        stream = getattr(sys, name)
+        if stream is None:  # closed by whoever started this process, as by >&-
+            stream = Path(os.devnull).open("r" if name == "stdin" else "w")  # noqa: SIM115
+            setattr(sys, name, stream)
+        if name != "stdin" and isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
+
+
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
     """Run a command line; every error is one line, every ending has its exit code.
 
     2: the request cannot be carried out as written; 3: the machine refused; 130: interrupted.
     """
+    _ready_streams()
     try:
-        code = cli.main(arguments, prog_name="conevo", standalone_mode=False)
+        words = list(sys.argv[1:] if arguments is None else arguments)
+        for word in words:
+            if any("\ud800" <= letter <= "\udfff" for letter in word):
+                raise UsageError(f"{word!r} is not valid UTF-8, as names and settings must be")
+        with cli.make_context("conevo", words) as ctx:
+            code = cli.invoke(ctx)
+        sys.stdout.flush()
+    except click.exceptions.NoArgsIsHelpError as error:
+        click.echo(error.format_message())
+        code = 0
+    except click.exceptions.Exit as error:
+        code = error.exit_code
     except ConevoError as error:
         fail(str(error), error.exit_code)
     except click.ClickException as error:
