@@ -6,6 +6,7 @@ import json
 import os
 import re
 import shlex
+import sys
 from pathlib import Path
 
 import pytest
@@ -167,6 +168,75 @@ def test_a_digest_belongs_to_the_world_beside_it(light: Path, tmp_path: Path) ->
     ):
         with pytest.raises(UsageError, match=words):
             resolve(overrides=given)
+
+
+FETCH = (
+    "from conevo.rng import stream\n",
+    "from conevo.rng import stream\nfrom paces import PACE\n",
+)
+PACED = (FETCH, ("Le(0.1)] = 0.01", "Le(0.1)] = PACE"))
+
+
+def test_a_file_imports_its_neighbours_and_the_digest_covers_them(tmp_path: Path) -> None:
+    found = []
+    for place, pace in (("a", "0.02"), ("b", "0.03"), ("c", "0.02")):
+        (tmp_path / place).mkdir()
+        file = written(tmp_path / place / "light.py", *PACED)
+        (file.parent / "paces.py").write_text("import math\nimport deeper\n\nPACE = deeper.PACE\n")
+        (file.parent / "deeper.py").write_text(f"import paces\nimport light\n\nPACE = {pace}\n")
+        (file.parent / "unused.py").write_text("raise RuntimeError\n")
+        found.append(resolve(f"{file}:dark-1"))
+    assert [config.world_params.step for config in found] == [0.02, 0.03, 0.02]
+    assert found[0].run_id == found[2].run_id != found[1].run_id
+    names = [Path(file).name for file in found[0].entry.files]
+    assert names == ["light.py", "paces.py", "deeper.py"]
+    assert found[0].entry.files[0] == found[0].entry.file
+    assert not {"paces", "deeper", "light", "unused"} & set(sys.modules)
+    kept = tmp_path / "config.toml"
+    kept.write_text(found[0].to_toml())
+    (tmp_path / "a" / "deeper.py").write_text("PACE = 0.04\n")
+    with pytest.raises(
+        UsageError, match=r"has changed, or what it imports \(paces.py, deeper.py\)"
+    ):
+        resolve(file=kept)
+
+
+def test_kernels_made_of_a_neighbour_change_with_it_and_imports_may_wait(tmp_path: Path) -> None:
+    score = "1.0 - wp.length(light(team, scene, i))"
+    changes = (
+        (score, "scored(light(team, scene, i))"),
+        ("from conevo.rng", "from scores import scored\nfrom conevo.rng"),
+        ("        params = Params()", "        import late\n\n        params = late.of(Params)"),
+    )
+    file = written(tmp_path / "light.py", *changes)
+    (tmp_path / "late.py").write_text("def of(kind):\n    return kind()\n")
+    hashes = []
+    for sign in ("1.0", "2.0", "1.0"):
+        (tmp_path / "scores.py").write_text(
+            "import warp as wp\n\n\n@wp.func\ndef scored(way: wp.vec2f) -> float:\n"
+            f"    return {sign} - wp.length(way)\n"
+        )
+        hashes.append(conevo.Rollout(conevo.world(f"{file}:dark-1")).kernel_hash)
+    assert hashes[0] == hashes[2] != hashes[1]
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("PACE = 1 / 0\n", "light.py: paces.py line 1: ZeroDivisionError: division by zero"),
+        ("PACE = = 1\n", "light.py: paces.py line 1: SyntaxError: invalid syntax"),
+        ("\nimport os\nimport conevo_no_such\n", "light.py: paces.py line 3: ModuleNotFoundError"),
+        ("", "ImportError: cannot import name 'PACE'"),
+    ],
+)
+def test_a_bad_neighbour_is_named(text: str, words: str, tmp_path: Path) -> None:
+    file = written(tmp_path / "light.py", *PACED)
+    for _ in range(2):
+        (tmp_path / "paces.py").write_text(text)
+        with pytest.raises(UsageError, match=re.escape(words)):
+            resolve(f"{file}:dark-1")
+    (tmp_path / "paces.py").write_text("PACE = 0.05\n")
+    assert resolve(f"{file}:dark-1").world_params.step == 0.05
 
 
 def test_shaping_through_the_environments_of_a_file(tmp_path: Path) -> None:

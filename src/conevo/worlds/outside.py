@@ -1,17 +1,22 @@
 """Worlds outside the package: one Python file each, with its registry entry as ``ENTRY``.
 
-Such a world is named "FILE.py:ENVIRONMENT". Its text is known by a digest, which a run keeps, so
-that it is never carried on with another text: what a kernel hash cannot see (parameters, how
-scenarios are drawn) counts as well. The digest is looked at before anything in the file is run.
+Such a world is named "FILE.py:ENVIRONMENT". It may import other files of its folder. The text of
+all of them is known by a digest, which a run keeps, so that it is never carried on with another
+text: what a kernel hash cannot see (parameters, how scenarios are drawn) counts as well. The digest
+is looked at before anything in the files is run, so imports are found by reading, not by running.
 """
 
 from __future__ import annotations
 
+import ast
+import builtins
 import hashlib
 import linecache
 import re
 import sys
+import threading
 import traceback
+from collections.abc import Iterable, Mapping
 from dataclasses import is_dataclass, replace
 from importlib.util import decode_source, module_from_spec, spec_from_loader
 from pathlib import Path
@@ -21,69 +26,144 @@ from typing import Any
 from conevo.errors import UsageError
 from conevo.worlds.registry import WORLDS, WorldEntry
 
-__all__ = ["load"]
+__all__ = ["load", "line_of"]
 
 CLASS_NAMES = ("name", "actions", "castes", "performance", "heuristics")
+OWN = "conevo_world_"  # begins the names of the modules that such files become
+_loading = threading.RLock()
 
 
 def load(path: Path, digest: str = "") -> WorldEntry:
-    """Return the entry of the world in a file, with the file's path and digest.
+    """Return the entry of the world in a file, with the files it is made of and their digest.
 
-    A file is run once in a process for each text that it has.
+    The files are run once in a process for each text that they have.
 
     Args:
         path: the file.
-        digest: that its text must have; any if empty.
+        digest: that they must have; any if empty.
 
     Raises:
-        UsageError: it cannot be read or run, holds no world, or has another digest.
+        UsageError: a file cannot be read or run, holds no world, or they have another digest.
     """
-    try:
-        text = path.read_bytes()
-    except OSError as error:
-        raise UsageError(f"cannot read the world file {path}: {error.strerror}") from error
-    found = hashlib.blake2b(text, digest_size=6).hexdigest()
+    texts = _texts(path)
+    found = _digest(texts)
     if digest not in ("", found):
+        others = ", ".join(file.name for file in list(texts)[1:])
         raise UsageError(
-            f"world file {path} has changed: its digest is {found}, not {digest}; bring back the "
-            f"file as it was, or start another run"
+            f"world file {path} has changed{f', or what it imports ({others})' * bool(others)}: "
+            f"its digest is {found}, not {digest}; bring back the file as it was, or start another "
+            f"run"
         )
-    name = f"conevo_world_{found}"
-    module = sys.modules.get(name) or _run(name, path.resolve(), text)
+    with _loading:
+        module = sys.modules.get(OWN + found) or _run(path, texts, found)
     entry = getattr(module, "ENTRY", None)
     if problem := _problem(entry, module):
         raise UsageError(f"world file {path}: {problem}")
     assert isinstance(entry, WorldEntry)
-    return replace(entry, module=name, file=str(path.resolve()), digest=found)
+    files = tuple(map(str, texts))
+    return replace(entry, module=OWN + found, file=files[0], files=files, digest=found)
 
 
-def _run(name: str, path: Path, text: bytes) -> ModuleType:
-    """Return the module that a file makes; Warp looks for both module and text by their names."""
-    spec = spec_from_loader(name, loader=None, origin=str(path))
-    assert spec is not None
-    module = module_from_spec(spec)
-    module.__file__ = str(path)
-    sys.modules[name] = module
+def _texts(path: Path) -> dict[Path, bytes]:
+    """Return the text of a file and of the files next to it that it imports, itself first."""
+    texts: dict[Path, bytes] = {}
+    rest = [path.resolve()]
+    while rest:
+        file = rest.pop()
+        try:
+            texts[file] = file.read_bytes()
+        except OSError as error:
+            shown = file if texts else path
+            raise UsageError(f"cannot read the world file {shown}: {error.strerror}") from error
+        near = {file.parent / f"{name}.py" for name in _imported(texts[file])}
+        rest += sorted((one for one in near if one.is_file() and one not in texts), reverse=True)
+    return texts
+
+
+def _imported(text: bytes) -> set[str]:
+    """Return the modules that a text imports by a plain name, wherever in it; none of Python's."""
     try:
-        lines = decode_source(text).splitlines(keepends=True)
-        linecache.cache[str(path)] = (len(text), None, lines, str(path))
-        exec(compile(text, str(path), "exec"), module.__dict__)
+        nodes = list(ast.walk(ast.parse(text)))
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        return set()  # running it says what is wrong
+    names = {alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names}
+    names |= {n.module for n in nodes if isinstance(n, ast.ImportFrom) and n.module and not n.level}
+    return names - sys.stdlib_module_names - {"conevo"}
+
+
+def _digest(texts: Mapping[Path, bytes]) -> str:
+    """Return twelve hex digits of the texts, and of the names that are imported."""
+    first, *others = texts
+    digest = hashlib.blake2b(texts[first], digest_size=6)
+    for file in sorted(others):
+        digest.update(b"\0" + file.name.encode() + b"\0" + texts[file])
+    return digest.hexdigest()
+
+
+def _run(path: Path, texts: Mapping[Path, bytes], digest: str) -> ModuleType:
+    """Return the module that a world's file makes.
+
+    Warp looks for both module and text by their names. Those of neighbours are the world's own, so
+    that two worlds may each have a neighbour of the same name: their imports are looked up here.
+    """
+    first = next(iter(texts))
+    names = {file.stem: OWN + digest + ("" if file == first else f"_{file.stem}") for file in texts}
+
+    def find(name: str, *rest: Any, **more: Any) -> ModuleType:
+        level = more.get("level", rest[3] if len(rest) > 3 else 0)
+        if level or name not in names:
+            return builtins.__import__(name, *rest, **more)
+        return sys.modules.get(names[name]) or run(files[name])
+
+    def run(file: Path) -> ModuleType:
+        name = names[file.stem]
+        spec = spec_from_loader(name, loader=None, origin=str(file))
+        assert spec is not None
+        module = module_from_spec(spec)
+        module.__file__ = str(file)
+        module.__dict__["__builtins__"] = vars(builtins) | {"__import__": find}
+        sys.modules[name] = module
+        try:
+            lines = decode_source(texts[file]).splitlines(keepends=True)
+            linecache.cache[str(file)] = (len(texts[file]), None, lines, str(file))
+            exec(compile(texts[file], str(file), "exec"), module.__dict__)
+        except BaseException:
+            del sys.modules[name]
+            raise
+        return module
+
+    files = {file.stem: file for file in texts}
+    try:
+        return run(first)
     except (Exception, SystemExit) as error:
-        del sys.modules[name]
-        raise UsageError(f"cannot run the world file {path}: {_line(error, path)}") from error
-    return module
+        for name in names.values():
+            sys.modules.pop(name, None)
+        place = _place(error, texts)
+        at = f"{place[0].name} " * (place[0] != first) + f"line {place[1]}: " if place else ""
+        raise UsageError(f"cannot run the world file {path}: {at}{_words(error)}") from error
 
 
-def _line(error: BaseException, path: Path) -> str:
-    """Return an error in one line, with the line of the file that it comes from."""
-    if isinstance(error, SyntaxError):
-        words, number = f"SyntaxError: {error.msg}", error.lineno
-    else:
-        words = f"{type(error).__name__}: {error}"
-        stack = traceback.extract_tb(error.__traceback__)
-        number = next((one.lineno for one in reversed(stack) if one.filename == str(path)), None)
-    place = f"line {number}: " if number else ""
-    return place + " ".join(words.split())
+def _place(error: BaseException, files: Iterable[Path]) -> tuple[Path, int] | None:
+    """Return the file and line that an error comes from, the innermost of some files."""
+    wanted = {str(file): file for file in files}
+    if isinstance(error, SyntaxError) and error.filename in wanted and error.lineno:
+        return wanted[error.filename], error.lineno
+    stack = traceback.extract_tb(error.__traceback__)
+    found = ((wanted[s.filename], s.lineno) for s in reversed(stack) if s.filename in wanted)
+    return next(((file, line) for file, line in found if line), None)
+
+
+def _words(error: BaseException) -> str:
+    """Return what an error is, in one line."""
+    what = error.msg if isinstance(error, SyntaxError) else str(error)
+    return " ".join(f"{type(error).__name__}: {what}".split())
+
+
+def line_of(error: BaseException) -> str:
+    """Return "FILE:LINE: TYPE: MESSAGE" of an error that comes from a world's file, or nothing."""
+    modules = [module for name, module in list(sys.modules.items()) if name.startswith(OWN)]
+    place = _place(error, (Path(str(module.__file__)) for module in modules))
+    return f"{place[0]}:{place[1]}: {_words(error)}" if place else ""
 
 
 def _problem(entry: Any, module: ModuleType) -> str:

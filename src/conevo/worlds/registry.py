@@ -22,7 +22,8 @@ class WorldEntry:
 
     ``module`` holds the classes named ``params_name`` (parameters) and ``world_name`` (built from
     an environment name and parameters). An entry in a file outside the package leaves it out;
-    ``worlds.outside`` fills it in, with the file's path and the digest of its text.
+    ``worlds.outside`` fills it in, with the file's path, ``files`` (this one first, then the files
+    next to it that it imports) and the digest of their texts.
     """
 
     name: str
@@ -34,6 +35,7 @@ class WorldEntry:
     world_name: str
     module: str = ""
     file: str = ""
+    files: tuple[str, ...] = ()
     digest: str = ""
 
     @property
