@@ -128,4 +128,10 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             sys.exit(0)
         fail(f"{error.filename}: {error.strerror}" if error.filename else str(error), 3)
+    except Exception as error:
+        outside = sys.modules.get("conevo.worlds.outside")
+        line = outside.line_of(error) if outside else ""
+        if not line:
+            raise
+        fail(line, 2)
     sys.exit(code if isinstance(code, int) else 0)

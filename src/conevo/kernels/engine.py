@@ -9,6 +9,7 @@ writes only its own robot's data, so both give the same bits.
 import hashlib
 import linecache
 import os
+import re
 import sys
 import tempfile
 import threading
@@ -20,25 +21,87 @@ from typing import Any
 
 import warp as wp
 
-__all__ = ["barrier", "kernel_hash", "launch", "options", "start", "usable_threads", "view_of"]
+from conevo.errors import EnvironmentFailure, UsageError
+
+__all__ = [
+    "barrier",
+    "build",
+    "building",
+    "kernel_hash",
+    "launch",
+    "options",
+    "start",
+    "usable_threads",
+    "view_of",
+]
 
 # Measured: no adjoints and no unrolling pay; fast_math and -O3 do not. No fused
 # multiply-add: CPU and CUDA must agree to the bit.
 options = {"enable_backward": False, "max_unroll": 0, "fuse_fp": False}
 
-_started = threading.Lock()
+# Held while kernels are made, identified, compiled and loaded: Warp generates code for one of them
+# at a time, whatever the number of threads that ask for it.
+building = threading.RLock()
 _is_started = False
 
 
 def start() -> None:
-    """Initialize Warp once, quietly."""
+    """Initialize Warp once, quietly.
+
+    Raises:
+        EnvironmentFailure: the folder for compiled kernels cannot be made.
+    """
     global _is_started
-    with _started:
+    with building:
         if not _is_started:
             wp.config.log_level = wp.LOG_WARNING
-            with _without_driver_warning():
+            with _without_driver_warning(), _cache_named():
                 wp.init()
             _is_started = True
+
+
+def build(kernel: Any, device: str, lanes: int) -> None:
+    """Compile and load a kernel unless that has been done.
+
+    Args:
+        kernel: made with ``options``.
+        device: "cpu" or a CUDA device.
+        lanes: lanes of a block.
+
+    Raises:
+        UsageError: a function of the kernel is not one that Warp can compile.
+        EnvironmentFailure: the compiled kernel cannot be written.
+    """
+    with building, _cache_named():
+        try:
+            kernel.module.load(wp.get_device(device), lanes)
+        except (OSError, UsageError):
+            raise
+        except Exception as error:
+            raise UsageError(_mistake(error)) from error
+
+
+@contextmanager
+def _cache_named() -> Iterator[None]:
+    """Let a file system that refuses compiled kernels be an error that names their folder."""
+    try:
+        yield
+    except OSError as error:
+        raise EnvironmentFailure(
+            f"compiled kernels cannot be kept in {wp.config.kernel_cache_dir}: {error.strerror}; "
+            f"set the variable WARP_CACHE_PATH to a folder that can be written"
+        ) from error
+
+
+def _mistake(error: Exception) -> str:
+    """Return "FILE:LINE: what is wrong" of an error in the text of a Warp function."""
+    words = str(error.args[0] if error.args else error)
+    places = re.findall(r'Error while parsing function "(\w+)" at (.+):(\d+):\n(.*)\n', words)
+    what = " ".join(words.rpartition("\n;")[2].split()).rstrip(".") or type(error).__name__
+    if not places:
+        return f"the world's kernel cannot be compiled: {what}"
+    function, file, line, text = places[-1]
+    return f"{file}:{line}: {what} (in {function}: {text.strip()})"
 
 
 @contextmanager
@@ -170,6 +233,7 @@ def kernel_hash(*kernels: Any) -> str:
     whether a compiled kernel may be used again.
     """
     digest = hashlib.blake2b(wp.__version__.encode(), digest_size=8)
-    for kernel in kernels:
-        digest.update(kernel.module.get_module_hash())
+    with building:
+        for kernel in kernels:
+            digest.update(kernel.module.get_module_hash())
     return digest.hexdigest()

@@ -72,10 +72,11 @@ class Lab:
         """Build world, method and simulator.
 
         Raises:
-            EnvironmentFailure: there is no such device.
+            UsageError: the world's functions cannot be compiled.
+            EnvironmentFailure: there is no such device, or no place for compiled kernels.
         """
         world = config.build_world()
-        rollout = Rollout(world, n_threads=threads, device=device)
+        rollout = Rollout(world, n_threads=threads, device=device).build()
         return Lab(
             config=config,
             world=world,

@@ -6,7 +6,7 @@ thousand teams needs no unpacked weights. Batches larger than the workspace run 
 
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -149,9 +149,10 @@ class Rollout:
         self.lanes = 32 if device != "cpu" else lanes
         self._chunk = CHUNK if device == "cpu" else CUDA_CHUNK
         _check_device(device)
-        self._simulation = world.simulation()
+        with engine.building:
+            self._simulation = world.simulation()
+            self._kernel = episode_kernel(self._simulation)
         self._sizes = _sizes_of(world, self._simulation)
-        self._kernel = episode_kernel(self._simulation)
         spec = world.controller
         shape = Shape()
         shape.n_sensors = spec.n_sensors
@@ -163,7 +164,20 @@ class Rollout:
         shape.weight_scale = spec.weight_scale
         shape.bias = float(spec.bias)
         self._shape = shape
+        self._is_built = False
         self._workspace: _Workspace | None = None
+
+    def build(self) -> Self:
+        """Compile and load the kernel, which the first launch does otherwise; return this rollout.
+
+        Raises:
+            UsageError: the world's functions cannot be compiled; names file and line.
+            EnvironmentFailure: the compiled kernel cannot be written.
+        """
+        if not self._is_built:
+            engine.build(self._kernel, self.device, self.lanes)
+            self._is_built = True
+        return self
 
     @property
     def kernel_hash(self) -> str:
@@ -339,6 +353,7 @@ class Rollout:
         return self._workspace
 
     def _launch(self, batch: _Workspace, scene: Any, job: Any, n: int) -> None:
+        self.build()
         job.n_worlds = batch.n
         engine.launch(
             self._kernel,
