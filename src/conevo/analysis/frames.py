@@ -165,7 +165,7 @@ class Tables:
 
         try:
             result = self._connection.execute(sql)
-            if not result.description:
+            if result is None or not result.description:
                 raise UsageError(
                     'no SQL statement, as in "SELECT method, count(*) FROM runs GROUP BY ALL"'
                 )
