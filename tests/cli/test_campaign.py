@@ -43,7 +43,7 @@ def test_a_campaign_from_start_to_answers(conevo, tmp_path):
     ]
     code, out, _ = conevo("query", "tiny", "SELECT method AS m FROM runs ORDER BY m", "--csv")
     assert out == "m\ncone\nhomcne\n"
-    for nothing in ("", ";", "-- only a comment"):
+    for nothing in ("", ";", "/* only a comment */"):
         code, out, err = conevo("query", "tiny", nothing)
         assert (code, out) == (2, "")
         assert "no SQL statement" in err
