@@ -89,7 +89,7 @@ SHEETS = {
     "gacc-v1": Sheet(
         measures=(
             ("delivered", "delivered", ".2f"),
-            ("optimum", "of the optimum, %", ".1f"),
+            ("delivered_share", "of the optimum, %", ".1f"),
             ("completed", "completed", ".2f"),
         ),
         axis="objects delivered by the fittest team",

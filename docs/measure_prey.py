@@ -209,7 +209,7 @@ def flee(prey: Prey, seed: int) -> list[Row]:
         teams = type(teams)(found.one[0], wide, teams.heuristic, teams.kinds)
     outcome = play(world, teams, keys_of(seed, N_SCENARIOS, "flee"))
     rows = []
-    for what in world.performance:
+    for what in outcome.performance:
         values = outcome.performance[what][0].astype(np.float64)
         row = {"what": what, "prey": kind, "seed": number, "environment": world.environment}
         rows.append(row | {"n": len(values), "value": values.mean(), "se": error(values)})

@@ -24,6 +24,7 @@ from conevo.runs.lab import Lab
 from conevo.runs.run import start
 from conevo.specialization import degree
 from conevo.specialization.team import METRICS, Activity, measure
+from conevo.worlds.measures import measures_of
 from conevo.worlds.rollout import Rollout
 from runs.tiny import evolve_tiny, tiny_settings
 
@@ -113,7 +114,8 @@ def test_lesioned_teams_play_the_same_fresh_scenarios(task, runs, found) -> None
     if task.startswith("pursuit"):
         castes -= {"non-specialized"}
     rows = values(found[task]["scores"], "lesion")
-    expected = {(team, name) for team in ("whole", *castes) for name in lab.world.performance}
+    measures = [one.name for one in measures_of(lab.world)]
+    expected = {(team, name) for team in ("whole", *castes) for name in measures}
     assert set(rows) == expected
     for team in ("whole", *castes):
         stands_in = replacement(lab.world, team)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from conevo.rng import fold, stream
+from conevo.worlds.measures import measures_of
 from conevo.worlds.registry import WORLDS, resolve, world
 from conevo.worlds.rollout import Rollout
 
@@ -59,7 +60,7 @@ def test_a_world_is_what_its_entry_says(path, some_world):
     entry, environment = resolve(path)
     assert (some_world.name, some_world.environment) == (entry.name, environment)
     assert some_world.params == entry.params_class(iterations=ITERATIONS)
-    for names in (some_world.actions, some_world.performance, some_world.heuristics):
+    for names in (some_world.actions, measures_of(some_world), some_world.heuristics):
         assert isinstance(names, tuple)
         assert len(set(names)) == len(names) > 0
     assert len(some_world.castes) >= len(some_world.actions)
@@ -73,7 +74,7 @@ def test_outcome_has_the_shapes_and_ranges_it_promises(some_world):
     assert out.fitness.shape == (3, 2, r)
     assert out.counts.shape == (3, 2, r, c)
     assert out.switches.shape == (3, 2, r)
-    assert set(out.performance) == set(some_world.performance)
+    assert list(out.performance) == [one.name for one in measures_of(some_world)]
     assert all(values.shape == (3, 2) for values in out.performance.values())
     assert np.isfinite(out.fitness).all()
     executed = out.counts.sum(axis=-1)
@@ -119,13 +120,13 @@ def test_record_equals_evaluate_bit_for_bit(some_world):
         n_inputs = some_world.controller.n_inputs
         assert seen["inputs"].shape == (ITERATIONS, some_world.n_robots, n_inputs)
         assert seen["fitness"][-1].tobytes() == out.fitness[n, 0].tobytes()
-        ended = np.array([out.performance[name][n, 0] for name in some_world.performance])
+        ended = np.array([out.performance[one.name][n, 0] for one in measures_of(some_world)])
         assert seen["performance"][-1].tobytes() == ended.tobytes()
         shorter = replace(some_world.params, iterations=10)
         early = Rollout(replace(some_world, params=shorter)).evaluate(
             genes, teams[n : n + 1], scenarios, heuristic[n : n + 1]
         )
-        ended = np.array([early.performance[name][0, 0] for name in some_world.performance])
+        ended = np.array([early.performance[one.name][0, 0] for one in measures_of(some_world)])
         assert seen["performance"][9].tobytes() == ended.tobytes()
         for name in some_world.simulation().recorded_at_end:
             size = some_world.simulation().sizes.get(name, some_world.n_robots)

@@ -350,7 +350,7 @@ def performance(w: World) -> dict[str, float]:
     return {
         "delivered": float(delivered),
         "completed": float(sum(one.is_complete for one in w.complexes)),
-        "optimum": 100.0 * delivered / len(w.objects),
+        "delivered_share": 100.0 * delivered / len(w.objects),
     }
 
 

@@ -13,10 +13,10 @@ from conevo.replay.channel import Channel
 from conevo.replay.stage import (
     Backdrop,
     BodyKind,
+    Curve,
     Event,
     Gauge,
     Kind,
-    Measure,
     PlanRow,
     Ring,
     Robot,
@@ -124,7 +124,7 @@ def made_up(title: str = "Made-up team", shift: float = 0.0, **changes: Any) -> 
             PlanRow("second", False, (1, 1, 0), (T, T, T)),
         ),
         gauges=(Gauge("demand for A", Channel.of(np.linspace(0, 2, T)), 2.0, palette.BLUE),),
-        measures=(Measure("value", Channel.of(np.linspace(0, 12.5, T))),),
+        measures=(Curve("value", Channel.of(np.linspace(0, 12.5, T))),),
     )
     return replace(stage, **changes)
 
@@ -231,7 +231,7 @@ def crowd(robots: int = 30, rocks: int = 2000, iterations: int = 2500) -> Stage:
         events=tuple(events),
         plan=(),
         gauges=(),
-        measures=(Measure("value", Channel.of(np.linspace(0, 5000, iterations))),),
+        measures=(Curve("value", Channel.of(np.linspace(0, 5000, iterations))),),
     )
 
 

@@ -73,7 +73,7 @@ def test_two_robots_and_a_type_a():
     assert play.place(5) == pytest.approx((0.5 + 0.06 * (0.05 - 0.5), 0.5))
     assert play.part() == 0
     assert play.fitness == [1, 1]
-    assert play.performance == {"delivered": 1, "completed": 0, "optimum": 10}
+    assert play.performance == {"delivered": 1, "completed": 0, "delivered_share": 10}
     # Construction is from the arrival on (3 iterations), or from the grip at home.
     assert play.counts[0].tolist() == [0, 0, 0, 1, 3, 0, 0, 3, 0, 0]
     assert play.counts[1].tolist() == [0, 0, 5, 1, 0, 0, 0, 1, 0, 0]
@@ -216,7 +216,7 @@ def test_the_last_part_and_demand_on_the_way_to_it():
     # Two parts begin to broadcast; the next part is an A, of so many that are left.
     assert demand[:, 0] == pytest.approx([0] + [1 / left for left in range(8, 0, -1)] + [0] * 3)
     assert not demand[:, 1:].any()
-    assert play.performance == {"delivered": 10, "completed": 1, "optimum": 100}
+    assert play.performance == {"delivered": 10, "completed": 1, "delivered_share": 100}
     assert play.fitness == [10, 10]
     # The stop signal lasts; inputs show the demand one iteration later.
     assert play.seen["inputs"][1:, 0, 24:27] == pytest.approx(demand[:-1])

@@ -18,6 +18,7 @@ from conevo.replay.trajectory import FORMAT, About, Trajectory
 from conevo.rng import fold
 from conevo.runs.evaluation import describe
 from conevo.runs.run import Run
+from conevo.worlds.measures import measures_of
 from conevo.worlds.protocol import World
 from conevo.worlds.rollout import Rollout
 
@@ -125,8 +126,8 @@ def record_epoch(
         if not np.isfinite(values).all():
             raise UsageError(f"the world's {name} is not finite here: the epoch cannot be kept")
     channels = {name: Channel.of(values) for name, values in seen.items()}
-    for k, name in enumerate(world.performance):
-        channels[f"performance/{name}"] = Channel.of(measured[:, k])
+    for k, one in enumerate(measures_of(world)):
+        channels[f"performance/{one.name}"] = Channel.of(measured[:, k])
     channels["sensors"] = Channel.of(inputs[:, :, : spec.n_sensors])
     hidden = hidden_activations(spec, genes, team, inputs) * has_network[:, None]
     channels["hidden"] = Channel.of(hidden, bits=8)

@@ -21,7 +21,7 @@ __all__ = [
     "Event",
     "Gauge",
     "Kind",
-    "Measure",
+    "Curve",
     "Pool",
     "PlanRow",
     "Ring",
@@ -177,7 +177,7 @@ class Gauge:
 
 
 @dataclass(frozen=True)
-class Measure:
+class Curve:
     """A curve over the timeline: [T], the last value is what the epoch ended with."""
 
     name: str
@@ -224,7 +224,7 @@ class Stage:
     event_kinds: tuple[Kind, ...] = ()
     plan: tuple[PlanRow, ...] = ()
     gauges: tuple[Gauge, ...] = ()
-    measures: tuple[Measure, ...] = ()
+    measures: tuple[Curve, ...] = ()
 
 
 class Pool:

@@ -91,7 +91,8 @@ class RunSettings:
         credit: "robot" gives each robot its own fitness as the world reports it (eq. 5.4, 6.8);
             "team" gives every robot the sum over the team (eq. 5.5).
         budget_evaluations: the run never spends more team evaluations than this; 0 is no limit.
-        target: the run ends when the fittest team's main task performance reaches this.
+        target: the run ends when the fittest team's main task performance is as good as this: at
+            least, or, of a measure of which smaller is better, at most.
         checkpoint_every: generations between two checkpoints.
         n_tests: fresh scenarios of the testing phase (5.4: 20).
     """

@@ -13,6 +13,7 @@ from conevo.errors import UsageError
 from conevo.evolution.protocol import Method, Scores, State
 from conevo.runs.config import RunSettings
 from conevo.runs.evaluation import Evaluate, Portrait, describe
+from conevo.worlds.measures import Measure
 
 __all__ = ["check_budget", "evolve_generations", "price"]
 
@@ -25,6 +26,7 @@ def evolve_generations(
     evaluate: Evaluate,
     *,
     settings: RunSettings,
+    main: Measure,
     castes: tuple[str, ...],
     iterations: int,
     last: Record | None = None,
@@ -37,6 +39,7 @@ def evolve_generations(
         state: the method's state at the beginning of a generation.
         evaluate: plays trials.
         settings: the stop conditions.
+        main: the world's main measure of task performance.
         castes: names of the world's castes.
         iterations: of one epoch of the world.
         last: record of the generation before, if there was one.
@@ -46,7 +49,7 @@ def evolve_generations(
         "generations", "target" or "budget".
     """
     while True:
-        if last is not None and _has_reached(settings.target, last["performance"]):
+        if last is not None and _has_reached(settings.target, main, last["performance"]):
             return "target"
         if state.generation >= settings.generations:
             return "generations"
@@ -146,7 +149,9 @@ def _finite(value: Any) -> float | None:
     return float(value) if math.isfinite(value) else None
 
 
-def _has_reached(target: float | None, performance: Mapping[str, float | None]) -> bool:
-    """Whether the first performance measure is at least the target."""
-    value = next(iter(performance.values()), None)
-    return target is not None and value is not None and value >= target
+def _has_reached(
+    target: float | None, main: Measure, performance: Mapping[str, float | None]
+) -> bool:
+    """Whether the main measure is as good as the target."""
+    value = performance.get(main.name)
+    return target is not None and value is not None and main.reaches(value, target)

@@ -17,6 +17,7 @@ from conevo.runs.lab import Lab
 from conevo.runs.loop import evolve_generations
 from conevo.runs.store import Store, create
 from conevo.runs.testing import test_team
+from conevo.worlds.measures import measures_of
 
 __all__ = ["RUNS", "Run", "evolve", "start"]
 
@@ -196,6 +197,7 @@ class Run:
             self._store.load_origin(self.config.method) or lab.first_state(),
             lab.evaluate,
             settings=replace(self.config.run, generations=generation + 1, target=None),
+            main=measures_of(lab.world)[0],
             castes=lab.world.castes,
             iterations=lab.world.params.iterations,
             on_generation=keep,
@@ -365,6 +367,7 @@ class Run:
                 state,
                 lab.evaluate,
                 settings=settings,
+                main=measures_of(lab.world)[0],
                 castes=lab.world.castes,
                 iterations=lab.world.params.iterations,
                 last=records[-1] if records else None,

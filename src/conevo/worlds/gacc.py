@@ -12,7 +12,7 @@ sensors        8 for objects and obstacles, 8 for robots, 8 for the home area, o
 actions        detect A, B, C; move; grip A, B, C
 controller     37-10-8 simple recurrent network (27 sensors, 10 context units) with bias
 performance    ``delivered``, objects delivered in correct order; ``completed``, complex
-               objects; ``optimum``, percent of all objects that are delivered
+               objects; ``delivered_share``, percent of all objects that are delivered
 =============  =========================================================================
 
 **Task.** Objects of type A, B and C lie about and are to be built into complex objects of ten parts
@@ -97,6 +97,7 @@ from conevo.worlds.gacc_dynamics import FUNCTIONS
 from conevo.worlds.gacc_plans import TYPES, Plan, plan
 from conevo.worlds.gacc_senses import N_SENSORS
 from conevo.worlds.gacc_state import Params, Scene, Team
+from conevo.worlds.measures import Measure
 from conevo.worlds.places import draw_places
 from conevo.worlds.protocol import Scenarios, Simulation
 
@@ -220,7 +221,11 @@ class GaccWorld:
         *(f"{kind}-gatherer" for kind in TYPES),
         *(f"{kind}-constructor" for kind in TYPES),
     )
-    performance: ClassVar[tuple[str, ...]] = ("delivered", "completed", "optimum")
+    performance: ClassVar[tuple[Measure, ...]] = (
+        Measure("delivered", "objects"),
+        Measure("completed", "complex objects"),
+        Measure("delivered_share", "%"),
+    )
     heuristics: ClassVar[tuple[str, ...]] = (
         *(f"{kind}-detector" for kind in TYPES),
         *(f"{kind}-gatherer" for kind in TYPES),

@@ -130,7 +130,7 @@ class Team:
     built: wp.array[int]  # [C] parts of each complex object
     missing: wp.array[int]  # [C, 3] parts of each type that it lacks
     demand: wp.array[float]  # [3]
-    performance: wp.array[float]  # delivered, completed, optimum
+    performance: wp.array[float]  # delivered, completed, delivered_share
 
 
 # --- places ---------------------------------------------------------------------------------------

@@ -37,6 +37,7 @@ from annotated_types import Ge, Le
 from conevo.controllers import ControllerSpec
 from conevo.errors import UsageError
 from conevo.worlds.arena import ArenaParams, ArenaScenarios, draw_scenarios, simulate
+from conevo.worlds.measures import Measure
 from conevo.worlds.protocol import Simulation
 from conevo.worlds.pursuit_dynamics import ACTIONS, PREY_FUNCTIONS
 
@@ -75,7 +76,10 @@ class PreyWorld:
     name: ClassVar[str] = "prey-v1"
     actions: ClassVar[tuple[str, ...]] = ACTIONS
     castes: ClassVar[tuple[str, ...]] = actions
-    performance: ClassVar[tuple[str, ...]] = ("path", "collided")
+    performance: ClassVar[tuple[Measure, ...]] = (
+        Measure("path", "cm"),
+        Measure("collided", "share of the prey", larger_is_better=False),
+    )
     heuristics: ClassVar[tuple[str, ...]] = ("heuristic", "random")
 
     @property

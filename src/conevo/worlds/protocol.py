@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from conevo.controllers import ControllerSpec
+from conevo.worlds.measures import Measure
 
 __all__ = ["Outcome", "Scenarios", "Simulation", "World"]
 
@@ -79,18 +80,22 @@ class World(Protocol):
             of its life on it. Most worlds count actions, so castes are actions; a world that tells
             apart what for an action was executed has more. Every executed action counts in exactly
             one column.
-        performance: names of the task performance measures, the main one first.
+        performance: the task performance measures, the main one first. A measure is a ``Measure``,
+            with its unit and whether larger is better, or just a name: then larger is better.
         heuristics: names of the heuristic controllers, at least one.
 
     A world may have a property ``optimum``: the largest possible value of its main task performance
-    measure, of which reports then give the share.
+    measure, of which reports then give the share. It has none if smaller is better.
     """
 
     name: ClassVar[str]
     actions: ClassVar[tuple[str, ...]]
     castes: ClassVar[tuple[str, ...]]
-    performance: ClassVar[tuple[str, ...]]
     heuristics: ClassVar[tuple[str, ...]]
+
+    @property
+    def performance(self) -> tuple[str | Measure, ...]:
+        """Task performance measures, the main one first."""
 
     @property
     def environment(self) -> str:

@@ -50,6 +50,7 @@ from conevo.controllers import ControllerSpec
 from conevo.errors import UsageError, unknown_name
 from conevo.worlds import prey_sets
 from conevo.worlds.arena import ArenaParams, ArenaScenarios, draw_scenarios, simulate
+from conevo.worlds.measures import Measure
 from conevo.worlds.protocol import Simulation
 from conevo.worlds.pursuit_dynamics import ACTIONS, PURSUIT_FUNCTIONS
 
@@ -116,11 +117,11 @@ class PursuitWorld:
     name: ClassVar[str] = "pursuit-v1"
     actions: ClassVar[tuple[str, ...]] = ACTIONS
     castes: ClassVar[tuple[str, ...]] = actions
-    performance: ClassVar[tuple[str, ...]] = (
-        "capture_time",
-        "first_capture",
-        "captures",
-        "collisions",
+    performance: ClassVar[tuple[Measure, ...]] = (
+        Measure("capture_time", "iterations"),
+        Measure("first_capture", "iteration", larger_is_better=False),
+        Measure("captures", "captures"),
+        Measure("collisions", "refused moves", larger_is_better=False),
     )
     heuristics: ClassVar[tuple[str, ...]] = ("heuristic",)
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from conevo.errors import UsageError, unknown_name
+from conevo.worlds.measures import measures_of
 
 if TYPE_CHECKING:
     from conevo.worlds.protocol import World
@@ -62,6 +63,7 @@ class WorldEntry:
         make: Callable[[str, Any], World] = getattr(import_module(self.module), self.world_name)
         built = make(environment, params)
         _ = built.controller  # refuses fewer slots than neurons
+        _ = measures_of(built)  # refuses what are no measures
         return built
 
 

@@ -16,6 +16,7 @@ from conevo.errors import EnvironmentFailure
 from conevo.kernels import engine
 from conevo.kernels.engine import barrier
 from conevo.kernels.network import WIDE, Shape, load, out_vector, think, wide_vector
+from conevo.worlds.measures import measures_of
 from conevo.worlds.protocol import Outcome, Scenarios, Simulation, World
 
 __all__ = ["Rollout", "episode_kernel"]
@@ -221,7 +222,7 @@ class Rollout:
             switches=joined["switches"].reshape(n_teams, e, r),
             performance={
                 name: joined["performance"].reshape(n_teams, e, -1)[:, :, k]
-                for k, name in enumerate(self.world.performance)
+                for k, name in enumerate(one.name for one in measures_of(self.world))
             },
         )
 

@@ -49,6 +49,7 @@ from conevo.controllers import ControllerSpec
 from conevo.kernels.geometry import COVER_WORDS
 from conevo.rng import stream
 from conevo.worlds import canals, rocks
+from conevo.worlds.measures import Measure
 from conevo.worlds.places import draw_places
 from conevo.worlds.protocol import Scenarios, Simulation
 from conevo.worlds.rover_dynamics import FUNCTIONS, ROCK_CELLS, Params, Scene, Team
@@ -147,7 +148,10 @@ class RoverWorld:
     name: ClassVar[str] = "rover-v1"
     actions: ClassVar[tuple[str, ...]] = ("low", "med", "hi", "move")
     castes: ClassVar[tuple[str, ...]] = actions
-    performance: ClassVar[tuple[str, ...]] = ("value", "area")
+    performance: ClassVar[tuple[Measure, ...]] = (
+        Measure("value", "points"),
+        Measure("area", "share of the square"),
+    )
     heuristics: ClassVar[tuple[str, ...]] = ("low", "med", "hi", "non-specialized")
 
     @property

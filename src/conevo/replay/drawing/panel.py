@@ -15,7 +15,7 @@ from conevo.palette import FAINT, GROUND, INK, shade
 from conevo.replay.drawing.planes import Colours, Mask, Planes, even
 from conevo.replay.drawing.scene import Scene
 from conevo.replay.drawing.strip import Strip
-from conevo.replay.stage import Kind, Measure, PlanRow, Stage
+from conevo.replay.stage import Curve, Kind, PlanRow, Stage
 
 __all__ = ["PAGE", "Panel"]
 
@@ -264,7 +264,7 @@ class Panel:
         return even(1.4 * self._points[letters])
 
 
-def _reading(measure: Measure) -> Text:
+def _reading(measure: Curve) -> Text:
     """Return a measure in frame t as text."""
     is_whole = float(measure.values.step).is_integer()
     return _at(measure.values.values, 0 if is_whole else 3)

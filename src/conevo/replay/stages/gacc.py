@@ -10,9 +10,9 @@ from conevo.replay.channel import Channel
 from conevo.replay.stage import (
     Backdrop,
     BodyKind,
+    Curve,
     Gauge,
     Kind,
-    Measure,
     PlanRow,
     Ring,
     SensorGroup,
@@ -79,7 +79,7 @@ def stage(parts: Parts) -> Stage:
         event_kinds=EVENT_KINDS,
         plan=_plan(parts, building),
         gauges=_demand(parts),
-        measures=(Measure("objects delivered", Channel.of(building.delivered)),),
+        measures=(Curve("objects delivered", Channel.of(building.delivered)),),
     )
 
 

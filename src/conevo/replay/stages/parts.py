@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from conevo.palette import FAINT
 from conevo.replay.channel import Channel
-from conevo.replay.stage import Kind, Measure, Robot, SensorGroup
+from conevo.replay.stage import Curve, Kind, Robot, SensorGroup
 from conevo.replay.stages.words import facts, subtitle, title
 from conevo.replay.trajectory import Trajectory
 from conevo.specialization.individual import NON_SPECIALIZED
@@ -108,9 +108,9 @@ class Parts:
             raise ValueError(f"world.{name} is {value}")
         return float(value)
 
-    def measures(self, *names: str) -> tuple[Measure, ...]:
+    def measures(self, *names: str) -> tuple[Curve, ...]:
         """Return every task performance measure as if the epoch ended in each iteration."""
-        return tuple(Measure(n, self.channel(f"performance/{n}", self.t)) for n in names)
+        return tuple(Curve(n, self.channel(f"performance/{n}", self.t)) for n in names)
 
 
 def _fits(actual: Sequence[int], shape: Sequence[int]) -> bool:

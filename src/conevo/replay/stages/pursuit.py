@@ -13,9 +13,9 @@ from conevo.replay.channel import Channel
 from conevo.replay.stage import (
     Backdrop,
     BodyKind,
+    Curve,
     Event,
     Kind,
-    Measure,
     Ring,
     SensorGroup,
     Stage,
@@ -120,14 +120,14 @@ def _halos(captured: Channel, x: Channel, y: Channel, r: int) -> Things:
     )
 
 
-def _capture_time(captured: Channel) -> Measure:
+def _capture_time(captured: Channel) -> Curve:
     held = captured.values.any(axis=1)
-    return Measure("capture time (iterations)", Channel.of(held.cumsum()))
+    return Curve("capture time (iterations)", Channel.of(held.cumsum()))
 
 
-def _path(parts: Parts) -> Measure:
+def _path(parts: Parts) -> Curve:
     fitness = parts.floats("fitness", parts.t, parts.r)
-    return Measure("path (cm, mean of the prey)", Channel.of(fitness.mean(axis=1)))
+    return Curve("path (cm, mean of the prey)", Channel.of(fitness.mean(axis=1)))
 
 
 # --- events ---------------------------------------------------------------------------------------

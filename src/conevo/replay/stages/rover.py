@@ -9,7 +9,7 @@ import numpy as np
 from conevo import palette
 from conevo.palette import INK
 from conevo.replay.channel import Channel
-from conevo.replay.stage import Backdrop, BodyKind, Event, Kind, Measure, Ring, Stage, Things
+from conevo.replay.stage import Backdrop, BodyKind, Curve, Event, Kind, Ring, Stage, Things
 from conevo.replay.stages.parts import Parts, begun, octants
 from conevo.replay.stages.words import enumerated
 from conevo.worlds import rocks
@@ -82,17 +82,17 @@ def _rocks(parts: Parts) -> Things:
     )
 
 
-def _area(parts: Parts) -> Measure:
-    return Measure("share of area covered", parts.channel("performance/area", parts.t))
+def _area(parts: Parts) -> Curve:
+    return Curve("share of area covered", parts.channel("performance/area", parts.t))
 
 
-def _value(parts: Parts) -> Measure:
+def _value(parts: Parts) -> Curve:
     """Return the value that the lander has recorded: an iteration after each detection."""
     gone = parts.whole("detected", -1)
     value = parts.whole("scene/rock_value", len(gone))
     seen = gone < parts.t
     gains = np.bincount(gone[seen] + 1, value[seen], minlength=parts.t)[: parts.t]
-    return Measure("value recorded by the lander", Channel.of(gains.cumsum().astype(np.int64)))
+    return Curve("value recorded by the lander", Channel.of(gains.cumsum().astype(np.int64)))
 
 
 def _detections(parts: Parts) -> tuple[Event, ...]:

@@ -1,0 +1,108 @@
+"""Measures of task performance: what a world reports, in which unit, and whether more is better."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+from conevo.errors import UsageError
+
+if TYPE_CHECKING:
+    from conevo.worlds.protocol import World
+
+__all__ = ["Measure", "measures_of"]
+
+
+@dataclass(frozen=True)
+class Measure:
+    """A measure of task performance, as a world declares it.
+
+    Fitness, on which methods select, is not one: of fitness more is always better.
+
+    Attributes:
+        name: as in records and tables, "first_capture".
+        unit: of its values, "iterations"; empty if it has none.
+        larger_is_better: False of what a team is to keep small, as a distance, a time or a count of
+            mishaps.
+
+    Raises:
+        UsageError: a name or unit that is not text, a direction that is not True or False.
+    """
+
+    name: str
+    unit: str = ""
+    larger_is_better: bool = True
+
+    def __post_init__(self) -> None:
+        given: dict[str, Any] = asdict(self)  # of a world file: anything
+        if not isinstance(given["name"], str) or not self.name:
+            raise UsageError(f"a measure's name must be text, not {self.name!r}")
+        kinds = (("unit", str, "text"), ("larger_is_better", bool, "True or False"))
+        for what, kind, must in kinds:
+            if not isinstance(given[what], kind):
+                raise UsageError(
+                    f"measure {self.name!r}: its {what} must be {must}, not {given[what]!r}"
+                )
+
+    @property
+    def title(self) -> str:
+        """The name in words, "first capture"."""
+        return self.name.replace("_", " ")
+
+    @property
+    def direction(self) -> str:
+        """Return "larger is better" or "smaller is better"."""
+        return f"{'larger' if self.larger_is_better else 'smaller'} is better"
+
+    @property
+    def about(self) -> str:
+        """Unit and direction, "iterations, smaller is better"."""
+        return f"{self.unit}, {self.direction}" if self.unit else self.direction
+
+    @property
+    def heading(self) -> str:
+        """Title, unit and direction, "first capture (iterations, smaller is better)"."""
+        return f"{self.title} ({self.about})"
+
+    @property
+    def axis(self) -> str:
+        """Title and unit, "first capture (iterations)"."""
+        return f"{self.title} ({self.unit})" if self.unit else self.title
+
+    def best(self, values: Iterable[float]) -> float:
+        """Return the best of some values."""
+        return max(values) if self.larger_is_better else min(values)
+
+    def is_better(self, value: float, than: float) -> bool:
+        """Whether a value is better than another."""
+        return value > than if self.larger_is_better else value < than
+
+    def reaches(self, value: float, target: float) -> bool:
+        """Whether a value is as good as a target."""
+        return value >= target if self.larger_is_better else value <= target
+
+    def record(self) -> dict[str, Any]:
+        """Return it as plain data."""
+        return asdict(self)
+
+
+def measures_of(world: World) -> tuple[Measure, ...]:
+    """Return the measures of a world, the main one first.
+
+    Of a measure that the world only names, larger is better, and it has no unit.
+
+    Raises:
+        UsageError: it declares something else, or two of one name.
+    """
+    declared: Any = world.performance
+    if not (isinstance(declared, tuple) and declared):
+        raise UsageError(
+            f"world {world.name}: performance must be a tuple of measures, as in ('nearness',), "
+            f"not {declared!r}"
+        )
+    measures = tuple(one if isinstance(one, Measure) else Measure(one) for one in declared)
+    names = [one.name for one in measures]
+    if twice := next((name for name in names if names.count(name) > 1), ""):
+        raise UsageError(f"world {world.name}: performance has two measures named {twice!r}")
+    return measures
