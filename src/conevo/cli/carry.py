@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from conevo.runs.run import Run
     from conevo.runs.shaping import Shaping
 
-__all__ = ["carry_on", "output_options", "style_of"]
+__all__ = ["accept_option", "carry_on", "output_options", "style_of"]
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -30,6 +30,15 @@ def output_options(function: Function) -> Function:
     return function
 
 
+def accept_option(function: Function) -> Function:
+    """Add --accept-other-code to a command that continues something."""
+    return click.option(
+        "--accept-other-code",
+        is_flag=True,
+        help="Continue what another version of conevo began; it is recorded and shown.",
+    )(function)
+
+
 def style_of(as_json: bool, quiet: bool, verbose: bool) -> str:
     """Return how to report: "json", "quiet", "verbose", "live" (a terminal) or "plain"."""
     if as_json + quiet + verbose > 1:
@@ -39,7 +48,9 @@ def style_of(as_json: bool, quiet: bool, verbose: bool) -> str:
     return "live" if sys.stdout.isatty() else "plain"
 
 
-def carry_on(found: Run | Shaping, threads: int | None, style: str) -> None:
+def carry_on(
+    found: Run | Shaping, threads: int | None, style: str, accept_other_code: bool = False
+) -> None:
     """Carry a run or a shaping on to its end, then print a summary and what can be done next."""
     from conevo.cli.progress import watching
     from conevo.cli.stages import print_shaping_end
@@ -54,15 +65,22 @@ def carry_on(found: Run | Shaping, threads: int | None, style: str) -> None:
         if not isinstance(found, Run):
             of, before = len(found.configs), len(found.generations()) - len(run.generations())
         with watching(run, style, stage, of, before) as watch:
-            run.resume(threads=threads, watch=watch, remark=remark)
+            run.resume(
+                threads=threads,
+                watch=watch,
+                remark=remark,
+                accept_other_code=accept_other_code,
+            )
 
     found.refuse_finished()
+    if not accept_other_code:
+        found.refuse_other_code()
     advice = f"conevo resume {found.path}"
     try:
         if isinstance(found, Run):
             carry(found)
         else:
-            found.carry_on(carry, threads)
+            found.carry_on(carry, threads, accept_other_code)
     except KeyboardInterrupt:
         runs = [found] if isinstance(found, Run) else found.stages
         count = sum(len(run.generations()) for run in runs)

@@ -9,6 +9,7 @@ import click
 
 from conevo.cli.summary import generations_table, spaced, title
 from conevo.cli.text import castes, count, duration, number, table
+from conevo.runs.code import changes_text
 from conevo.runs.run import Run
 from conevo.runs.shaping import Shaping
 
@@ -55,6 +56,7 @@ def shaping_text(shaping: Shaping, n_rows: int = 0) -> str:
         f"{shaping.path}: {state}",
         f"{len(stages)} of {len(shaping.configs)} stages begun, {len(records)} generations, "
         f"{duration(seconds)}",
+        *changes_text(shaping.sessions),
     ]
     if stages:
         parts += ["", _table(stages)]

@@ -10,6 +10,7 @@ import click
 
 from conevo.cli.text import castes, count, duration, neurons, number, table
 from conevo.evolution.methods.registry import METHODS
+from conevo.runs.code import changes_text, sessions_of
 from conevo.runs.config import RunConfig, resolve
 from conevo.runs.run import Run
 
@@ -46,7 +47,7 @@ def print_end(run: Run, style: str) -> None:
 def run_text(run: Run, n_rows: int) -> str:
     """Return a finished or unfinished run as text."""
     records = run.generations()
-    parts = [title(run.config), _state(run)]
+    parts = [title(run.config), _state(run), *changes_text(sessions_of(run.provenance))]
     if records:
         parts += ["", generations_table(spaced(records, n_rows))]
     if run.test_result:

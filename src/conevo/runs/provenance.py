@@ -1,35 +1,61 @@
-"""What a result was made with: versions, kernels, machine."""
+"""What a result was made with: versions, code, kernels, machine, and the world's header.
+
+``provenance.json`` of a run holds, besides where it came from::
+
+    conevo, python, numpy, warp, platform, cpu, device, code, kernel_hash     when it was started
+    world       its header: all that is needed to look at the run without loading the world
+    sessions    one for each time it was carried on: started, from_generation, threads, and the
+                same versions, machine and code as above
+    finished, stopped_by    when it is
+
+``code`` is the digest of the code that decides results (``runs.code``).
+"""
 
 from __future__ import annotations
 
 import platform
 import sys
 from datetime import UTC, datetime
-from importlib import metadata
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-__all__ = ["now", "describe_machine", "version"]
+from conevo.runs.code import code_digest, version
+from conevo.worlds.measures import measures_of
+
+if TYPE_CHECKING:
+    from conevo.worlds.protocol import World
+
+__all__ = ["describe_machine", "describe_world", "now"]
 
 
-def describe_machine() -> dict[str, Any]:
+def describe_machine(device: str) -> dict[str, Any]:
     """Return versions of everything that can change a result, and the machine's description."""
     return {
         "conevo": version("conevo"),
+        "code": code_digest(),
         "python": platform.python_version(),
         "numpy": version("numpy"),
         "warp": version("warp-lang"),
         "platform": platform.platform(),
         "cpu": _cpu(),
+        "device": device,
     }
 
 
-def version(package: str) -> str:
-    """Return the installed version of a package, "source" where it runs without being installed."""
-    try:
-        return metadata.version(package)
-    except metadata.PackageNotFoundError:
-        return "source"
+def describe_world(world: World) -> dict[str, Any]:
+    """Return a world's header: its names, its measures, the main one first, and its size.
+
+    ``optimum`` is the largest possible value of the main measure, None where none is known.
+    """
+    return {
+        "name": world.name,
+        "environment": world.environment,
+        "measures": [measure.record() for measure in measures_of(world)],
+        "castes": list(world.castes),
+        "n_robots": world.n_robots,
+        "iterations": world.params.iterations,
+        "optimum": getattr(world, "optimum", None),
+    }
 
 
 def now() -> str:

@@ -11,6 +11,7 @@ from conevo.errors import UsageError
 from conevo.evolution.protocol import State
 from conevo.runs import provenance
 from conevo.runs.champions import Team, fittest_team, sampled_generations
+from conevo.runs.code import last_code, refuse_other_code
 from conevo.runs.config import RunConfig, resolve
 from conevo.runs.directory import refuse_existing
 from conevo.runs.lab import Lab
@@ -96,10 +97,10 @@ def start(
         "run_id": config.run_id,
         "preset": config.preset,
         "command": command,
-        "device": device,
         "kernel_hash": lab.rollout.kernel_hash,
         "created": provenance.now(),
-        **provenance.describe_machine(),
+        **provenance.describe_machine(device),
+        "world": provenance.describe_world(lab.world),
         **ancestry,
         "sessions": [],
     }
@@ -235,6 +236,7 @@ class Run:
         threads: int | None = None,
         watch: Watch | None = None,
         remark: Callable[[str], None] | None = None,
+        accept_other_code: bool = False,
     ) -> Run:
         """Carry the run on from its last checkpoint to its end: the same bits as without a break.
 
@@ -242,12 +244,16 @@ class Run:
             threads: CPU threads, all by default.
             watch: called with the run and the record of each finished generation.
             remark: told about a checkpoint that could not be used.
+            accept_other_code: go on although another conevo made the run so far; it is recorded.
 
         Raises:
-            UsageError: finished, in use, made with other kernels, or no usable checkpoint.
+            UsageError: finished, in use, made by other code or with other kernels, or no usable
+                checkpoint.
             EnvironmentFailure: the machine refused; the run can be resumed when it no longer does.
         """
         self.refuse_finished()
+        if not accept_other_code:
+            self.refuse_other_code()
         with self._store.locked():
             self.refuse_finished()
             lab = self._equip(threads)
@@ -316,6 +322,10 @@ class Run:
                 f"run with another --seed or --out"
             )
 
+    def refuse_other_code(self) -> None:
+        """Raise UsageError if another conevo made the run so far."""
+        refuse_other_code(self.path, last_code(self.provenance))
+
     def _equip(self, threads: int | None) -> Lab:
         """Return what the run needs, after checking that it is what it was started with."""
         lab, self._lab = self._lab, None
@@ -341,9 +351,14 @@ class Run:
         champion = self._best_so_far() if records else None
         kept = sampled_generations(settings.generations)
         newest = saved = state
-        session = {"started": provenance.now(), "from_generation": state.generation}
-        sessions = [*self.provenance["sessions"], session | {"threads": lab.rollout.n_threads}]
-        store.write_provenance(self.provenance | {"sessions": sessions})
+        about = self.provenance
+        session = {
+            "started": provenance.now(),
+            "from_generation": state.generation,
+            "threads": lab.rollout.n_threads,
+            **provenance.describe_machine(about["device"]),
+        }
+        store.write_provenance(about | {"sessions": [*about["sessions"], session]})
 
         def keep(state: State, record: Record) -> None:
             nonlocal champion, newest, saved

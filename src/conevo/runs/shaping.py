@@ -24,6 +24,7 @@ import tomli_w
 
 from conevo.errors import EnvironmentFailure, UsageError
 from conevo.evolution.protocol import State
+from conevo.runs.code import last_code, refuse_other_code, sessions_of
 from conevo.runs.config import RunConfig, resolve
 from conevo.runs.directory import CONFIG, SHAPING, Directory, appearing, refuse_existing
 from conevo.runs.durable import replace_file
@@ -168,6 +169,16 @@ class Shaping:
             ]
         return found
 
+    @property
+    def sessions(self) -> list[Mapping[str, Any]]:
+        """The sessions of all stages, each from a generation as it is numbered through them."""
+        found: list[Mapping[str, Any]] = []
+        before = 0
+        for run in self.stages:
+            found += sessions_of(run.provenance, before)
+            before += len(run.generations())
+        return found
+
     def place(self, stage: int) -> Record:
         """Return a stage's number and its task."""
         return {"stage": stage, "task": self.tasks[stage - 1]}
@@ -219,12 +230,18 @@ class Shaping:
         if self._directory.is_finished:
             raise UsageError(f"{self.path} is finished; see it with 'conevo show {self.path}'")
 
+    def refuse_other_code(self) -> None:
+        """Raise UsageError if another conevo made the stages so far."""
+        if begun := self.stages:
+            refuse_other_code(self.path, last_code(begun[-1].provenance))
+
     def resume(
         self,
         *,
         threads: int | None = None,
         watch: Watch | None = None,
         remark: Callable[[str], None] | None = None,
+        accept_other_code: bool = False,
     ) -> Shaping:
         """Carry the shaping on to the end of its last stage: the same bits as without a break.
 
@@ -232,23 +249,42 @@ class Shaping:
             threads: CPU threads, all by default.
             watch: called with the stage and the record of each finished generation.
             remark: told about a checkpoint that could not be used.
+            accept_other_code: go on although another conevo made it so far; it is recorded.
 
         Raises:
-            UsageError: finished, in use, or a stage cannot be resumed.
+            UsageError: finished, in use, made by other code, or a stage cannot be resumed.
             EnvironmentFailure: the machine refused; resume when it no longer does.
         """
-        return self.carry_on(
-            lambda run, _: run.resume(threads=threads, watch=watch, remark=remark), threads
-        )
 
-    def carry_on(self, carry: Callable[[Run, int], object], threads: int | None = None) -> Shaping:
+        def carry(run: Run, _: int) -> None:
+            run.resume(
+                threads=threads,
+                watch=watch,
+                remark=remark,
+                accept_other_code=accept_other_code,
+            )
+
+        return self.carry_on(carry, threads, accept_other_code)
+
+    def carry_on(
+        self,
+        carry: Callable[[Run, int], object],
+        threads: int | None = None,
+        accept_other_code: bool = False,
+    ) -> Shaping:
         """Begin one stage after the other; ``carry`` resumes each to its end.
 
         Args:
             carry: called with a stage that is not finished and its number, from 1.
             threads: CPU threads, all by default.
+            accept_other_code: begin a stage although another conevo made those before.
+
+        Raises:
+            UsageError: finished, in use, or made by other code.
         """
         self.refuse_finished()
+        if not accept_other_code:
+            self.refuse_other_code()
         with self._directory.locked():
             self.refuse_finished()
             for number in range(1, len(self.configs) + 1):

@@ -1,0 +1,161 @@
+"""The code that decides results, as one digest, and which code made which generations of a run."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import operator
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import conevo
+from conevo.errors import UsageError
+
+__all__ = [
+    "DECIDING",
+    "changes_text",
+    "code_digest",
+    "code_spans",
+    "current_code",
+    "last_code",
+    "refuse_other_code",
+    "sessions_of",
+    "version",
+]
+
+DECIDING = (
+    "rng.py",
+    "kernels",
+    "worlds",
+    "controllers",
+    "specialization",
+    "evolution",
+    "runs/champions.py",
+    "runs/evaluation.py",
+    "runs/lab.py",
+    "runs/loop.py",
+    "runs/testing.py",
+)
+"""Files and folders of the package. A world in a file of its own has a digest of its own."""
+
+MAKING = ("numpy", "warp", "device")  # what else makes results, and is shown if it changed
+Record = Mapping[str, Any]
+Span = tuple[str, int, int | None]  # of what, first generation, last (None: the newest)
+
+
+@functools.cache
+def code_digest() -> str:
+    """Return twelve hex digits that change with any text that decides results.
+
+    Choice: comments and docstrings count. A text is the same in every version of Python, installed
+    or not, which no parser's output is. A release that changes a comment only asks for a flag once;
+    a change that goes unnoticed costs a result.
+    """
+    package = Path(conevo.__file__).parent
+    found = hashlib.blake2b(digest_size=6)
+    for name in DECIDING:
+        path = package / name
+        for file in sorted(path.rglob("*.py")) if path.is_dir() else [path]:
+            text = file.read_bytes().replace(b"\r\n", b"\n")
+            found.update(f"{file.relative_to(package).as_posix()} {len(text)}\n".encode() + text)
+    return found.hexdigest()
+
+
+def version(package: str) -> str:
+    """Return the installed version of a package, "source" where it runs without being installed."""
+    from importlib import metadata  # takes longer to load than a run takes to be shown
+
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return "source"
+
+
+def current_code() -> str:
+    """Return this conevo's version with its code: "0.2.0 (1f0c9a5e77b2)"."""
+    return _named(version("conevo"), code_digest())
+
+
+def last_code(provenance: Record) -> str:
+    """Return the version with its code that carried a run on last."""
+    return _code_of([provenance, *provenance["sessions"]][-1])
+
+
+def sessions_of(provenance: Record, before: int = 0) -> list[Record]:
+    """Return the sessions of a run, each with what made it.
+
+    Args:
+        provenance: of the run; conevo 0.1.0 recorded versions there only.
+        before: generations of earlier stages, if it is a stage of a shaping.
+    """
+    shared = {name: provenance[name] for name in MAKING if name in provenance}
+    return [
+        shared | session | {"from_generation": before + session["from_generation"]}
+        for session in provenance["sessions"]
+    ]
+
+
+def refuse_other_code(path: Path, code: str) -> None:
+    """Raise UsageError unless ``code``, of the run or shaping at ``path``, is this conevo's."""
+    if code != current_code():
+        raise UsageError(
+            f"{path} was made by conevo {code}, and this is {current_code()}, which may give other "
+            f"results: use that version, or continue with 'conevo resume {path} "
+            f"--accept-other-code'"
+        )
+
+
+def code_spans(sessions: Sequence[Record]) -> list[Span]:
+    """Return which code made which generations, given the sessions that made them."""
+    return _spans(sessions, _code_of)
+
+
+def changes_text(sessions: Sequence[Record]) -> list[str]:
+    """Return a line for each thing that makes results and was another one in a later session.
+
+    For example "made by 2 versions: 0.1.0 (0f3e5a7712bc) generations 0-11, 0.2.0 (5d11c0ffee00)
+    from 12".
+    """
+    lines = []
+    codes = code_spans(sessions)
+    if len(codes) > 1:
+        lines.append(f"made by {len({one[0] for one in codes})} versions: {_text(codes)}")
+    for name in MAKING:
+        found = _spans(sessions, operator.itemgetter(name))
+        if len(found) > 1:
+            lines.append(f"made with more than one {name}: {_text(found)}")
+    return lines
+
+
+def _spans(sessions: Sequence[Record], thing: Callable[[Record], str]) -> list[Span]:
+    """Return of what which generations are, in their order.
+
+    A session begins at a checkpoint, and what was newer than that is made again: so a session's
+    generations end where the next one begins.
+    """
+    starts = [session["from_generation"] for session in sessions]
+    found: list[Span] = []
+    for session, start, end in zip(sessions, starts, [*starts[1:], None], strict=True):
+        one = thing(session)
+        if found and found[-1][0] == one:
+            start = found.pop()[1]
+        if end is None or end > start:
+            found.append((one, start, None if end is None else end - 1))
+    return found
+
+
+def _text(spans: Sequence[Span]) -> str:
+    return ", ".join(
+        f"{one} from {first}" if last is None else f"{one} generations {first}-{last}"
+        for one, first, last in spans
+    )
+
+
+def _code_of(session: Record) -> str:
+    """Return version and code of a session; conevo 0.1.0 recorded neither."""
+    return _named(session.get("conevo", "0.1.0"), session.get("code", "code not recorded"))
+
+
+def _named(version: str, code: str) -> str:
+    return f"{version} ({code})"
