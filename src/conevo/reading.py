@@ -307,7 +307,9 @@ _DECODER = json.JSONDecoder(
 # --- arrays ---------------------------------------------------------------------------------------
 
 
-def read_arrays(path: Path, limit: int = MOST_ARRAYS) -> dict[str, npt.NDArray[Any]]:
+def read_arrays(
+    path: Path, limit: int = MOST_ARRAYS, kind: str = "an npz file"
+) -> dict[str, npt.NDArray[Any]]:
     """Return the arrays of an npz file by name.
 
     Nothing is unpacked before the sizes that its headers state are known to be within the limit,
@@ -316,6 +318,7 @@ def read_arrays(path: Path, limit: int = MOST_ARRAYS) -> dict[str, npt.NDArray[A
     Args:
         path: the file.
         limit: bytes that it may have, packed and unpacked.
+        kind: what it should be, for messages.
 
     Raises:
         DamagedFile: it is damaged, not an npz file of numbers, not a regular file, or too large.
@@ -334,7 +337,7 @@ def read_arrays(path: Path, limit: int = MOST_ARRAYS) -> dict[str, npt.NDArray[A
             return found
     except Exception as error:  # whatever a damaged file makes its readers say
         reason = _one_line(error) or type(error).__name__
-        raise DamagedFile(f"{path} is damaged or not an npz file ({reason})") from error
+        raise DamagedFile(f"{path} is damaged or not {kind} ({reason})") from error
 
 
 def _refuse_members(members: list[zipfile.ZipInfo], limit: int) -> None:

@@ -218,7 +218,7 @@ BAD = [
     (["run", "rover/complex-2", "--prey", "random"], "rover-v1 has no prey to be chosen"),
     (["run", "prey/shaping-2", "--prey", "random"], "prey-v1 has no prey to be chosen"),
     (["run", "pursuit/team-2", "--prey", "randon"], "did you mean 'random'"),
-    (["run", "pursuit/team-2", "--prey", "none.npz"], "cannot read prey file 'none.npz'"),
+    (["run", "pursuit/team-2", "--prey", "none.npz"], "cannot read none.npz: No such file"),
     (["shape-prey", "pursuit/team-2"], "unexpected extra argument"),
     (["shape-prey", "--method", "coen"], "did you mean 'cone'"),
     (["shape-prey", "--set", "run.generatoins=3"], "did you mean 'run.generations'"),

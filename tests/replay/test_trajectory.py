@@ -156,7 +156,7 @@ def test_a_missing_file_is_the_machines_fault(tmp_path):
 
 def refused(path, data):
     path.write_bytes(data)
-    with pytest.raises(UsageError, match="damaged or no trajectory") as error:
+    with pytest.raises(UsageError, match="damaged or not a trajectory") as error:
         Trajectory.load(path)
     assert "\n" not in str(error.value)
     return str(error.value)
@@ -261,7 +261,7 @@ def test_a_header_cannot_ask_for_more_than_the_file_has(tmp_path):
 def test_a_small_file_cannot_unpack_to_a_huge_one(tmp_path, monkeypatch):
     monkeypatch.setattr("conevo.replay.trajectory.MOST_BYTES", 100_000)
     data = epoch("rover/complex-5").to_bytes()
-    assert "more than 100000 bytes" in refused(tmp_path / "bad.npz", data)
+    assert "more than 100,000" in refused(tmp_path / "bad.npz", data)
 
 
 def test_what_is_no_archive_is_refused(tmp_path):

@@ -114,17 +114,17 @@ def test_another_runs_or_methods_file_is_refused(saved: Path) -> None:
 def test_other_files_are_refused(saved: Path) -> None:
     with saved.open("wb") as file:
         np.savez(file, a=np.zeros(3))
-    with pytest.raises(UnusableFile, match="damaged or no file of conevo's"):
+    with pytest.raises(UnusableFile, match="damaged or not a file of conevo"):
         load(saved, Example, IDENTITY)
     saved.write_text("hello")
-    with pytest.raises(UnusableFile, match="damaged or no file of conevo's"):
+    with pytest.raises(UnusableFile, match="damaged or not a file of conevo"):
         load(saved, Example, IDENTITY)
 
 
 def test_pickles_are_not_opened(saved: Path) -> None:
     with saved.open("wb") as file:
         np.savez(file, about=np.array([{"x": 1}], dtype=object))
-    with pytest.raises(UnusableFile, match="damaged or no file of conevo's"):
+    with pytest.raises(UnusableFile, match="damaged or not a file of conevo"):
         load(saved, Example, IDENTITY)
 
 

@@ -369,9 +369,9 @@ def test_an_edited_or_damaged_plan_is_refused(tmp_path: Path) -> None:
     for old, new, words in (
         ("iterations = 12", "iterations = 13", "was changed after the shaping was started"),
         ("format = 1", "format = 9", "written by another version"),
-        ("format = 1", "format = ", "is damaged"),
+        ("format = 1", "format = ", "is not valid TOML"),
         ("run_ids", "run_idz", "is damaged"),
-        ("[[stages]]", "", "is damaged"),
+        ("[[stages]]", "", "is not valid TOML"),
     ):
         edit(file, old, new)
         with pytest.raises(UsageError, match=words) as caught:

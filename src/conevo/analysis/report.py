@@ -39,6 +39,7 @@ from conevo.analysis.sections.overview import Campaign, overview, read_campaign,
 from conevo.analysis.sections.performance import performance
 from conevo.analysis.sections.scope import Scope, scopes
 from conevo.errors import UsageError
+from conevo.reading import DamagedFile, read_bytes, read_json
 from conevo.runs.drafts import draft_of
 from conevo.runs.durable import writing
 
@@ -210,11 +211,11 @@ def _refuse_changed(out: Path) -> None:
     if not manifest.is_file():
         raise UsageError(f"{out} is no report, so it is not replaced; choose another --out")
     try:
-        written = json.loads(manifest.read_text(encoding="utf-8"))["files"]
-    except (ValueError, KeyError, TypeError) as error:
+        written = read_json(manifest)["files"]
+    except (DamagedFile, KeyError) as error:
         raise UsageError(f"{manifest} was changed; move the report away first") from error
     found = {
-        path.relative_to(out).as_posix(): _digest(path.read_bytes())
+        path.relative_to(out).as_posix(): _digest(read_bytes(path))
         for path in sorted(out.rglob("*"))
         if path.is_file() and path != manifest
     }

@@ -33,7 +33,8 @@ from conevo.campaigns.plan_file import read_plan
 from conevo.campaigns.tables import seal_tables
 from conevo.campaigns.work import planned_runs
 from conevo.errors import UsageError
-from conevo.runs.directory import Directory, appearing, read_json
+from conevo.reading import read_json
+from conevo.runs.directory import Directory, appearing
 from conevo.runs.durable import replace_file
 
 __all__ = ["ATTEMPTS", "CAMPAIGNS", "Campaign", "Stopped", "create"]

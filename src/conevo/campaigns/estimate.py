@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from statistics import fmean
 
 from conevo.campaigns.campaign import Campaign
 from conevo.campaigns.ledger import Entry
 from conevo.errors import ConevoError
+from conevo.reading import parse_json, read_bytes, whole_lines
 
 __all__ = ["remaining_seconds"]
 
@@ -73,11 +73,13 @@ def _share(campaign: Campaign, label: str) -> float:
         configs = planned.configs()
         for name, config in zip(planned.names, configs, strict=True):
             path = campaign.places.run(name) / "generations.jsonl"
-            lines = path.read_bytes().split(b"\n")[:-1] if path.is_file() else []
+            lines = whole_lines(read_bytes(path)) if path.is_file() else []
             if lines:
                 budget = config.run.budget_evaluations
-                spent = json.loads(lines[-1])["team_evaluations"] / budget if budget else 0.0
+                spent = (
+                    parse_json(lines[-1], str(path))["team_evaluations"] / budget if budget else 0.0
+                )
                 over += min(max(len(lines) / config.run.generations, spent), 1.0)
         return over / len(configs)
-    except (ConevoError, ValueError, KeyError):
+    except (ConevoError, KeyError, TypeError):
         return 0.0

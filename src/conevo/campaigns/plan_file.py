@@ -29,14 +29,14 @@ run with every seed::
 from __future__ import annotations
 
 import re
-import tomllib
 from collections.abc import Iterable, Mapping
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
 from conevo.campaigns.plan import Plan, Where
-from conevo.errors import EnvironmentFailure, UsageError, unknown_name
+from conevo.errors import UsageError, shown, unknown_name
+from conevo.reading import parse_toml, read_toml
 from conevo.runs.config import PRESETS
 
 __all__ = ["STUDIES", "preset_names", "read_plan", "read_preset"]
@@ -66,7 +66,8 @@ def read_preset(name: str) -> Plan:
     if name not in preset_names():
         raise unknown_name("campaign", name, preset_names())
     source = resources.files(__package__) / "presets" / f"{name}.toml"
-    return _parse(source.read_text(encoding="utf-8"), f"in campaign {name!r}", name)
+    place = f"campaign {name!r}"
+    return _parse(parse_toml(source.read_text(encoding="utf-8"), place), f"in {place}", name)
 
 
 def read_plan(path: Path) -> Plan:
@@ -76,20 +77,10 @@ def read_plan(path: Path) -> Plan:
         UsageError: it is no plan; the message names the key and what is allowed.
         EnvironmentFailure: it cannot be read.
     """
-    try:
-        text = path.read_text(encoding="utf-8")
-    except OSError as error:
-        raise EnvironmentFailure(f"cannot read {path}: {error.strerror}") from error
-    except UnicodeDecodeError as error:
-        raise UsageError(f"{path} is not valid TOML: {error}") from error
-    return _parse(text, f"in {path}", path.stem)
+    return _parse(read_toml(path), f"in {path}", path.stem)
 
 
-def _parse(text: str, place: str, name: str) -> Plan:
-    try:
-        tables = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise UsageError(f"{place.removeprefix('in ')} is not valid TOML: {error}") from error
+def _parse(tables: Mapping[str, Any], place: str, name: str) -> Plan:
     for key in tables:
         if key not in TABLES:
             raise unknown_name("section", key, TABLES, place)
@@ -134,26 +125,27 @@ def _name(value: Any, place: str) -> str:
     name = _text(value, "campaign.name", place)
     if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._-]*", name):
         raise UsageError(
-            f"campaign.name = {name!r} {place}: letters, digits and . _ - only, it names a folder"
+            f"campaign.name = {shown(name)} {place}: "
+            f"letters, digits and . _ - only, it names a folder"
         )
     return name
 
 
 def _text(value: Any, key: str, place: str) -> str:
     if not isinstance(value, str):
-        raise UsageError(f"{key} = {value!r} {place}: must be text")
+        raise UsageError(f"{key} = {shown(value)} {place}: must be text")
     return value
 
 
 def _truth(value: Any, key: str, place: str) -> bool:
     if not isinstance(value, bool):
-        raise UsageError(f"{key} = {value!r} {place}: must be true or false")
+        raise UsageError(f"{key} = {shown(value)} {place}: must be true or false")
     return value
 
 
 def _texts(value: Any, key: str, place: str) -> tuple[str, ...]:
     if not isinstance(value, list):
-        raise UsageError(f"{key} = {value!r} {place}: must be a list of texts")
+        raise UsageError(f"{key} = {shown(value)} {place}: must be a list of texts")
     return tuple(_text(one, key, place) for one in value)
 
 
@@ -163,7 +155,7 @@ def _seeds(value: Any, place: str) -> tuple[int, ...]:
     is_list = isinstance(value, list) and value
     if not is_list or any(type(seed) is not int or seed < 0 for seed in value):
         raise UsageError(
-            f"campaign.seeds = {value!r} {place}: must be a number from 1, or a list of seeds"
+            f"campaign.seeds = {shown(value)} {place}: must be a number from 1, or a list of seeds"
         )
     return tuple(value)
 

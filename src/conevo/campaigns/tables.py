@@ -15,8 +15,9 @@ from typing import Any
 from conevo.analysis.frames import SCHEMA
 from conevo.campaigns.places import Places
 from conevo.campaigns.plan import PlannedRun
+from conevo.reading import read_json, read_json_lines
 from conevo.runs.config import RunConfig
-from conevo.runs.directory import as_json, read_json
+from conevo.runs.directory import as_json
 from conevo.runs.drafts import draft_of
 from conevo.runs.durable import replace_file, sync_directory, writing
 
@@ -103,8 +104,7 @@ def _rows(
     for name, config in zip(names, configs, strict=True):
         path = places.run(name)
         provenance = read_json(path / "provenance.json")
-        lines = (path / "generations.jsonl").read_text(encoding="utf-8").splitlines()
-        records = [json.loads(line) for line in lines]
+        records = read_json_lines(path / "generations.jsonl")
         test = read_json(path / "test.json")
         measure = next(iter(test["champion"]["performance"]))
         yield (

@@ -8,7 +8,6 @@ how it ended is a file, ``ended/LABEL.json``, that holds plain data.
 from __future__ import annotations
 
 import _thread
-import json
 import os
 import platform
 import resource
@@ -23,6 +22,7 @@ from typing import Any
 from conevo.campaigns.places import Places
 from conevo.campaigns.plan import PlannedRun
 from conevo.errors import ConevoError, EnvironmentFailure, UsageError
+from conevo.reading import read_json_lines
 from conevo.runs.directory import as_json, kind_of
 from conevo.runs.durable import replace_file
 from conevo.runs.run import Run, start
@@ -42,13 +42,11 @@ def planned_runs(root: Path) -> dict[str, PlannedRun]:
     """
     path = Places(root).runs
     try:
-        lines = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
         runs = [
-            PlannedRun(**{key: _frozen(value) for key, value in line.items()}) for line in lines
+            PlannedRun(**{key: _frozen(value) for key, value in line.items()})
+            for line in read_json_lines(path)
         ]
-    except OSError as error:
-        raise EnvironmentFailure(f"cannot read {path}: {error.strerror}") from error
-    except (ValueError, TypeError, KeyError) as error:
+    except TypeError as error:
         raise UsageError(f"{path} is damaged: {error}") from error
     return {run.label: run for run in runs}
 

@@ -29,7 +29,6 @@ from __future__ import annotations
 import io
 import json
 import math
-import zipfile
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -38,7 +37,8 @@ from typing import Any
 import numpy as np
 from typing_extensions import TypedDict  # pydantic reads typing's own from Python 3.12 on only
 
-from conevo.errors import EnvironmentFailure, UsageError
+from conevo.errors import UsageError
+from conevo.reading import parse_json, read_arrays
 from conevo.replay.channel import Channel
 from conevo.runs.durable import write_new
 
@@ -135,16 +135,13 @@ class Trajectory:
         """Return the trajectory in a file.
 
         Raises:
-            UsageError: it is damaged, or no trajectory.
+            UsageError: it is damaged, or not a trajectory.
             EnvironmentFailure: it cannot be read.
         """
+        arrays = read_arrays(path, MOST_BYTES, "a trajectory")
         try:
-            data = path.read_bytes()
-        except OSError as error:
-            raise EnvironmentFailure(f"cannot read {path}: {error.strerror}") from error
-        try:
-            about, arrays = _unpack(data)
-            version = about.get("format") if isinstance(about, dict) else None
+            about = parse_json(arrays.pop("about").tobytes(), "about")
+            version = about.get("format")
             if version != FORMAT:
                 raise ValueError(f"its format is {version!r}, not {FORMAT}")
             kept = about.pop("channels")
@@ -156,41 +153,12 @@ class Trajectory:
                 checked, {name: _channel(arrays[name], kept[name]) for name in arrays}
             )
         except Exception as error:  # whatever a damaged or hostile file makes its readers say
-            raise UsageError(f"{path} is damaged or no trajectory ({_reason(error)})") from error
-
-
-def _unpack(data: bytes) -> tuple[Any, dict[str, Any]]:
-    """Return the text and the arrays of a file, after looking at what it asks for."""
-    with zipfile.ZipFile(io.BytesIO(data)) as archive:
-        members = archive.infolist()
-        if sum(member.file_size for member in members) > MOST_BYTES:
-            raise ValueError(f"unpacked it would have more than {MOST_BYTES} bytes")
-        names = [member.filename.removesuffix(".npy") for member in members]
-        if len(set(names)) != len(names):
-            raise ValueError("it has something twice")
-        found = {}
-        for name, member in zip(names, members, strict=True):
-            found[name] = _array(archive.read(member))
-    about = found.pop("about")
-    return json.loads(about.tobytes(), parse_constant=_refuse), found
-
-
-def _array(data: bytes) -> Any:
-    """Return an array of codes: of the size that the file has, whatever its header says."""
-    stream = io.BytesIO(data)
-    version = np.lib.format.read_magic(stream)
-    if version != (1, 0):
-        raise ValueError(f"arrays of version {version}")
-    shape, is_fortran, dtype = np.lib.format.read_array_header_1_0(stream)
-    if dtype not in _CODES:
-        raise ValueError(f"codes of type {dtype}")
-    if math.prod(shape) * dtype.itemsize != len(data) - stream.tell():
-        raise ValueError("an array of another size than it says")
-    flat = np.frombuffer(data, dtype=dtype, offset=stream.tell())
-    return flat.reshape(shape, order="F" if is_fortran else "C")
+            raise UsageError(f"{path} is damaged or not a trajectory ({_reason(error)})") from error
 
 
 def _channel(codes: Any, kept: Any) -> Channel:
+    if codes.dtype not in _CODES:
+        raise ValueError(f"codes of type {codes.dtype}")
     low, step = kept["low"], kept["step"]
     for number in (low, step):
         if isinstance(number, bool) or not isinstance(number, int | float):
@@ -211,10 +179,6 @@ def _check(about: About) -> None:
             raise ValueError(f"{name} of {len(about[name])} robots, not {r}")
     if unknown := set(about["labels"]) - set(castes):
         raise ValueError(f"castes that the world does not have: {', '.join(sorted(unknown))}")
-
-
-def _refuse(constant: str) -> None:
-    raise ValueError(f"{constant} is no number")
 
 
 @cache

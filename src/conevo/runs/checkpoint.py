@@ -17,7 +17,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from conevo.errors import EnvironmentFailure, UsageError
+from conevo.reading import DamagedFile, read_arrays
 from conevo.runs.durable import replace_file
 
 __all__ = ["UnusableFile", "content_digest", "load", "save"]
@@ -26,7 +26,7 @@ FORMAT = 1
 Record = TypeVar("Record")
 
 
-class UnusableFile(UsageError):
+class UnusableFile(DamagedFile):
     """A checkpoint or team file that is corrupt, truncated or foreign."""
 
 
@@ -61,19 +61,17 @@ def load(path: Path, record_class: type[Record], identity: Mapping[str, str]) ->
         EnvironmentFailure: the file cannot be read.
     """
     try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise EnvironmentFailure(f"cannot read {path}: {error.strerror}") from error
+        arrays = read_arrays(path, kind="a file of conevo")
+    except DamagedFile as error:
+        raise UnusableFile(str(error)) from error
     try:
-        with np.load(io.BytesIO(data), allow_pickle=False) as archive:
-            arrays = {name: archive[name] for name in archive.files}
         about = json.loads(arrays.pop("about").tobytes())
         arrays = {name.removeprefix("field."): value for name, value in arrays.items()}
         is_whole = about.pop("digest") == _digest(about, arrays)
         version, found, fields = about["format"], about["identity"], about["fields"]
     except Exception as error:  # whatever a damaged file makes its readers say
         reason = " ".join(str(error).split()) or type(error).__name__
-        raise UnusableFile(f"{path} is damaged or no file of conevo's ({reason})") from error
+        raise UnusableFile(f"{path} is damaged or not a file of conevo ({reason})") from error
     if not is_whole:
         raise UnusableFile(f"{path} is damaged (its digest does not match)")
     for key in {**identity, **found}:
@@ -89,8 +87,7 @@ def load(path: Path, record_class: type[Record], identity: Mapping[str, str]) ->
 
 def content_digest(path: Path) -> str:
     """Return the digest that a whole file holds of its content, whichever way the zip was laid."""
-    with np.load(path, allow_pickle=False) as archive:
-        return str(json.loads(archive["about"].tobytes())["digest"])
+    return str(json.loads(read_arrays(path)["about"].tobytes())["digest"])
 
 
 def _digest(about: Mapping[str, Any], arrays: Mapping[str, Any]) -> str:

@@ -38,7 +38,6 @@ import functools
 import hashlib
 import json
 import math
-import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from importlib import resources
@@ -49,7 +48,8 @@ import tomli_w
 from annotated_types import Ge, Le
 from pydantic import TypeAdapter, ValidationError
 
-from conevo.errors import EnvironmentFailure, UsageError, unknown_name
+from conevo.errors import UsageError, shown, unknown_name
+from conevo.reading import DamagedFile, parse_toml, read_toml
 
 if TYPE_CHECKING:
     from conevo.worlds.protocol import World
@@ -270,8 +270,8 @@ def parse_assignment(text: str) -> tuple[str, Any]:
     if not equals or not key.strip():
         raise UsageError(f"--set {text!r}: expected key=value, for example run.generations=5")
     try:
-        return key.strip(), tomllib.loads(f"value = {value}")["value"]
-    except tomllib.TOMLDecodeError:
+        return key.strip(), parse_toml(f"value = {value}", "a value")["value"]
+    except DamagedFile:
         return key.strip(), value.strip()
 
 
@@ -291,13 +291,7 @@ def parse_assignments(texts: Iterable[str]) -> dict[str, Any]:
 
 
 def _read_file(path: Path) -> Layer:
-    try:
-        tables = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise EnvironmentFailure(f"cannot read {path}: {error.strerror}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise UsageError(f"{path} is not valid TOML: {error}") from error
-    return _as_layer(tables, f"in {path}")
+    return _as_layer(read_toml(path), f"in {path}")
 
 
 def _as_layer(tables: Mapping[str, Any], place: str) -> Layer:
@@ -340,7 +334,7 @@ def _take_names(layers: list[Layer], asked: Mapping[str, str | None]) -> dict[st
             names["world_digest"] = ""  # of another world
         for name, found in given.items():
             if found is not None and not isinstance(found.value, str):
-                raise UsageError(f"run.{name} = {found.value!r} {found.place}: must be a name")
+                raise UsageError(f"run.{name} = {shown(found.value)} {found.place}: must be a name")
             names[name] = found.value if found is not None else names[name]
     if asked["world"] is not None:
         names["world_digest"] = ""
@@ -364,7 +358,7 @@ def _read_preset(preset: str, world: str, method: str) -> Layer:
     if preset not in PRESETS:
         raise unknown_name("preset", preset, PRESETS)
     source = resources.files(__package__) / "presets" / f"{preset}.toml"
-    worlds = tomllib.loads(source.read_text(encoding="utf-8"))
+    worlds = parse_toml(source.read_text(encoding="utf-8"), f"preset {preset!r}")
     generic, own = dict(worlds[ANY]), dict(worlds.get(world.rsplit("-v", 1)[0], {}))
     by_method = generic.pop("method") | own.pop("method", {})
     family = method.split("-")[0]
@@ -399,7 +393,7 @@ def _check(name: str, hint: Any, given: _Value) -> Any:
             return TypeAdapter(hint).validate_python(given.value, strict=True)
         except ValidationError as error:
             problem = error.errors()[0]["msg"].replace("Input should be", "must be")
-    raise UsageError(f"{name} = {given.value!r} {given.place}: {problem}")
+    raise UsageError(f"{name} = {shown(given.value)} {given.place}: {problem}")
 
 
 def _set_fields(part: Any) -> dict[str, Any]:

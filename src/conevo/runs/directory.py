@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from conevo.errors import EnvironmentFailure, UsageError
+from conevo.reading import read_bytes, read_json, read_text
 from conevo.runs import locks
 from conevo.runs.drafts import draft_of, remove_abandoned, remove_torn
 from conevo.runs.durable import replace_file, sync_directory, writing
@@ -32,7 +33,6 @@ __all__ = [
     "appearing",
     "as_json",
     "kind_of",
-    "read_json",
     "refuse_existing",
 ]
 
@@ -156,7 +156,7 @@ class Directory:
     def user(self) -> str:
         """The process that is or was last at work here."""
         path = self.path / LOCK
-        return (path.read_text() if path.is_file() else "") or "another process"
+        return (read_text(path) if path.is_file() else "") or "another process"
 
     @property
     def is_finished(self) -> bool:
@@ -177,7 +177,7 @@ class Directory:
         files = sorted(p for p in self.path.rglob("*") if p.is_file() and p.suffix != ".tmp")
         return {
             p.relative_to(self.path).as_posix(): hashlib.blake2b(
-                p.read_bytes(), digest_size=16
+                read_bytes(p), digest_size=16
             ).hexdigest()
             for p in files
             if p.name not in (SEAL, LOCK)
@@ -187,19 +187,3 @@ class Directory:
 def as_json(value: Mapping[str, Any]) -> bytes:
     """Return the text of a JSON file."""
     return (json.dumps(value, indent=1, allow_nan=False) + "\n").encode()
-
-
-def read_json(path: Path) -> dict[str, Any]:
-    """Return the content of a JSON file.
-
-    Raises:
-        UsageError: it is damaged.
-        EnvironmentFailure: it cannot be read.
-    """
-    try:
-        found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise EnvironmentFailure(f"cannot read {path}: {error.strerror}") from error
-    except ValueError as error:
-        raise UsageError(f"{path} is damaged: {error}") from error
-    return found

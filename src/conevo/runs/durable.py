@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from conevo.errors import EnvironmentFailure, UsageError
+from conevo.reading import read_bytes
 from conevo.runs.drafts import draft_of
 
 __all__ = [
@@ -57,7 +58,7 @@ def write_new(files: Mapping[Path, bytes]) -> None:
         UsageError: something else is in the place of one; none was written.
         EnvironmentFailure: one cannot be written.
     """
-    missing = {p: data for p, data in files.items() if not (p.is_file() and p.read_bytes() == data)}
+    missing = {p: data for p, data in files.items() if not (p.is_file() and read_bytes(p) == data)}
     for path in missing:
         refuse_file(path)
     for path, data in missing.items():

@@ -15,15 +15,16 @@ from __future__ import annotations
 
 import hashlib
 import json
-import tomllib
+import os
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import tomli_w
 
-from conevo.errors import EnvironmentFailure, UsageError
+from conevo.errors import UsageError
 from conevo.evolution.protocol import State
+from conevo.reading import read_bytes, read_toml
 from conevo.runs.code import last_code, refuse_other_code, sessions_of
 from conevo.runs.config import RunConfig, resolve
 from conevo.runs.directory import CONFIG, SHAPING, Directory, appearing, refuse_existing
@@ -301,7 +302,7 @@ class Shaping:
         """Write the records of all generations so far, one per line."""
         lines = "".join(f"{json.dumps(one, allow_nan=False)}\n" for one in self.generations())
         path = self.path / GENERATIONS
-        if not path.is_file() or path.read_bytes() != lines.encode():
+        if not os.path.lexists(path) or read_bytes(path) != lines.encode():
             replace_file(path, lines.encode())
 
     def _stage(self, number: int, threads: int | None) -> Run:
@@ -333,7 +334,7 @@ def label(configs: Sequence[RunConfig]) -> str:
 def _read(path: Path) -> dict[str, Any]:
     """Return what a shaping file says, with the stages' configurations as ``configs``."""
     try:
-        about = tomllib.loads(path.read_text(encoding="utf-8"))
+        about = read_toml(path)
         if about["format"] != FORMAT:
             raise UsageError(f"{path} was written by another version of conevo")
         stages, run_ids = about["stages"], about["run_ids"]
@@ -342,9 +343,7 @@ def _read(path: Path) -> dict[str, Any]:
             for stage in stages
         ]
         command, device = about["command"], about["device"]
-    except OSError as error:
-        raise EnvironmentFailure(f"cannot read {path}: {error.strerror}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, KeyError, TypeError) as error:
+    except (KeyError, TypeError) as error:
         raise UsageError(f"{path} is damaged: {error}") from error
     configs = [resolve(overrides=stage, place=f"in {path}") for stage in settings]
     if [config.run_id for config in configs] != run_ids:

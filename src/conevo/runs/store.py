@@ -21,15 +21,17 @@ its name only when the files down to ``generations.jsonl`` are in it.
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 from typing import Any
 
 from conevo.errors import UsageError
 from conevo.evolution.protocol import State
+from conevo.reading import DamagedFile, read_bytes, read_json, read_json_lines, whole_lines
 from conevo.runs import checkpoint
 from conevo.runs.champions import Team
 from conevo.runs.config import RunConfig, resolve
-from conevo.runs.directory import CONFIG, Directory, appearing, as_json, read_json
+from conevo.runs.directory import CONFIG, Directory, appearing, as_json
 from conevo.runs.durable import append_line, replace_file, writing
 
 __all__ = ["Store", "create"]
@@ -114,16 +116,12 @@ class Store(Directory):
             UsageError: a line in the middle is damaged.
         """
         path = self.path / GENERATIONS
-        whole = path.read_bytes().split(b"\n")[:-1] if path.is_file() else []
-        records: list[Record] = []
-        for number, line in enumerate(whole):
-            try:
-                record = json.loads(line)
-                if record["generation"] != number:
-                    raise ValueError(f"generation {number} expected")
-            except (ValueError, KeyError, TypeError) as error:
-                raise UsageError(f"{path} is damaged in line {number + 1}: {error}") from error
-            records.append(record)
+        records = read_json_lines(path) if os.path.lexists(path) else []
+        for number, record in enumerate(records):
+            if record.get("generation") != number:
+                raise DamagedFile(
+                    f"{path} is damaged in line {number + 1}: generation {number} expected"
+                )
         return records
 
     def cut_generations(self, count: int) -> list[Record]:
@@ -133,9 +131,9 @@ class Store(Directory):
             UsageError: there are fewer.
         """
         path = self.path / GENERATIONS
-        lines = path.read_bytes().split(b"\n")[:-1] if path.is_file() else []
-        kept = b"".join(line + b"\n" for line in lines[:count])
-        if path.is_file() and path.read_bytes() != kept:
+        content = read_bytes(path) if os.path.lexists(path) else b""
+        kept = b"".join(line + b"\n" for line in whole_lines(content)[:count])
+        if content != kept:
             replace_file(path, kept)
         records = self.read_generations()
         if len(records) != count:
@@ -170,7 +168,7 @@ class Store(Directory):
         return self.path / "teams" / f"generation-{generation:04d}.npz"
 
     def _load_team(self, path: Path) -> Team | None:
-        return checkpoint.load(path, Team, self._identity()) if path.is_file() else None
+        return checkpoint.load(path, Team, self._identity()) if os.path.lexists(path) else None
 
     # --- checkpoints ------------------------------------------------------------------------------
 
@@ -193,7 +191,7 @@ class Store(Directory):
         problems: list[str] = []
         for slot, name in enumerate(CHECKPOINTS):
             path = self.path / name
-            if path.is_file():
+            if os.path.lexists(path):
                 try:
                     identity = self._identity() | {"method": method}
                     states[slot] = checkpoint.load(path, State, identity)
@@ -244,7 +242,7 @@ class Store(Directory):
 
     def read_test(self) -> Record | None:
         """Return the testing phase, None if the run has not come to it."""
-        return read_json(self.path / TEST) if (self.path / TEST).is_file() else None
+        return read_json(self.path / TEST) if os.path.lexists(self.path / TEST) else None
 
     def seal(self) -> None:
         """Close the run: drop the older checkpoint, write the digests of all files."""

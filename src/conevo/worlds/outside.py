@@ -23,11 +23,13 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from conevo.errors import UsageError
+from conevo.errors import EnvironmentFailure, UsageError
+from conevo.reading import read_bytes
 from conevo.worlds.registry import WORLDS, WorldEntry
 
 __all__ = ["load", "line_of"]
 
+MOST_BYTES = 2**20  # of a world's text
 CLASS_NAMES = ("name", "actions", "castes", "performance", "heuristics")
 OWN = "conevo_world_"  # begins the names of the modules that such files become
 _loading = threading.RLock()
@@ -71,10 +73,9 @@ def _texts(path: Path) -> dict[Path, bytes]:
     while rest:
         file = rest.pop()
         try:
-            texts[file] = file.read_bytes()
-        except OSError as error:
-            shown = file if texts else path
-            raise UsageError(f"cannot read the world file {shown}: {error.strerror}") from error
+            texts[file] = read_bytes(file, MOST_BYTES, f"the world file {file if texts else path}")
+        except EnvironmentFailure as error:
+            raise UsageError(str(error)) from error
         near = {file.parent / f"{name}.py" for name in _imported(texts[file])}
         rest += sorted((one for one in near if one.is_file() and one not in texts), reverse=True)
     return texts

@@ -9,7 +9,6 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-import zipfile
 from dataclasses import dataclass, field
 from importlib import resources
 from pathlib import Path
@@ -19,11 +18,13 @@ import numpy as np
 import numpy.typing as npt
 
 from conevo.errors import EnvironmentFailure, UsageError
+from conevo.reading import parse_json, read_arrays
 
 __all__ = ["PreySet", "load", "save"]
 
 FORMAT = "conevo prey set 1"
 SHIPPED = "prey-v1.npz"
+MOST_BYTES = 2**24  # of a file, packed and unpacked
 N_GENES = 10  # eight sensors, two wheels (fig. 4.2)
 
 
@@ -96,15 +97,11 @@ def load(path: str | Path | None = None) -> PreySet:
     """Return a prey set, by default the one that is shipped.
 
     Raises:
-        UsageError: the file cannot be read, or is no prey set.
+        UsageError: the file cannot be read, or is not a prey set.
     """
-    data = _read(path)
+    arrays = _read(path)
     try:
-        if not zipfile.is_zipfile(io.BytesIO(data)):  # else numpy advises to unpickle it
-            raise ValueError("not an npz file")
-        with np.load(io.BytesIO(data), allow_pickle=False) as archive:
-            arrays = {name: archive[name] for name in archive.files}
-        about = json.loads(arrays.pop("about").tobytes())
+        about = parse_json(arrays.pop("about").tobytes(), "about")
         if about.pop("format") != FORMAT:
             raise ValueError("another format")
         prey = PreySet(**arrays, about=about)
@@ -116,14 +113,15 @@ def load(path: str | Path | None = None) -> PreySet:
             if not (np.abs(genes) <= 1).all():
                 raise ValueError("genes outside [-1, 1]")
     except Exception as error:  # whatever a damaged file makes its readers say
-        raise UsageError(f"{path} is damaged or no prey set ({error})") from error
+        raise UsageError(f"{path} is damaged or not a prey set ({error})") from error
     return prey
 
 
-def _read(path: str | Path | None) -> bytes:
+def _read(path: str | Path | None) -> dict[str, npt.NDArray[Any]]:
     if path is None:
-        return (resources.files(__package__) / "data" / SHIPPED).read_bytes()
+        with resources.as_file(resources.files(__package__) / "data" / SHIPPED) as shipped:
+            return read_arrays(shipped)
     try:
-        return Path(path).read_bytes()
-    except OSError as error:
-        raise UsageError(f"cannot read prey file {str(path)!r}: {error.strerror}") from error
+        return read_arrays(Path(path), MOST_BYTES, "a prey set")
+    except EnvironmentFailure as error:
+        raise UsageError(str(error)) from error

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
-import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from conevo.analysis.exhibits import Column, Section, Table, number, plain
 from conevo.analysis.frames import Tables
+from conevo.reading import parse_toml, read_json, read_json_lines, read_text
 
 __all__ = ["Campaign", "overview", "read_campaign", "repetition"]
 
@@ -37,18 +36,17 @@ class Campaign:
 
 def read_campaign(root: Path) -> Campaign:
     """Return what a campaign's directory says beside its tables; missing files say nothing."""
-    plan = _text(root / "plan.toml")
-    head = tomllib.loads(plan).get("campaign", {})
-    lines = [json.loads(line) for line in _text(root / "runs.jsonl").splitlines()]
-    endings = {
-        path.stem: json.loads(_text(path)) for path in sorted((root / "ended").glob("*.json"))
-    }
+    plan, listed = root / "plan.toml", root / "runs.jsonl"
+    text = read_text(plan) if plan.is_file() else ""
+    head = parse_toml(text, str(plan)).get("campaign", {})
+    lines = read_json_lines(listed) if listed.is_file() else []
+    endings = {path.stem: read_json(path) for path in sorted((root / "ended").glob("*.json"))}
     name = str(head.get("name", root.resolve().name))
     return Campaign(
         name=name,
         title=str(head.get("title") or name),
         produces=tuple(map(str, head.get("produces", ()))),
-        plan=plan,
+        plan=text,
         planned={str(line["label"]): line for line in lines},
         failed={k: v for k, v in endings.items() if v.get("status") != "finished"},
     )
@@ -90,10 +88,6 @@ def repetition(tables: Tables, campaign: Campaign) -> Section:
         text.append("For more scale: conevo campaign start plan.toml --preset night")
     commands = f"conevo campaign start plan.toml\nconevo report {campaign.name}\n\n# plan.toml\n"
     return Section("How to repeat it", text, preformatted=commands + campaign.plan)
-
-
-def _text(path: Path) -> str:
-    return path.read_text(encoding="utf-8") if path.is_file() else ""
 
 
 def _cost(tables: Tables) -> Table:
