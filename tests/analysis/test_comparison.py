@@ -122,6 +122,18 @@ def test_pairs_that_differ_in_method_and_level_are_not_compared() -> None:
     }
 
 
+def test_a_factor_of_one_method_does_not_keep_it_from_the_others() -> None:
+    low, high = Treatment("cone", "epochs=1, gst=0.1"), Treatment("cone", "epochs=1, gst=0.2")
+    clones, more = Treatment("homcne", "epochs=1"), Treatment("homcne", "epochs=3")
+    samples = {("complex-1", one): sample(1.0, 4) for one in (low, high, clones, more)}
+    assert {frozenset((p.a, p.b)) for p in compare_all(cells_of(samples))} == {
+        frozenset((low, high)),
+        frozenset((low, clones)),
+        frozenset((high, clones)),
+        frozenset((clones, more)),
+    }
+
+
 def test_what_the_tests_say_is_said_apart_where_they_disagree() -> None:
     def verdict(a: list[float], b: list[float]) -> str:
         (pair,) = compare_all(cells_of({("complex-1", HOM): b, ("complex-1", CONE): a}))

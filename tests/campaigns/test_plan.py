@@ -48,6 +48,27 @@ def test_conditions_choose_runs_and_later_ones_win_and_factors_win_over_all(tmp_
     assert {run.configs()[0].run.checkpoint_every for run in forced} == {7}
 
 
+def test_a_factor_may_belong_to_some_runs_only(tmp_path):
+    path = write_plan(tmp_path, factors='"run.epochs" = [1, 3]')
+    with path.open("a") as file:
+        file.write('[[where]]\nmethod = "cone"\nfactors = { "method.gst" = [0.1, 0.2] }\n')
+    plan = read_plan(path)
+    runs = [run for run in plan.write_out() if run.seed == 1]
+    assert [(run.method, run.variant) for run in runs] == [
+        ("homcne", "epochs=1"),
+        ("homcne", "epochs=3"),
+        ("cone", "epochs=1, gst=0.1"),
+        ("cone", "epochs=1, gst=0.2"),
+        ("cone", "epochs=3, gst=0.1"),
+        ("cone", "epochs=3, gst=0.2"),
+    ]
+    assert [run.configs()[0].method_config.gst for run in runs[2:]] == [0.1, 0.2, 0.1, 0.2]
+    assert plan.n_runs == 12
+    again = tmp_path / "again.toml"
+    again.write_text(plan.to_toml())
+    assert read_plan(again) == plan
+
+
 def test_a_plan_is_what_it_was_after_being_written_and_read(tmp_path):
     path = write_plan(tmp_path, 'produces = ["figure 1"]', '"method.gst" = [0.1]')
     path.write_text(path.read_text().replace('"homcne", ', ""))
@@ -103,6 +124,14 @@ def test_some_runs_of_a_plan_may_be_shapings(tmp_path):
         ("[settings]", "[[where]]\nshape = 2\n[settings]", "where.shape = 2"),
         ("[settings]", "[where]\n[settings]", r"\[\[where\]\]"),
         ("[campaign]", "[campaign", "not valid TOML"),
+        ("[settings]", '[[where]]\nfactors = { "run.epochs" = 3 }\n[settings]', "at least one"),
+        ("[settings]", '[[where]]\nfactors = { method = ["cone"] }\n[settings]', "for all runs"),
+        (
+            "[settings]",
+            '[[where]]\nmethod = "homcne"\nfactors = { "method.gst" = [0.1] }\n[settings]',
+            "unknown key 'method.gst'",
+        ),
+        ("[settings]", '[settings]\n"run.seed" = 4', "seeds are campaign.seeds"),
     ],
 )
 def test_a_wrong_plan_is_one_clear_line(tmp_path, old, new, says):

@@ -37,8 +37,10 @@ __all__ = [
     "Summary",
     "Treatment",
     "aggregate",
+    "agree",
     "compare_all",
     "group_values",
+    "levels_of",
     "summarize",
     "treatments_of",
 ]
@@ -55,6 +57,20 @@ class Treatment(NamedTuple):
         """Name as published, and the levels."""
         name = METHODS[self.method].title if self.method in METHODS else self.method
         return f"{name}, {self.variant}" if self.variant else name
+
+
+def levels_of(variant: str) -> dict[str, str]:
+    """Return the level of each factor that a variant names."""
+    return dict(level.partition("=")[::2] for level in variant.split(", ") if level)
+
+
+def agree(a: str, b: str) -> bool:
+    """Whether two variants have the same level of every factor that both have.
+
+    A factor may apply to some methods only; the others' runs go with each of its levels.
+    """
+    one, other = levels_of(a), levels_of(b)
+    return all(one[factor] == other[factor] for factor in one.keys() & other.keys())
 
 
 class Group(NamedTuple):
@@ -201,7 +217,7 @@ def compare_all(cells: Mapping[Cell, Sequence[Value]]) -> list[Pair]:
         (environment, a, b, compare(samples[a], samples[b]))
         for environment, samples in _by_environment(cells).items()
         for b, a in combinations(samples, 2)
-        if a.method == b.method or a.variant == b.variant
+        if a.method == b.method or agree(a.variant, b.variant)
     ]
     corrected = holm([result.p_mann_whitney for *_, result in made])
     tests = sum(result.p_mann_whitney is not None for *_, result in made)

@@ -94,11 +94,13 @@ class Where:
         conditions: "world", "method" or "preset" -> the names for which it holds.
         settings: key -> value.
         shape: whether they are shapings; None leaves it.
+        factors: name -> levels, of these runs only.
     """
 
     conditions: dict[str, tuple[str, ...]]
     settings: dict[str, Any]
     shape: bool | None = None
+    factors: dict[str, tuple[Any, ...]] = field(default_factory=dict)
 
     def holds(self, names: Mapping[str, str]) -> bool:
         """Whether a run with these names is meant."""
@@ -161,10 +163,18 @@ class Plan:
     @property
     def n_runs(self) -> int:
         """Number of runs."""
-        cells = 1
-        for levels in self.factors.values():
-            cells *= len(levels)
-        return cells * len(self.seeds)
+        return len(self._cells()) * len(self.seeds)
+
+    def _cells(self) -> list[dict[str, Any]]:
+        """Return every combination of levels, those of some runs' own factors among them."""
+        found = []
+        for levels in _combinations(self.factors):
+            names = {"world": levels["world"], "method": levels["method"], "preset": self.preset}
+            own: dict[str, tuple[Any, ...]] = {}
+            for one in self.where:
+                own |= one.factors if one.holds(names) else {}
+            found += [levels | more for more in _combinations(own)]
+        return found
 
     def write_out(self) -> list[PlannedRun]:
         """Return every run, checked: seed by seed, so that an early stop leaves equal cells.
@@ -172,11 +182,7 @@ class Plan:
         Raises:
             UsageError: an unknown name or a value that is not allowed in any run.
         """
-        cells = [
-            dict(zip(self.factors, levels, strict=True))
-            for levels in itertools.product(*self.factors.values())
-        ]
-        written = [self._write_cell(levels) for levels in cells]
+        written = [self._write_cell(levels) for levels in self._cells()]
         runs = [run for same_seed in zip(*written, strict=True) for run in same_seed]
         labels = [run.label for run in runs]
         if twice := sorted({label for label in labels if labels.count(label) > 1}):
@@ -233,6 +239,7 @@ class Plan:
             {key: list(allowed) for key, allowed in one.conditions.items()}
             | ({} if one.shape is None else {"shape": one.shape})
             | {"settings": one.settings}
+            | ({"factors": {k: list(v) for k, v in one.factors.items()}} if one.factors else {})
             for one in self.where
         ]
         tables = {
@@ -241,6 +248,11 @@ class Plan:
             "settings": self.settings,
         }
         return tomli_w.dumps(tables | ({"where": where} if where else {}))
+
+
+def _combinations(factors: Mapping[str, tuple[Any, ...]]) -> list[dict[str, Any]]:
+    """Return every combination of the factors' levels."""
+    return [dict(zip(factors, some, strict=True)) for some in itertools.product(*factors.values())]
 
 
 def _with_seed(config: RunConfig, seed: int) -> RunConfig:

@@ -14,7 +14,7 @@ run with every seed::
     [factors]
     world = ["rover/complex-1..10"]
     method = ["homcne", "cone"]
-    "method.gst" = [0.1, 0.2]      # any setting may be a factor
+    "method.rounds" = [5, 10]      # any setting may be a factor
 
     [settings]                     # of all runs, over those of the preset
     "run.budget_evaluations" = 20000
@@ -24,6 +24,10 @@ run with every seed::
     preset = "desk"
     settings = { "method.fresh_rounds" = true }
     # shape = true                 # also here, for some of the runs
+
+    [[where]]                      # a factor of some runs only
+    method = ["cone"]
+    factors = { "method.gst" = [0.1, 0.2] }
 """
 
 from __future__ import annotations
@@ -45,7 +49,7 @@ STUDIES = ("teams",)
 TABLES = ("campaign", "factors", "settings", "where")
 HEAD = ("name", "title", "produces", "seeds", "preset", "shape", "studies")
 CONDITIONS = ("world", "method", "preset")
-EFFECTS = ("settings", "shape")
+EFFECTS = ("settings", "shape", "factors")
 RANGE = re.compile(r"(.*-)(\d+)\.\.(\d+)")
 
 
@@ -99,6 +103,8 @@ def _parse(tables: Mapping[str, Any], place: str, name: str) -> Plan:
     wheres = tables.get("where", [])
     if not isinstance(wheres, list):
         raise UsageError(f"where {place} must be written [[where]]")
+    every_run = {"world": [], "method": []} | _table(tables, "factors", place)
+    factors = _factors(every_run, "factors", place)
     return Plan(
         name=_name(head.get("name", name), place),
         title=_text(head.get("title", ""), "campaign.title", place),
@@ -107,9 +113,9 @@ def _parse(tables: Mapping[str, Any], place: str, name: str) -> Plan:
         preset=preset,
         shape=shape,
         studies=studies,
-        factors=_factors(_table(tables, "factors", place), place),
+        factors=factors,
         settings=_table(tables, "settings", place),
-        where=tuple(_where(one, place) for one in wheres),
+        where=tuple(_where(one, factors, place) for one in wheres),
         place=place,
     )
 
@@ -117,7 +123,7 @@ def _parse(tables: Mapping[str, Any], place: str, name: str) -> Plan:
 def _table(tables: Mapping[str, Any], key: str, place: str) -> dict[str, Any]:
     found = tables.get(key, {})
     if not isinstance(found, dict):
-        raise UsageError(f"{key} {place} must be a table: [{key}]")
+        raise UsageError(f"{key} {place} must be a table")
     return found
 
 
@@ -160,15 +166,15 @@ def _seeds(value: Any, place: str) -> tuple[int, ...]:
     return tuple(value)
 
 
-def _factors(table: Mapping[str, Any], place: str) -> dict[str, tuple[Any, ...]]:
+def _factors(table: Mapping[str, Any], key: str, place: str) -> dict[str, tuple[Any, ...]]:
     factors: dict[str, tuple[Any, ...]] = {}
-    for name, levels in ({"world": [], "method": []} | dict(table)).items():
+    for name, levels in table.items():
         if not isinstance(levels, list) or not levels:
-            raise UsageError(f"factors.{name} {place}: must be a list of at least one level")
+            raise UsageError(f"{key}.{name} {place}: must be a list of at least one level")
         if name in ("world", "method"):
-            levels = _expand(_texts(levels, f"factors.{name}", place))
+            levels = _expand(_texts(levels, f"{key}.{name}", place))
         elif any(isinstance(level, (list, dict)) for level in levels):
-            raise UsageError(f"factors.{name} {place}: levels are numbers, texts, true or false")
+            raise UsageError(f"{key}.{name} {place}: levels are numbers, texts, true or false")
         factors[name] = tuple(levels)
     return factors
 
@@ -185,7 +191,8 @@ def _expand(names: Iterable[str]) -> list[str]:
     return found
 
 
-def _where(table: Any, place: str) -> Where:
+def _where(table: Any, of_all: Mapping[str, Any], place: str) -> Where:
+    """Return one [[where]]; ``of_all`` are the factors of all runs, which it may not repeat."""
     if not isinstance(table, dict):
         raise UsageError(f"where {place} must be written [[where]]")
     conditions: dict[str, tuple[str, ...]] = {}
@@ -197,4 +204,7 @@ def _where(table: Any, place: str) -> Where:
         allowed = [value] if isinstance(value, str) else value
         conditions[key] = tuple(_expand(_texts(allowed, f"where.{key}", place)))
     shape = _truth(table["shape"], "where.shape", place) if "shape" in table else None
-    return Where(conditions, _table(table, "settings", place), shape)
+    factors = _factors(_table(table, "factors", place), "where.factors", place)
+    if twice := sorted(factors.keys() & of_all.keys()):
+        raise UsageError(f"where.factors.{twice[0]} {place}: [factors] has {twice[0]} for all runs")
+    return Where(conditions, _table(table, "settings", place), shape, factors)

@@ -225,6 +225,22 @@ def test_world_preset_and_variant_are_judged_apart(tmp_path: Path) -> None:
     assert all("no runs of HetCNE in 10 environments" in one.why for one in told)
 
 
+def test_runs_without_a_factor_are_judged_with_each_of_its_levels(tmp_path: Path) -> None:
+    runs = [
+        RUN | {"run": method + variant, "method": method, "variant": variant, "run_id": str(k)}
+        for k, (method, variant) in enumerate(
+            [("cone", "gst=0.1"), ("cone", "gst=0.2"), ("homcne", "")]
+        )
+    ]
+    write(tmp_path, runs=runs)
+    with Tables(tmp_path) as tables:
+        groups = {one.variant: one.runs for one in read_evidence(tables)}
+    assert {
+        variant: sorted(run.run for of in some.values() for run in of)
+        for variant, some in groups.items()
+    } == {"gst=0.1": ["conegst=0.1", "homcne"], "gst=0.2": ["conegst=0.2", "homcne"]}
+
+
 def test_the_budget_with_most_runs_of_both_is_taken(tmp_path: Path) -> None:
     runs, scores = [], []
     for method, spent in (

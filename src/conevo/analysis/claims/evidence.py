@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from conevo.analysis.claims.statements import Compare, Sample, Within
+from conevo.analysis.comparison import levels_of
 from conevo.analysis.frames import Tables
 
 __all__ = ["QUANTITIES", "Evidence", "Gathered", "Quantity", "RunOf", "read_evidence"]
@@ -268,12 +269,32 @@ def read_evidence(tables: Tables) -> list[Evidence]:
         "SELECT world, preset, variant, environment, method, run, seed, budget"
         " FROM runs JOIN budgets USING (run) ORDER BY ALL"
     )
+    variants: dict[tuple[str, str], dict[str, set[str]]] = defaultdict(lambda: defaultdict(set))
+    for world, preset, variant, _, method, *_ in rows:
+        variants[world, preset][method].add(variant)
     groups: dict[tuple[str, str, str], Evidence] = {}
     for world, preset, variant, environment, method, run, seed, budget in rows:
-        key = (world, preset, variant)
-        group = groups.setdefault(key, Evidence(*key, cached))
-        group.runs.setdefault((environment, method), []).append(RunOf(run, seed, budget))
-    return list(groups.values())
+        for whole in _joined(variant, method, variants[world, preset]):
+            key = (world, preset, whole)
+            group = groups.setdefault(key, Evidence(*key, cached))
+            group.runs.setdefault((environment, method), []).append(RunOf(run, seed, budget))
+    return [groups[key] for key in sorted(groups)]
+
+
+def _joined(variant: str, method: str, variants: Mapping[str, set[str]]) -> list[str]:
+    """Return the variants with whose runs those of a method are judged.
+
+    A factor may apply to some methods only; the others' runs go with each of its levels.
+
+    Args:
+        variant: of the runs.
+        method: of the runs.
+        variants: that each method has runs of.
+    """
+    own = levels_of(variant).items()
+    others = set().union(*(some for name, some in variants.items() if name != method))
+    longer = [one for one in others - variants[method] if own < levels_of(one).items()]
+    return sorted(longer) + ([variant] if variant in others or not longer else [])
 
 
 def _usual(of: Mapping[str, list[tuple[int, float]]]) -> str:
