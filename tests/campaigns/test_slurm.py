@@ -25,8 +25,9 @@ def task(tmp_path):
 
     def begin(script, index):
         known = {
+            "SLURM_ARRAY_JOB_ID": "77",
             "SLURM_ARRAY_TASK_ID": str(index),
-            "SLURM_JOB_ID": "77",
+            "SLURM_JOB_ID": "77",  # of one task of an array it is that of the whole array
             "SLURM_CPUS_PER_TASK": "1",
         }
         path = f"{command.parent}:{os.environ['PATH']}"
@@ -62,7 +63,7 @@ def test_a_task_whose_time_is_up_lets_its_worker_leave_and_goes_back_into_the_qu
     until(lambda: n_generations(campaign, label) > 3)
     job.send_signal(signal.SIGUSR1)
     assert job.wait(60) == 0
-    assert (tmp_path / "said.txt").read_text() == "requeue 77\n"
+    assert (tmp_path / "said.txt").read_text() == "requeue 77_0\n"
     assert workers(campaign.path) == {}
     run = conevo.Run(campaign.places.run(label))
     assert run.status == "interrupted"
@@ -72,12 +73,36 @@ def test_a_task_whose_time_is_up_lets_its_worker_leave_and_goes_back_into_the_qu
     job.send_signal(signal.SIGUSR1)
     assert job.wait(60) == 0
     assert run.provenance["sessions"][1]["from_generation"] in (done - 1, done)  # records go first
+    (tmp_path / "said.txt").unlink()
+    job = task(script, 0)
+    until(lambda: workers(campaign.path))
+    job.send_signal(signal.SIGTERM)  # cancelled: whoever did that does not want it back
+    assert job.wait(60) == 143
+    assert workers(campaign.path) == {}
+    assert not (tmp_path / "said.txt").exists()
+
+
+def test_a_task_goes_on_after_a_run_that_fails_and_is_listed_as_failed(tmp_path, task):
+    more = '[[where]]\nmethod = "homcne"\nsettings = { "run.budget_evaluations" = 1 }'
+    campaign = tiny_campaign(tmp_path, more=more)
+    failing, good, *_ = campaign.planned
+    script = slurm.write_array(campaign.path, [failing, good])
+    lines = script.read_text().replace("k += 2", "k += 1")  # both in one task
+    script.write_text(lines)
+    assert task(script, 0).wait(60) == 1
+    assert (campaign.is_finished(failing), campaign.is_finished(good)) == (False, True)
 
 
 def test_what_the_array_asks_for_is_what_was_said(tmp_path):
     campaign = tiny_campaign(tmp_path)
     script = slurm.write_array(
-        campaign.path, ["a", "b"], threads=8, hours=1.5, at_once=1, python="/srv/it's/python"
+        campaign.path,
+        ["a", "b"],
+        threads=8,
+        hours=1.5,
+        at_once=1,
+        options=["--gres=gpu:a100:1", "--mem=8G", "--exclusive", "--constraint=a&(b|c)"],
+        python="/srv/it's/python",
     )
     lines = script.read_text().splitlines()
     assert {
@@ -87,19 +112,50 @@ def test_what_the_array_asks_for_is_what_was_said(tmp_path):
         "#SBATCH --time=90",
         "#SBATCH --signal=B:USR1@180",
         "#SBATCH --requeue",
+        "#SBATCH --gres=gpu:a100:1",
+        "#SBATCH --mem=8G",
+        "#SBATCH --exclusive",
+        "#SBATCH --constraint=a&(b|c)",
     } <= set(lines)
     assert any("'/srv/it'\"'\"'s/python' -m conevo" in line for line in lines)
-    assert (campaign.path / "slurm-runs.txt").read_text() == "a\nb\n"
+    assert lines[lines.index("runs=(") + 1 :][:3] == ["a", "b", ")"]
+    first_command = next(k for k, line in enumerate(lines[1:], 1) if not line.startswith("#"))
+    assert not [line for line in lines[first_command:] if line.startswith("#SBATCH")]
     assert lines[0] == "#!/bin/bash"
     assert sys.executable in slurm.write_array(campaign.path, ["a"]).read_text()
 
 
+def test_a_run_that_was_finished_and_is_to_go_on_is_not_passed_over(tmp_path):
+    campaign = tiny_campaign(tmp_path)
+    ended = campaign.places.ended("a")
+    ended.parent.mkdir()
+    ended.write_text('{"status": "finished"}')
+    failed = campaign.places.ended("b")
+    failed.write_text('{"status": "failed"}')
+    slurm.write_array(campaign.path, ["a", "b"])
+    assert (ended.exists(), failed.exists()) == (False, True)
+
+
 @pytest.mark.parametrize(
-    ("labels", "hours", "says"),
-    [([], 1.0, "no run left"), (["a"], 0.05, "0.05 hours are too short: a worker has 180 s")],
+    ("labels", "asked", "says"),
+    [
+        ([], {}, "no run left"),
+        (["a"], {"hours": 0.05}, "--hours 0.05: must be from 0.1 .a worker has 180 s to leave. to"),
+        (["a"], {"hours": float("inf")}, "--hours inf: must be from 0.1 "),
+        (["a"], {"hours": float("nan")}, "--hours nan: must be from 0.1 "),
+        (["a"], {"options": ["-p gpu"]}, "'-p gpu' is not an option for sbatch"),
+        (["a"], {"options": ["--mem 8G"]}, "'--mem 8G' is not an option for sbatch"),
+        (["a"], {"options": ["--mem=8G\nrm -rf x"]}, "is not an option for sbatch"),
+        (["a"], {"options": ["--comment=a#b"]}, "is not an option for sbatch"),
+        (["a"], {"options": ['--comment="a']}, "is not an option for sbatch"),
+        (["a"], {"options": ["--mem="]}, "is not an option for sbatch"),
+        (["a"], {"options": ["--array=0-5"]}, "conevo sets --array itself; use conevo's --at-once"),
+        (["a"], {"options": ["--requeue"]}, "conevo sets --requeue itself; leave it out"),
+        (["a"], {"options": ["--mem=8G", "--mem=9G"]}, "--mem for sbatch is given twice"),
+    ],
 )
-def test_an_array_that_cannot_be_is_refused(tmp_path, labels, hours, says):
+def test_an_array_that_cannot_be_is_refused(tmp_path, labels, asked, says):
     campaign = tiny_campaign(tmp_path)
     with pytest.raises(UsageError, match=says):
-        slurm.write_array(campaign.path, labels, hours=hours)
+        slurm.write_array(campaign.path, labels, **asked)
     assert not (campaign.path / "slurm.sh").exists()

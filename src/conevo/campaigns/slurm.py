@@ -8,19 +8,30 @@ campaign as usual then finds what is finished, and finishes what is not.
 
 from __future__ import annotations
 
+import re
 import shlex
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
 from conevo.campaigns.executors import ONE_THREAD
-from conevo.errors import UsageError
+from conevo.campaigns.places import Places
+from conevo.errors import UsageError, shown
+from conevo.reading import DamagedFile, read_json
 from conevo.runs.durable import replace_file
 
-__all__ = ["write_array"]
+__all__ = ["check_request", "write_array"]
 
 TASKS = 1000  # SLURM takes array indices below 1001 unless a site allows more
 GRACE = 180  # seconds before the end at which SLURM signals the script
+MOST_HOURS = 8760  # a year
+OURS = {  # what the script sets, and the option of conevo for it
+    "array": "--at-once",
+    "cpus-per-task": "--threads",
+    "time": "--hours",
+    **dict.fromkeys(("job-name", "signal", "requeue", "no-requeue", "output", "wrap", "ntasks")),
+}
+OPTION = re.compile(r"--([a-z][a-z0-9-]*)(=[A-Za-z0-9_.,:;/=+@%*&|!()\[\]{}<>~^-]+)?")
 
 SCRIPT = """\
 #!/bin/bash
@@ -31,16 +42,20 @@ SCRIPT = """\
 #SBATCH --signal=B:USR1@{grace}
 #SBATCH --requeue
 #SBATCH --output=/dev/null
-# {n_runs} runs in {tasks} tasks. Submit with: sbatch [--partition=... --account=...] {path}
+{options}# {n_runs} runs in {tasks} tasks. Submit this file with sbatch.
 set -u
 campaign={campaign}
+runs=(
+{runs}
+)
 export {variables}
 mkdir -p "$campaign/logs"
 exec >> "$campaign/logs/slurm-$SLURM_ARRAY_TASK_ID.txt" 2>&1
-leaving=
-trap 'leaving=yes; exec 3>&-' USR1 TERM  # the worker leaves when its stdin ends
-for ((line = SLURM_ARRAY_TASK_ID + 1; line <= {n_runs}; line += {tasks})); do
-    label=$(sed -n "${{line}}p" "$campaign/slurm-runs.txt")
+leaving= failed=
+trap 'leaving=requeue; exec 3>&-' USR1  # the worker leaves when its stdin ends
+trap 'leaving=end; exec 3>&-' TERM
+for ((k = SLURM_ARRAY_TASK_ID; k < {n_runs}; k += {tasks})); do
+    label=${{runs[k]}}
     if grep -qs '"status": "finished"' "$campaign/ended/$label.json"; then continue; fi
     echo "$(date -Is) $(hostname) $label"
     exec 3> >(exec {python} -m conevo.campaigns.work "$campaign" "$label" "$SLURM_CPUS_PER_TASK" \\
@@ -48,8 +63,14 @@ for ((line = SLURM_ARRAY_TASK_ID + 1; line <= {n_runs}; line += {tasks})); do
     worker=$!
     while kill -0 "$worker" 2> /dev/null; do wait "$worker"; done  # a signal interrupts wait
     exec 3>&-
-    if [ "$leaving" ]; then exec scontrol requeue "$SLURM_JOB_ID"; fi
+    case $leaving in
+        # SLURM_JOB_ID of one of the tasks is that of the whole array, which would be put back
+        requeue) exec scontrol requeue "${{SLURM_ARRAY_JOB_ID}}_$SLURM_ARRAY_TASK_ID" ;;
+        end) exit 143 ;;
+    esac
+    grep -qs '"status": "finished"' "$campaign/ended/$label.json" || failed=yes
 done
+[ -z "$failed" ]  # SLURM lists a task as failed if one of its runs is
 """
 
 
@@ -60,44 +81,86 @@ def write_array(
     threads: int = 1,
     hours: float = 24.0,
     at_once: int | None = None,
+    options: Sequence[str] = (),
     python: str = sys.executable,
 ) -> Path:
-    """Write ``slurm.sh`` and ``slurm-runs.txt`` into a campaign's directory; nothing is submitted.
+    """Write ``slurm.sh`` into a campaign's directory; nothing is submitted.
 
     Args:
         root: the campaign's directory, which all nodes must see under the same path.
         labels: of the runs to carry out.
         threads: CPU threads of a run.
         hours: time limit of a task; what takes longer is put into the queue again.
-        at_once: tasks that may be at work together; no limit by default.
+        at_once: tasks that may run together; no limit by default.
+        options: of sbatch, for every task: "--gres=gpu:1"; see ``check_request``.
         python: the interpreter on the nodes.
 
     Raises:
-        UsageError: no runs, or less time than a worker is given to leave.
-        EnvironmentFailure: the files cannot be written.
+        UsageError: no runs, less time than a worker is given to leave, or an option that is not
+            allowed.
+        EnvironmentFailure: the file cannot be written.
     """
     if not labels:
         raise UsageError(f"{root} has no run left to carry out")
-    minutes = int(hours * 60)
-    if minutes * 60 < 2 * GRACE:
-        raise UsageError(f"{hours:g} hours are too short: a worker has {GRACE} s to leave")
+    check_request(hours, options)
     root = root.resolve()
     path = root / "slurm.sh"
     tasks = min(len(labels), TASKS)
     text = SCRIPT.format(
-        name=f"conevo-{root.name}",
+        name=re.sub(r"[^A-Za-z0-9._-]", "_", f"conevo-{root.name}"),
         last=tasks - 1,
         at_once=f"%{at_once}" if at_once else "",
         threads=threads,
-        minutes=minutes,
+        minutes=int(hours * 60),
         grace=GRACE,
+        options="".join(f"#SBATCH {option}\n" for option in options),
         n_runs=len(labels),
         tasks=tasks,
-        path=shlex.quote(str(path)),
         campaign=shlex.quote(str(root)),
+        runs="\n".join(shlex.quote(label) for label in labels),
         variables=" ".join(f"{name}=1" for name in ONE_THREAD),
         python=shlex.quote(python),
     )
-    replace_file(root / "slurm-runs.txt", "".join(f"{label}\n" for label in labels).encode())
+    for label in labels:  # what the script would take for finished, and is not any more
+        _forget_finished(Places(root).ended(label))
     replace_file(path, text.encode())
     return path
+
+
+def check_request(hours: float, options: Sequence[str]) -> None:
+    """Refuse a time limit or options with which the script would not work.
+
+    Raises:
+        UsageError: less time than a worker is given to leave, or more than a year; an option is
+            not written ``--NAME`` or ``--NAME=VALUE`` in the characters that ``#SBATCH`` lines take
+            as they are, is the script's own, or is there twice.
+    """
+    if not 2 * GRACE <= hours * 3600 <= MOST_HOURS * 3600:
+        raise UsageError(
+            f"--hours {hours:g}: must be from {2 * GRACE / 3600:g} (a worker has {GRACE} s to "
+            f"leave) to {MOST_HOURS}"
+        )
+    seen = set()
+    for option in options:
+        match = OPTION.fullmatch(option)
+        if match is None:
+            raise UsageError(
+                f"{shown(option)} is not an option for sbatch: write --NAME or --NAME=VALUE, "
+                f"without spaces, quotes and #, for example --gres=gpu:1"
+            )
+        name = match[1]
+        if name in OURS:
+            instead = f"use conevo's {OURS[name]}" if OURS[name] else "leave it out"
+            raise UsageError(f"{option}: conevo sets --{name} itself; {instead}")
+        if name in seen:
+            raise UsageError(f"--{name} for sbatch is given twice")
+        seen.add(name)
+
+
+def _forget_finished(ended: Path) -> None:
+    """Remove how a run ended if that was said to be finished."""
+    try:
+        if ended.is_file() and read_json(ended).get("status") == "finished":
+            ended.unlink()
+    except DamagedFile:
+        ended.unlink()

@@ -116,10 +116,18 @@ def start(
     help="CPU threads of a run; changes no result.",
 )  # fmt: skip
 @click.option(
-    "--hours", type=click.FloatRange(min=0.1), default=24.0, show_default=True,
+    "--hours", type=float, default=24.0, show_default=True,
     help="Time limit of a task; what takes longer is put into the queue again.",
 )  # fmt: skip
-@click.option("--at-once", type=click.IntRange(1), help="Tasks at work together (default: any).")
+@click.option("--at-once", type=click.IntRange(1), help="Tasks running together (default: any).")
+@click.option("--partition", metavar="NAME", help="SLURM partition.")
+@click.option("--account", metavar="NAME", help="SLURM account.")
+@click.option("--gres", metavar="GRES", help="Resources of a task, for example gpu:1.")
+@click.option("--mem", metavar="SIZE", help="Memory of a task, for example 8G.")
+@click.option(
+    "--sbatch", "others", metavar="OPTION", multiple=True,
+    help="Another option of sbatch, for example --sbatch=--constraint=avx512.",
+)  # fmt: skip
 def slurm(
     name: str,
     preset: str | None,
@@ -129,18 +137,25 @@ def slurm(
     threads: int,
     hours: float,
     at_once: int | None,
+    others: tuple[str, ...],
+    **named: str | None,
 ) -> None:
     """Write a script that carries out all runs that are not finished; submit it with sbatch.
 
-    All nodes must see the campaign's directory. conevo campaign status tells how it stands, and
+    All nodes must see the campaign's directory. conevo campaign status shows how far it is, and
     conevo campaign start finishes what is missing.
     """
-    from conevo.campaigns.slurm import write_array
+    from conevo.campaigns.slurm import check_request, write_array
 
+    options = [f"--{key}={value}" for key, value in named.items() if value is not None]
+    options += others
+    check_request(hours, options)
     found, plan = _planned(name, preset, seeds, settings, out)
     found = found or _create(plan, name, out)
     left = [label for label in found.planned if not found.is_finished(label)]
-    path = write_array(found.path, left, threads=threads, hours=hours, at_once=at_once)
+    path = write_array(
+        found.path, left, threads=threads, hours=hours, at_once=at_once, options=options
+    )
     click.echo(f"{len(left)} runs; submit them with: sbatch {path}")
 
 
