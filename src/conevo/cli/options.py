@@ -74,6 +74,7 @@ class Order:
     as_json: bool
     quiet: bool
     verbose: bool
+    comparing: bool = False
 
     def __post_init__(self) -> None:
         from conevo.runs.config import parse_assignments
@@ -101,13 +102,30 @@ class Order:
         if value is not None and given:
             raise UsageError(f"{option} and --set {given.pop()} are mutually exclusive")
 
+    @property
+    def methods(self) -> tuple[str, ...]:
+        """The methods asked for, "cone" unless there are any.
+
+        Raises:
+            UsageError: several, though they are not to be compared.
+        """
+        found = tuple(dict.fromkeys((self.method or "cone").split(",")))
+        if len(found) > 1 and not self.comparing:
+            raise UsageError(
+                f"--method {self.method}: several methods need --seeds N, for example 3"
+            )
+        return found
+
     def resolve(self, world: str | None) -> RunConfig:
-        """Return the configuration for a world, or for the one that the file names."""
+        """Return the configuration for a world, or for the one that the file names.
+
+        Of several methods it is the first one's.
+        """
         from conevo.runs.config import resolve
 
         return resolve(
             world,
-            self.method,
+            self.methods[0] if self.method else None,
             self.preset,
             self.seed,
             file=self.config,

@@ -27,20 +27,38 @@ __all__ = ["run"]
 @click.option(
     "--dry-run", is_flag=True, help="Print all settings and what they cost; start nothing."
 )
+@click.option(
+    "--seeds", type=click.IntRange(1, 10_000), metavar="N",
+    help="A comparison: N runs of each method (--method cone,mesp), as a campaign on all cores.",
+)  # fmt: skip
 @output_options
-def run(world: str | None, prey: str | None, shape: bool, dry_run: bool, **options: Any) -> None:
+def run(
+    world: str | None,
+    prey: str | None,
+    shape: bool,
+    dry_run: bool,
+    seeds: int | None,
+    **options: Any,
+) -> int | None:
     """Evolve a team for WORLD/ENVIRONMENT (see: conevo list worlds) and test it.
 
-    Everything is kept in one directory. Ctrl-C leaves a run that conevo resume continues. With
-    --shape every stage is a run of its own, and all settings are those of each stage.
+    Everything is written to one directory. After Ctrl-C, continue with conevo resume. With --shape
+    every stage is a run of its own, and all settings are those of each stage. With --seeds the runs
+    are a campaign in campaigns/: continue it with conevo campaign start, see it with conevo report.
+
+    Try: conevo run rover/complex-1 --preset smoke --method cone,homcne --seeds 3
     """
-    order = Order(**options)
+    order = Order(**options, comparing=seeds is not None)
     config = order.resolve(world)
     if prey is not None:
         if not hasattr(config.world_params, "prey"):
             raise UsageError(f"--prey {prey!r}: {config.world} has no prey to be chosen")
         order.take("world.prey", "--prey", prey)
         config = order.resolve(world)
+    if seeds is not None:
+        from conevo.cli.comparison import compare, plan_of
+
+        return compare(order, plan_of(order, config, seeds, shape), dry_run)
     if shape:
         from conevo.runs.shaping import tasks_up_to
 
@@ -53,3 +71,4 @@ def run(world: str | None, prey: str | None, shape: bool, dry_run: bool, **optio
         order.print_only([config])
     else:
         order.run(config)
+    return None

@@ -1,0 +1,70 @@
+"""``conevo run --seeds``: several runs of one or more methods, as a campaign without a plan file."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+from typing import TYPE_CHECKING
+
+from conevo.errors import UsageError
+
+if TYPE_CHECKING:
+    from conevo.campaigns.plan import Plan
+    from conevo.cli.options import Order
+    from conevo.runs.config import RunConfig
+
+__all__ = ["compare", "plan_of"]
+
+
+def plan_of(order: Order, config: RunConfig, n_seeds: int, shape: bool) -> Plan:
+    """Return the plan of every method with every seed; its name says what it compares.
+
+    Args:
+        order: what the command line asks for; its method may be several, "cone,mesp".
+        config: of the first method.
+        n_seeds: runs of each method; the seeds count from the one asked for, or 1.
+        shape: whether every run learns the environments before this one first.
+
+    Raises:
+        UsageError: --config, whose settings a campaign cannot take.
+    """
+    from conevo.campaigns.plan import Plan
+
+    if order.config is not None:
+        raise UsageError("--seeds and --config are mutually exclusive; give settings with --set")
+    first = 1 if order.seed is None else order.seed
+    methods = order.methods
+    settings = dict(order.overrides)
+    parts = [config.task, *methods, config.preset, *(["shaped"] if shape else [])]
+    if settings:
+        text = json.dumps(settings, sort_keys=True, default=str)
+        parts.append(hashlib.blake2b(text.encode(), digest_size=3).hexdigest())
+    return Plan(
+        name=re.sub(r"[^A-Za-z0-9._-]+", "-", "-".join(parts)),
+        title=f"{config.task}: {', '.join(methods)}",
+        produces=(),
+        seeds=tuple(range(first, first + n_seeds)),
+        preset=config.preset,
+        shape=shape,
+        studies=("teams",),
+        factors={"world": (config.address,), "method": methods},
+        settings=settings,
+        place="on the command line",
+    )
+
+
+def compare(order: Order, plan: Plan, dry_run: bool) -> int:
+    """Carry the campaign out on all cores, or print its runs; returns the exit code."""
+    from pathlib import Path
+
+    from conevo.campaigns.campaign import CAMPAIGNS, create
+    from conevo.cli.campaign_run import carry_on, ready
+    from conevo.cli.campaign_text import print_plan
+
+    if dry_run:
+        print_plan(plan.write_out(), order.as_json)
+        return 0
+    execution = ready("processes", order.threads, 1, None, None, order.as_json, order.quiet)
+    path = Path(order.out) if order.out else CAMPAIGNS / plan.name
+    return carry_on(create(plan, path), execution)
