@@ -1,4 +1,4 @@
-"""``conevo run --seeds``: several runs of one or more methods, as a campaign without a plan file."""
+"""``conevo run --seeds``: runs of one or more methods, as a campaign without a plan file."""
 
 from __future__ import annotations
 
