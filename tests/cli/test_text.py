@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import io
 from pathlib import Path
+from typing import Any
 
 import pytest
 from rich.console import Console
 
 from conevo.cli.progress import Display, Pace
-from conevo.cli.text import bars, castes, duration, neurons, number, table
+from conevo.cli.summary import test_text as text_of_test
+from conevo.cli.text import bars, castes, duration, neurons, number, spread, table
 from runs.tiny import evolve_tiny
 
 
@@ -34,6 +36,39 @@ def test_numbers_have_four_digits(value: float | None, text: str) -> None:
 )
 def test_durations(seconds: float, text: str) -> None:
     assert duration(seconds) == text
+
+
+@pytest.mark.parametrize(
+    ("found", "text"),
+    [
+        ({"mean": 2.0, "sd": 0.5, "n": 3, "values": [1.5, 2.0, 2.5]}, "2 +- 0.5"),
+        ({"mean": 2.0, "sd": 0.5, "n": 2, "values": [1.5, None, 2.5]}, "2 +- 0.5 (2 of 3)"),
+        ({"mean": 2.0, "sd": None, "n": 1, "values": [None, 2.0, None]}, "2 (1 of 3)"),
+        ({"mean": None, "sd": None, "n": 0, "values": [None] * 3}, "- (0 of 3)"),
+        ({"mean": 2.0, "sd": 0.0, "values": [2.0]}, "2 (1 of 3)"),  # conevo 0.1.0
+    ],
+)
+def test_a_spread_says_how_many_scenarios_it_is_of(found: dict[str, Any], text: str) -> None:
+    assert spread(found, 3) == text
+    rows = table(["", "value"], [["a", text], ["b", "-"]]).splitlines()
+    assert rows[2].endswith(" -")  # numbers to the right
+
+
+def test_a_run_of_an_older_conevo_is_shown_without_validation() -> None:
+    old = {"mean": 2.0, "sd": 0.0, "values": [2.0]}
+    tested = {
+        "generation": 3,
+        "scenarios": 2,
+        "performance": {"value": old},
+        "fitness": old,
+        "specialization": [0.5],
+        "castes": {"low": 1},
+    }
+    lines = text_of_test({"champion": tested, "generation_0": tested}).splitlines()
+    assert lines[0] == "Testing phase, 2 fresh scenarios (mean +- standard deviation)"
+    assert lines[2].split() == ["fittest", "team", "3", "2", "(1", "of", "2)", "0.5"]
+    assert sum(line.startswith("warning: value is not finite") for line in lines) == 1
+    assert not any("finalists" in line for line in lines)
 
 
 def test_bars_show_the_shape_of_a_series() -> None:

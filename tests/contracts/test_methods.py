@@ -26,10 +26,16 @@ def variants():
             continue
         for evaluation in ("systematic", "shared"):
             yield name, {**config, "evaluation": evaluation, "rounds": ROUNDS}
+        if name == "cone":
+            for type_c in ("team", "off"):
+                yield name, {**config, "evaluation": "shared", "rounds": ROUNDS, "type_c": type_c}
 
 
 VARIANTS = list(variants())
-IDS = [f"{name}-{config.get('evaluation', 'single')}" for name, config in VARIANTS]
+IDS = [
+    "-".join([name, config.get("evaluation", "single"), *filter(None, [config.get("type_c")])])
+    for name, config in VARIANTS
+]
 every_variant = pytest.mark.parametrize(("name", "config"), VARIANTS, ids=IDS)
 
 
@@ -147,7 +153,8 @@ def test_every_team_evaluated_is_counted(name, config):
         assert after.team_evaluations == spent
         assert after.generation - before.generation == (after.phase == "genotypes")
     phases = {state.phase for state in states}
-    assert ("elites" in phases) == name.startswith("cone")
+    has_type_c = name.startswith("cone") and config.get("type_c") != "off"
+    assert ("elites" in phases) == has_type_c
     assert ("lesion" in phases) == ("stagnation_y" in config)
 
 

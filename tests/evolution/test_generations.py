@@ -141,6 +141,68 @@ def test_cone_type_c_reorders_the_elite_and_only_the_elite():
     assert learner.ask(state).teams.tolist() == [[[3], [4]]]
 
 
+# Two robots, one neuron each; the elite of P0 is genotypes 1, 3, of P1 0, 2. Credits in two rounds:
+# P0's ranks 0 and 1, then P1's.
+TWO_ROUNDS = [[2, 0], [1, 5], [0, 3], [1, 2], [2, 1], [4, 0], [0, 3], [6, 6]]
+
+
+@pytest.mark.parametrize(
+    ("type_c", "p0", "p1"),
+    [
+        ("own", [[3, 1], [2.5, 2]], [[2, 0], [4, 3]]),  # means of 1, 4 and of 2, 2; of 2, 6; 3, 3
+        ("team", [[3, 1], [2.5, 1.25]], [[2, 0], [3.75, 1.5]]),  # of 3, 2 and 1, 1.5; 1.5, 6; ...
+    ],
+)
+def test_type_c_is_a_mean_over_as_many_trials_as_type_a(type_c, p0, p1):
+    learner = method(
+        "cone", genotypes=4, elite_portion=0.5, evaluation="shared", rounds=2, type_c=type_c
+    )
+    state = learner.init(replace(SMALL, n_hidden=1, max_hidden=1), root=3)
+    trials = learner.ask(state)
+    wanted = np.array([[1, 4, 2, 3], [9, 7, 8, 6]], float)
+    type_a = wanted.ravel()[trials.teams[:, :, 0]]
+    state = learner.tell(state, trials, Scores(type_a, np.zeros((8, 2))))
+    assert state.elite[:, 0].tolist() == [[1, 3], [0, 2]]
+    trials = learner.ask(state)
+    assert (trials.phase, trials.rounds, trials.teams.shape) == ("elites", 2, (8, 2, 1))
+    for part in np.split(trials.teams[:, :, 0], 2):  # each round tries every rank of both
+        assert part[:2, 0].tolist() == [1, 3]
+        assert part[2:, 1].tolist() == [4, 6]
+    told = learner.tell(state, trials, Scores(np.array(TWO_ROUNDS, float), np.zeros((8, 2))))
+    assert told.elite[:, 0].tolist() == [p0[0], p1[0]]
+    assert np.take(told.fitness[0, 0], told.elite[0, 0]).tolist() == p0[1]
+    assert np.take(told.fitness[1, 0], told.elite[1, 0]).tolist() == p1[1]
+    assert told.team_evaluations == 16
+
+
+@pytest.mark.parametrize(
+    ("config", "n_rounds", "parts"),
+    [
+        ({"evaluation": "systematic"}, 1, 1),  # the thesis'
+        ({"evaluation": "systematic", "type_c_rounds": 3}, 3, 3),
+        ({"evaluation": "shared", "rounds": 5}, 5, 5),
+        ({"evaluation": "shared", "rounds": 5, "fresh_rounds": False}, 5, 1),
+        ({"evaluation": "shared", "rounds": 5, "type_c_rounds": 2}, 2, 2),
+    ],
+)
+def test_how_often_and_in_how_many_parts_the_elite_is_tried(config, n_rounds, parts):
+    learner = method("cone", genotypes=4, elite_portion=0.5, **config)
+    state = learner.init(SMALL, root=3)
+    trials = learner.ask(state)
+    trials = learner.ask(learner.tell(state, trials, scores(trials)))
+    assert (trials.phase, len(trials.teams), trials.rounds) == ("elites", 4 * n_rounds, parts)
+
+
+def test_without_type_c_the_elite_keeps_the_order_of_type_a_and_nothing_is_spent():
+    learner = method("cone", genotypes=4, elite_portion=0.5, type_c="off")
+    state = learner.init(replace(SMALL, n_hidden=1, max_hidden=1), root=3)
+    type_a = np.array([[1, 0], [4, 0], [2, 0], [3, 0], [0, 9], [0, 7], [0, 8], [0, 6]], float)
+    state = learner.tell(state, learner.ask(state), Scores(type_a, np.zeros((8, 2))))
+    assert (state.phase, state.team_evaluations) == ("fittest", 8)
+    assert state.elite[:, 0].tolist() == [[1, 3], [0, 2]]
+    assert learner.ask(state).teams.tolist() == [[[1], [4]]]
+
+
 def marked_generation(name, specialization, n_robots=3, **config):
     """Return a method's state after a generation whose genes name their populations.
 

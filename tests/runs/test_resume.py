@@ -144,11 +144,17 @@ def test_a_foreign_checkpoint_is_refused(tmp_path: Path) -> None:
         run.resume(threads=1)
 
 
-def test_a_lost_champion_is_not_silently_replaced(tmp_path: Path) -> None:
+def test_lost_finalists_are_not_silently_replaced(tmp_path: Path) -> None:
+    run = interrupted(tmp_path / "run")
+    (run.path / "finalists.npz").unlink()
+    with pytest.raises(UsageError, match=r"lost its finalists\.npz"):
+        run.resume(threads=1)
+
+
+def test_a_lost_champion_is_the_first_finalist_again(tmp_path: Path) -> None:
     run = interrupted(tmp_path / "run")
     (run.path / "champion.npz").unlink()
-    with pytest.raises(UsageError, match=r"lost its champion\.npz"):
-        run.resume(threads=1)
+    assert content(run.resume(threads=1).path) == content(evolve_tiny(tmp_path / "whole").path)
 
 
 def test_a_run_made_with_other_kernels_is_refused(tmp_path: Path) -> None:

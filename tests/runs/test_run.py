@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
 from pathlib import Path
@@ -14,9 +15,10 @@ import conevo
 from conevo.errors import EnvironmentFailure, UsageError
 from conevo.evolution.methods.registry import METHODS
 from conevo.rng import fold
-from conevo.runs.champions import Team, sampled_generations
+from conevo.runs.champions import Team, finalists, sampled_generations
 from conevo.runs.config import resolve
 from conevo.runs.run import start
+from conevo.runs.testing import shrinkage, spread
 from runs.tiny import TASK, content, evolve_tiny, tiny_settings
 
 
@@ -95,17 +97,105 @@ def test_the_record_of_a_generation(tmp_path: Path) -> None:
     assert (homcne["sst"], homcne["gst"], homcne["n_hidden"]) == (None, None, [2])
 
 
-def test_the_champion_is_the_fittest_team_of_all_generations(tmp_path: Path) -> None:
-    run = evolve_tiny(tmp_path / "run", world__iterations=60, world__low_range=0.3)
-    fitness = [record["team_fitness"] for record in run.generations()]
-    assert max(fitness) > 0
-    champion = run.champion
-    assert champion is not None
-    assert champion.generation == int(np.argmax(fitness))
-    assert champion.mean_fitness == max(fitness)
-    kept = run.team(champion.generation)
-    assert kept is not None
-    np.testing.assert_array_equal(champion.genes, kept.genes)
+def test_the_champion_is_the_best_of_the_fittest_teams_in_scenarios_of_their_own(
+    tmp_path: Path,
+) -> None:
+    lucky = 0
+    for seed in (1, 2, 3):
+        changes = {"run__seed": seed, "run__n_finalists": 3, "run__n_validations": 4}
+        run = evolve_tiny(
+            tmp_path / f"{seed}", world__iterations=60, world__low_range=0.3, **changes
+        )
+        records, champion, result = run.generations(), run.champion, run.test_result
+        assert champion is not None
+        assert result is not None
+        about = result["validation"]
+        by_fitness = sorted(records, key=lambda one: -one["team_fitness"])[:3]
+        assert [one["generation"] for one in about["finalists"]] == [
+            one["generation"] for one in by_fitness
+        ]
+        world = conevo.world(TASK, **run.config.tables()["world"])
+        keys = [fold(seed, "validation", k) for k in range(4)]
+        means = []
+        for one, record in zip(about["finalists"], by_fitness, strict=True):
+            team = run.team(one["generation"])
+            assert team is not None
+            played = conevo.Rollout(world, n_threads=1).evaluate(
+                *team.as_trial(), world.scenarios(keys)
+            )
+            fitness = played.fitness[0].astype(float).mean(axis=1)
+            assert one["validation"]["fitness"]["values"] == fitness.tolist()
+            areas = played.performance["area"][0].tolist()
+            assert one["validation"]["performance"]["area"]["values"] == areas
+            assert one["selection"] == {
+                "fitness": record["team_fitness"],
+                "performance": record["performance"],
+            }
+            means.append(fitness.mean())
+        assert max(means) > 0
+        best = about["finalists"][int(np.argmax(means))]["generation"]
+        assert champion.generation == about["chosen"] == best
+        assert result["champion"]["generation"] == best
+        kept = run.team(best)
+        assert kept is not None
+        np.testing.assert_array_equal(champion.genes, kept.genes)
+        lucky += best != by_fitness[0]["generation"]
+    assert lucky > 0  # at least once the best by selection was not the best
+
+
+def test_while_a_run_goes_on_its_champion_is_the_fittest_so_far(tmp_path: Path) -> None:
+    seen: list[int] = []
+
+    def look(run: conevo.Run, record: dict[str, Any]) -> None:
+        fitness = [one["team_fitness"] for one in run.generations()]
+        champion = run.champion
+        assert champion is not None
+        assert champion.generation == int(np.argmax(fitness))
+        seen.append(champion.generation)
+
+    settings = tiny_settings("cone", world__iterations=60, world__low_range=0.3)
+    run = start(resolve(TASK, preset="smoke", overrides=settings), tmp_path / "run", threads=1)
+    run.resume(threads=1, watch=look)
+    assert len(set(seen)) > 1
+
+
+def test_finalists_do_not_depend_on_how_often_or_in_which_order_teams_came() -> None:
+    teams = [make_team(0, 2, 2), make_team(1, 1, 1), make_team(2, math.nan, 9), make_team(3, 1, 3)]
+    teams += [make_team(4, 5, 5), make_team(5, 0, 2)]
+    for order in itertools.permutations(teams):
+        found: list[Team] = []
+        for team in [*order, *order[2:]]:
+            found = finalists(found, team, 4)
+        assert [team.generation for team in found] == [4, 0, 3, 1]
+    assert [one.generation for one in finalists(teams[:2], teams[2], 9)] == [0, 1, 2]
+
+
+def test_the_shrinkage_of_a_champion_by_hand() -> None:
+    def part(fitness: Any, value: Any) -> dict[str, Any]:
+        return {"fitness": fitness, "performance": {"value": value}}
+
+    a, b, c, d = ({"mean": mean} for mean in (3.0, 6.0, 2.0, None))
+    chosen = {"generation": 7, "selection": part(4.0, -1.0), "validation": part(a, b)}
+    other = {"generation": 9, "selection": part(5.0, 1.0), "validation": part(a, b)}
+    about = {"chosen": 7, "finalists": [other, chosen]}
+    assert shrinkage({"champion": part(c, d), "validation": about}) == [
+        {"measure": "fitness", "selection": 4, "validation": a, "test": c, "ratio": 0.5},
+        {"measure": "value", "selection": -1, "validation": b, "test": d, "ratio": None},
+    ]
+
+
+@pytest.mark.parametrize(
+    ("values", "expected"),
+    [
+        ([1, 3], {"mean": 2, "sd": math.sqrt(2), "n": 2, "values": [1, 3]}),
+        ([math.nan, 4, math.inf], {"mean": 4, "sd": None, "n": 1, "values": [None, 4, None]}),
+        ([-math.inf], {"mean": None, "sd": None, "n": 0, "values": [None]}),
+    ],
+)
+def test_values_that_are_not_finite_keep_their_place(
+    values: list[float], expected: dict[str, Any]
+) -> None:
+    assert spread(np.array(values, np.float32)) == expected
 
 
 def test_only_a_fitter_finite_team_becomes_champion() -> None:

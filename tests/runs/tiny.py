@@ -24,6 +24,8 @@ TINY: dict[str, Any] = {
     "run.generations": 5,
     "run.epochs": 2,
     "run.fittest_epochs": 2,
+    "run.n_finalists": 2,
+    "run.n_validations": 3,
     "run.n_tests": 3,
     "world.n_robots": 3,
     "world.iterations": 12,
@@ -108,7 +110,11 @@ def content(path: Path) -> dict[str, Any]:
     lines = (path / "generations.jsonl").read_text().splitlines()
     found["generations"] = [json.loads(line) | {"seconds": 0} for line in lines]
     found["test"] = json.loads((path / "test.json").read_text())
-    for file in [path / "champion.npz", *sorted((path / "teams").iterdir())]:
+    for file in [
+        path / "champion.npz",
+        path / "finalists.npz",
+        *sorted((path / "teams").iterdir()),
+    ]:
         found[file.name] = arrays(file)
     (checkpoint,) = path.glob("checkpoint-?.npz")
     found["checkpoint"] = arrays(checkpoint)

@@ -22,7 +22,7 @@ run with every seed::
     [[where]]                      # of the runs that all conditions hold for; later ones win
     method = ["ccga", "mesp", "cone"]
     preset = "desk"
-    settings = { "method.fresh_rounds" = true }
+    settings = { "method.n_elitist" = 5 }
     # shape = true                 # also here, for some of the runs
 
     [[where]]                      # a factor of some runs only

@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from conevo.cli.summary import generations_table, spaced, title
-from conevo.cli.text import castes, count, duration, number, table
+from conevo.cli.text import castes, count, duration, number, spread, table
 from conevo.runs.code import changes_text
 from conevo.runs.run import Run
 from conevo.runs.shaping import Shaping
@@ -87,7 +87,7 @@ def stages_test_text(results: list[dict[str, Any]]) -> str:
         mean_s = sum(tested["specialization"]) / len(tested["specialization"])
         rows.append(
             [str(tested["stage"]), tested["task"]]
-            + ["-" if s is None else f"{number(s['mean'])} +- {number(s['sd'])}" for s in spreads]
+            + ["-" if s is None else spread(s, tested["scenarios"]) for s in spreads]
             + [number(mean_s), castes(tested["castes"])]
         )
     last = results[0]
@@ -109,14 +109,13 @@ def _chosen(records: list[dict[str, Any]], n: int) -> list[dict[str, Any]]:
 
 def _table(stages: list[Run]) -> str:
     """Return one line per stage; a champion's performance is that of the testing phase."""
-    tested = [
-        run.test_result["champion"]["performance"] if run.test_result else {} for run in stages
-    ]
-    measures = list(dict.fromkeys(name for performance in tested for name in performance))
+    nothing: dict[str, Any] = {"performance": {}, "scenarios": 0}
+    tests = [run.test_result["champion"] if run.test_result else nothing for run in stages]
+    measures = list(dict.fromkeys(name for tested in tests for name in tested["performance"]))
     rows = []
-    for stage, (run, performance) in enumerate(zip(stages, tested, strict=True), start=1):
+    for stage, (run, tested) in enumerate(zip(stages, tests, strict=True), start=1):
         records, champion = run.generations(), run.champion
-        spreads = [performance.get(name) for name in measures]
+        spreads = [tested["performance"].get(name) for name in measures]
         rows.append(
             [
                 str(stage),
@@ -125,10 +124,7 @@ def _table(stages: list[Run]) -> str:
                 f"{len(records)}/{run.config.run.generations}",
                 count(records[-1]["team_evaluations"] if records else 0),
                 "-" if champion is None else str(champion.generation),
-                *(
-                    "-" if s is None else f"{number(s['mean'])} +- {number(s['sd'])}"
-                    for s in spreads
-                ),
+                *("-" if s is None else spread(s, tested["scenarios"]) for s in spreads),
             ]
         )
     head = ["stage", "task", "status", "generations", "evaluations", "champion of", *measures]

@@ -8,17 +8,19 @@ from typing import Any
 
 import click
 
-from conevo.cli.text import castes, count, duration, neurons, number, table
+from conevo.cli.text import castes, count, duration, mean, n_finite, neurons, number, spread, table
 from conevo.evolution.methods.registry import METHODS
 from conevo.runs.code import changes_text, sessions_of
 from conevo.runs.config import RunConfig, resolve
 from conevo.runs.run import Run
+from conevo.runs.testing import shrinkage
 
 __all__ = [
     "generations_table",
     "next_commands",
     "print_end",
     "run_text",
+    "shrinkage_text",
     "spaced",
     "test_text",
     "title",
@@ -89,28 +91,58 @@ def generations_table(records: list[dict[str, Any]], *lead: str) -> str:
 
 def test_text(result: dict[str, Any]) -> str:
     """Return the testing phase as a table."""
-    some = next(iter(result.values()))
-    measures = list(some["performance"])
+    teams = {name: tested for name, tested in result.items() if name != "validation"}
+    some = next(iter(teams.values()))
+    n, measures = some["scenarios"], list(some["performance"])
     rows = []
-    for name, tested in result.items():
-        spread = [tested["performance"][m] for m in measures]
+    for name, tested in teams.items():
         mean_s = sum(tested["specialization"]) / len(tested["specialization"])
         rows.append(
             [
                 "first fittest team" if name == "generation_0" else "fittest team",
                 str(tested["generation"]),
-                *(f"{number(s['mean'])} +- {number(s['sd'])}" for s in spread),
+                *(spread(tested["performance"][measure], n) for measure in measures),
                 number(mean_s),
             ]
         )
     head = ["", "generation", *measures, "S"]
-    teams = "\n".join(
+    lines = [f"Testing phase, {n} fresh scenarios (mean +- standard deviation)", table(head, rows)]
+    lines += [
         f"castes of the {row[0]}: {castes(tested['castes'])}"
-        for row, tested in zip(rows, result.values(), strict=True)
-    )
+        for row, tested in zip(rows, teams.values(), strict=True)
+    ]
+    lacking = [
+        name
+        for name in measures
+        if any(n_finite(tested["performance"][name]) < n for tested in teams.values())
+    ]
+    if lacking:
+        lines.append(
+            f"warning: {', '.join(lacking)} is not finite in some scenarios; mean and standard "
+            f"deviation are of the others (how many, in brackets)"
+        )
+    if "validation" in result:
+        lines += ["", shrinkage_text(result)]
+    return "\n".join(lines)
+
+
+def shrinkage_text(result: dict[str, Any]) -> str:
+    """Return what the champion was chosen by, and how much of it is left in fresh scenarios."""
+    about, n_tests = result["validation"], result["champion"]["scenarios"]
+    rows = [
+        [
+            one["measure"],
+            number(one["selection"]),
+            mean(one["validation"], about["scenarios"]),
+            mean(one["test"], n_tests),
+            number(one["ratio"]),
+        ]
+        for one in shrinkage(result)
+    ]
     return (
-        f"Testing phase, {some['scenarios']} fresh scenarios (mean +- standard deviation)\n"
-        f"{table(head, rows)}\n{teams}"
+        f"The fittest team, of generation {about['chosen']}, is the best of "
+        f"{len(about['finalists'])} finalists in {about['scenarios']} validation scenarios\n"
+        + table(["", "selection", "validation", "test", "test / selection"], rows)
     )
 
 

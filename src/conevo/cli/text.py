@@ -5,10 +5,22 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
+from typing import Any
 
-__all__ = ["bars", "castes", "count", "duration", "neurons", "number", "table"]
+__all__ = [
+    "bars",
+    "castes",
+    "count",
+    "duration",
+    "neurons",
+    "mean",
+    "n_finite",
+    "number",
+    "spread",
+    "table",
+]
 
-NUMBER = re.compile(r"-|[-+.,/\de]+( \+- .*)?")
+NUMBER = re.compile(r"[-+.,/\de]+( (\+-|\().*)?")
 
 
 def number(value: float | None) -> str:
@@ -16,6 +28,33 @@ def number(value: float | None) -> str:
     if value is None:
         return "-"
     return f"{value:.0f}" if 1000 <= abs(value) < 1e7 else f"{value:.4g}"
+
+
+def spread(found: Mapping[str, Any], n_scenarios: int) -> str:
+    """Return mean and standard deviation of a measure: "0.9 +- 0.1", "0.8 (1 of 5)" if 4 have none.
+
+    Args:
+        found: "mean", "sd", "values".
+        n_scenarios: of the test.
+    """
+    deviation = f" +- {number(found['sd'])}" if n_finite(found) > 1 else ""
+    return f"{number(found['mean'])}{deviation}{_share(found, n_scenarios)}"
+
+
+def mean(found: Mapping[str, Any], n_scenarios: int) -> str:
+    """Return the mean of a measure, without its standard deviation."""
+    return f"{number(found['mean'])}{_share(found, n_scenarios)}"
+
+
+def _share(found: Mapping[str, Any], n_scenarios: int) -> str:
+    """Return how many scenarios have a finite value, nothing if all have."""
+    n = n_finite(found)
+    return "" if n == n_scenarios else f" ({n} of {n_scenarios})"
+
+
+def n_finite(found: Mapping[str, Any]) -> int:
+    """Return how many values of a measure are finite; conevo 0.1.0 kept no others."""
+    return int(found.get("n", len(found["values"])))
 
 
 def count(value: int) -> str:

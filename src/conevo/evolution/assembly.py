@@ -39,14 +39,14 @@ class SchemeConfig:
             published with.
         rounds: K, trials of each genotype under "shared". More makes fitness less noisy.
             Choice: 10, as ESP.
-        fresh_rounds: whether each round of "shared" is played in scenarios of its own: for the same
-            evaluations every genotype meets ``rounds`` times as many, and all meet the same ones.
-            Choice: off, so that all teams of a generation meet the same scenarios.
+        fresh_rounds: whether each round is played in scenarios of its own: for the same evaluations
+            every genotype meets ``rounds`` times as many, and all genotypes meet the same ones.
+            Choice: on, since without it co-evolved teams do not learn the shipped example.
     """
 
     evaluation: Literal["systematic", "shared"] = "systematic"
     rounds: Annotated[int, Ge(1)] = 10
-    fresh_rounds: bool = False
+    fresh_rounds: bool = True
 
     @property
     def n_parts(self) -> int:

@@ -1,7 +1,8 @@
-"""Teams worth keeping: the fittest of the run so far and of some generations."""
+"""Teams worth keeping: the fittest of the run so far, its finalists, those of some generations."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy.typing as npt
 
 from conevo.evolution.protocol import State
 
-__all__ = ["Team", "fittest_team", "sampled_generations"]
+__all__ = ["Finalists", "Team", "finalists", "fittest_team", "sampled_generations"]
 
 
 @dataclass(frozen=True)
@@ -35,6 +36,15 @@ class Team:
         """Mean credit of the robots."""
         return float(self.fitness.mean())
 
+    @property
+    def rank(self) -> float:
+        """What sorts teams: the fittest first, those whose fitness is not finite last.
+
+        Choice: by the robots' mean credit, what methods select on; task performance is never
+        selected on. Of equal teams the earlier is first.
+        """
+        return -self.mean_fitness if np.isfinite(self.mean_fitness) else np.inf
+
     def as_trial(self) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.int32]]:
         """Return a genotype pool [R * U, G] and the one team [1, R, U] that uses all of it."""
         rows = np.arange(self.active.size, dtype=np.int32).reshape(self.active.shape)
@@ -42,18 +52,63 @@ class Team:
         return pool, np.where(self.active, rows, np.int32(-1))[None]
 
     def is_fitter_than(self, other: Team | None) -> bool:
-        """Whether this team replaces ``other`` as the champion of a run.
+        """Whether this team is fitter than an earlier one, or there is none."""
+        return other is None or self.rank < other.rank
 
-        Choice: the champion is the fittest team of any generation by its robots' mean credit (what
-        methods select on; task performance is never selected on), the earlier one if equal.
-        """
-        if not np.isfinite(self.mean_fitness):
-            return other is None
-        return (
-            other is None
-            or not np.isfinite(other.mean_fitness)
-            or self.mean_fitness > other.mean_fitness
+
+@dataclass(frozen=True)
+class Finalists:
+    """Teams as rows of arrays, the fittest first: what is kept of them in a file.
+
+    Attributes:
+        generation: [F] int64.
+        genes: [F, R, U, G] float32.
+        active: [F, R, U] bool.
+        fitness: [F, R] float64.
+        specialization: [F, R] float64.
+    """
+
+    generation: npt.NDArray[np.int64]
+    genes: npt.NDArray[np.float32]
+    active: npt.NDArray[np.bool_]
+    fitness: npt.NDArray[np.float64]
+    specialization: npt.NDArray[np.float64]
+
+    @staticmethod
+    def of(teams: Sequence[Team]) -> Finalists:
+        """Return one team or more as arrays, in their order."""
+        return Finalists(
+            generation=np.array([team.generation for team in teams], dtype=np.int64),
+            genes=np.stack([team.genes for team in teams]),
+            active=np.stack([team.active for team in teams]),
+            fitness=np.stack([team.fitness for team in teams]),
+            specialization=np.stack([team.specialization for team in teams]),
         )
+
+    def teams(self) -> list[Team]:
+        """Return the teams, in their order."""
+        columns = (self.genes, self.active, self.fitness, self.specialization)
+        return [
+            Team(int(generation), *rest)
+            for generation, *rest in zip(self.generation, *columns, strict=True)
+        ]
+
+    def as_trials(self) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.int32]]:
+        """Return a genotype pool [F * R * U, G] and the teams [F, R, U] that use all of it."""
+        rows = np.arange(self.active.size, dtype=np.int32).reshape(self.active.shape)
+        pool = self.genes.reshape(-1, self.genes.shape[-1])
+        return pool, np.where(self.active, rows, np.int32(-1))
+
+
+def finalists(teams: Sequence[Team], newest: Team, most: int) -> list[Team]:
+    """Return the fittest of some teams and one more, at most ``most``, the fittest first.
+
+    Which they are in the end depends on the generations alone, in whatever order and however often
+    each was added, so that a resumed run and the beginning of a longer one have the same.
+    """
+    by_generation = {newest.generation: newest} | {team.generation: team for team in teams}
+    ranked = sorted(by_generation.values(), key=lambda team: (team.rank, team.generation))
+    return ranked[:most]
 
 
 def fittest_team(state: State, generation: int) -> Team:

@@ -94,6 +94,10 @@ class RunSettings:
         target: the run ends when the fittest team's main task performance is as good as this: at
             least, or, of a measure of which smaller is better, at most.
         checkpoint_every: generations between two checkpoints.
+        n_finalists: the fittest teams of the run, which are validated at its end. Choice: 10, as
+            the thesis says nothing of how a run's best team is found. 1 leaves the choice to the
+            scenarios of the evolution phase.
+        n_validations: scenarios in which finalists are validated. Choice: 20, as many as tests.
         n_tests: fresh scenarios of the testing phase (5.4: 20).
     """
 
@@ -105,6 +109,8 @@ class RunSettings:
     budget_evaluations: Annotated[int, Ge(0)] = 0
     target: float | None = None
     checkpoint_every: Annotated[int, Ge(1)] = 1
+    n_finalists: Annotated[int, Ge(1), Le(1000)] = 10
+    n_validations: Annotated[int, Ge(1)] = 20
     n_tests: Annotated[int, Ge(1)] = 20
 
 

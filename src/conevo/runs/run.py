@@ -10,14 +10,14 @@ from typing import Any
 from conevo.errors import UsageError
 from conevo.evolution.protocol import State
 from conevo.runs import provenance
-from conevo.runs.champions import Team, fittest_team, sampled_generations
+from conevo.runs.champions import Team, finalists, fittest_team, sampled_generations
 from conevo.runs.code import last_code, refuse_other_code
 from conevo.runs.config import RunConfig, resolve
 from conevo.runs.directory import refuse_existing
 from conevo.runs.lab import Lab
 from conevo.runs.loop import evolve_generations
 from conevo.runs.store import Store, create
-from conevo.runs.testing import test_team
+from conevo.runs.testing import test_team, validate
 from conevo.worlds.measures import measures_of
 
 __all__ = ["RUNS", "Run", "evolve", "start"]
@@ -140,12 +140,20 @@ class Run:
 
     @property
     def champion(self) -> Team | None:
-        """The fittest team of all generations so far, None before the first has ended."""
+        """The run's best team, None before the first generation has ended.
+
+        Of a finished run it is the finalist that validation chose, of any other the fittest so far
+        in the scenarios that all generations' fittest teams meet.
+        """
         return self._store.load_champion()
 
     @property
     def test_result(self) -> Record | None:
-        """The testing phase of a finished run: "champion" and "generation_0"; None before."""
+        """The testing phase of a finished run, None before.
+
+        "champion" and "generation_0" are tests of these teams, "validation" says how the champion
+        was chosen; runs of conevo 0.1.0 have none.
+        """
         return self._store.read_test()
 
     @property
@@ -258,9 +266,7 @@ class Run:
             self.refuse_finished()
             lab = self._equip(threads)
             stopped_by = self._evolve(lab, watch, remark)
-            champion, first = self._best_so_far(), self._store.load_team(0)
-            tested = {"champion": champion, "generation_0": first or champion}
-            self._store.write_test({name: self._test(lab, team) for name, team in tested.items()})
+            self._conclude(lab)
             about = self.provenance | {"finished": provenance.now(), "stopped_by": stopped_by}
             self._store.write_provenance(about)
             self._store.seal()
@@ -308,11 +314,29 @@ class Run:
             seed=self.config.run.seed if seed is None else seed,
         )
 
-    def _best_so_far(self) -> Team:
-        champion = self.champion
-        if champion is None:
-            raise UsageError(f"{self.path} has lost its champion.npz: it cannot be resumed")
-        return champion
+    def _conclude(self, lab: Lab) -> None:
+        """Choose the champion among the finalists, and test it."""
+        store, settings = self._store, self.config.run
+        champion, validation = validate(
+            lab.rollout,
+            lab.world,
+            self._best_so_far(),
+            n_scenarios=settings.n_validations,
+            seed=settings.seed,
+            credit=settings.credit,
+            selected={one["generation"]: one["performance"] for one in store.read_generations()},
+        )
+        store.save_champion(champion)
+        tested = {"champion": champion, "generation_0": store.load_team(0) or champion}
+        result = {name: self._test(lab, team) for name, team in tested.items()}
+        store.write_test(result | {"validation": validation})
+
+    def _best_so_far(self) -> list[Team]:
+        """Return the finalists of a run that has at least one generation."""
+        teams = self._store.load_finalists()
+        if not teams:
+            raise UsageError(f"{self.path} has lost its finalists.npz: it cannot be resumed")
+        return teams
 
     def refuse_finished(self) -> None:
         """Raise UsageError if there is nothing left to do."""
@@ -348,7 +372,8 @@ class Run:
         if problem and remark is not None:
             remark(f"{problem}; going on from generation {state.generation} instead")
         records = store.cut_generations(state.generation)
-        champion = self._best_so_far() if records else None
+        champion, best = self.champion, self._best_so_far() if records else []
+        best = [team for team in best if team.generation < state.generation]  # others come again
         kept = sampled_generations(settings.generations)
         newest = saved = state
         about = self.provenance
@@ -361,11 +386,14 @@ class Run:
         store.write_provenance(about | {"sessions": [*about["sessions"], session]})
 
         def keep(state: State, record: Record) -> None:
-            nonlocal champion, newest, saved
+            nonlocal champion, best, newest, saved
             team = fittest_team(state, record["generation"])
-            if team.is_fitter_than(champion):
-                store.save_champion(team)
-                champion = team
+            best = finalists(best, team, settings.n_finalists)
+            if any(one is team for one in best):
+                store.save_finalists(best)
+            if champion is None or champion.generation != best[0].generation:
+                champion = best[0]
+                store.save_champion(champion)
             if team.generation in kept:
                 store.save_team(team)
             store.append(record)

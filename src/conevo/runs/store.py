@@ -6,7 +6,8 @@
     provenance.json             versions, kernel hash, machine, sessions; replaced whole
     origin.npz                  the first state, if the run begins with the populations of another
     generations.jsonl           one line per generation, on the disk before the next begins
-    champion.npz                the fittest team so far
+    finalists.npz               the fittest teams so far
+    champion.npz                the first of them; of a finished run the one that validation chose
     teams/generation-0000.npz   the fittest team of some generations
     checkpoint-a.npz, -b.npz    the method's state, written in turn
     test.json                   the testing phase
@@ -22,6 +23,7 @@ from __future__ import annotations
 
 import json
 import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +31,7 @@ from conevo.errors import UsageError
 from conevo.evolution.protocol import State
 from conevo.reading import DamagedFile, read_bytes, read_json, read_json_lines, whole_lines
 from conevo.runs import checkpoint
-from conevo.runs.champions import Team
+from conevo.runs.champions import Finalists, Team
 from conevo.runs.config import RunConfig, resolve
 from conevo.runs.directory import CONFIG, Directory, appearing, as_json
 from conevo.runs.durable import append_line, replace_file, writing
@@ -38,7 +40,7 @@ __all__ = ["Store", "create"]
 
 Record = dict[str, Any]
 PROVENANCE, GENERATIONS, TEST = "provenance.json", "generations.jsonl", "test.json"
-CHAMPION, ORIGIN = "champion.npz", "origin.npz"
+CHAMPION, FINALISTS, ORIGIN = "champion.npz", "finalists.npz", "origin.npz"
 CHECKPOINTS = ("checkpoint-a.npz", "checkpoint-b.npz")
 
 
@@ -146,8 +148,19 @@ class Store(Directory):
     # --- teams ------------------------------------------------------------------------------------
 
     def save_champion(self, team: Team) -> None:
-        """Replace the fittest team so far."""
+        """Replace the run's champion."""
         checkpoint.save(self.path / CHAMPION, team, self._identity())
+
+    def save_finalists(self, teams: Sequence[Team]) -> None:
+        """Replace the fittest teams so far; they are ranked."""
+        checkpoint.save(self.path / FINALISTS, Finalists.of(teams), self._identity())
+
+    def load_finalists(self) -> list[Team]:
+        """Return the fittest teams so far, the fittest first; none before the first generation."""
+        path = self.path / FINALISTS
+        if not path.is_file():
+            return []
+        return checkpoint.load(path, Finalists, self._identity()).teams()
 
     def save_team(self, team: Team) -> None:
         """Keep the fittest team of a generation."""
@@ -157,7 +170,7 @@ class Store(Directory):
         checkpoint.save(path, team, self._identity())
 
     def load_champion(self) -> Team | None:
-        """Return the fittest team so far, None before the first generation's end."""
+        """Return the run's champion, None before the first generation's end."""
         return self._load_team(self.path / CHAMPION)
 
     def load_team(self, generation: int) -> Team | None:

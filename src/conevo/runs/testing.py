@@ -1,22 +1,81 @@
-"""The testing phase: the fittest team of a run, re-executed in fresh scenarios.
+"""What follows evolution: finalists are validated, then the champion is tested.
 
-Nitschke 2009, section 5.4: evolution phase, then testing phase with 20 executions.
+Nitschke 2009, section 5.4: evolution phase, then testing phase with 20 executions. Neither is
+counted in a run's team evaluations.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from conevo.rng import fold
-from conevo.runs.champions import Team
+from conevo.runs.champions import Finalists, Team
 from conevo.runs.evaluation import describe
 from conevo.worlds.protocol import World
 from conevo.worlds.rollout import Rollout
 
-__all__ = ["test_team"]
+__all__ = ["shrinkage", "spread", "test_team", "validate"]
+
+
+def validate(
+    rollout: Rollout,
+    world: World,
+    finalists: Sequence[Team],
+    *,
+    n_scenarios: int,
+    seed: int,
+    credit: str,
+    selected: Mapping[int, Mapping[str, float | None]],
+) -> tuple[Team, dict[str, Any]]:
+    """Choose the champion among finalists, in scenarios that no generation has met.
+
+    The best of many generations on the same few scenarios was lucky in them: the more generations,
+    the luckier. Scenarios of their own tell the lucky ones from the good ones.
+
+    Choice: the champion is the finalist whose robots have the highest mean fitness over all
+    validation scenarios, one with a scenario that is not finite last, of equal ones the fittest by
+    selection.
+
+    Args:
+        rollout: the simulator.
+        world: the task.
+        finalists: the fittest teams of the run, the fittest first.
+        n_scenarios: validation scenarios, the same for all.
+        seed: the run's.
+        credit: as in ``RunSettings``.
+        selected: task performance of each finalist's generation in the scenarios it was chosen on.
+
+    Returns:
+        The champion, and plain data: the scenarios, the generation chosen, and of each finalist
+        its generation, its robots' mean fitness and its performance: at "selection", and in
+        "validation" as ``spread`` gives them.
+    """
+    scenarios = world.scenarios([fold(seed, "validation", k) for k in range(n_scenarios)])
+    outcome = rollout.evaluate(*Finalists.of(finalists).as_trials(), scenarios)
+    fitness = outcome.fitness.astype(np.float64).mean(axis=2)
+    robots = len(finalists[0].fitness) if credit == "team" else 1  # whose sum each is credited with
+    rows = [
+        {
+            "generation": team.generation,
+            "selection": {
+                "fitness": _finite(team.mean_fitness / robots),
+                "performance": dict(selected[team.generation]),
+            },
+            "validation": {
+                "fitness": spread(fitness[k]),
+                "performance": {name: spread(v[k]) for name, v in outcome.performance.items()},
+            },
+        }
+        for k, team in enumerate(finalists)
+    ]
+    means = np.where(np.isfinite(fitness).all(axis=1), fitness.mean(axis=1), -np.inf)
+    champion = finalists[int(np.argmax(means))]
+    about = {"scenarios": n_scenarios, "chosen": champion.generation, "finalists": rows}
+    return champion, about
 
 
 def test_team(
@@ -25,8 +84,8 @@ def test_team(
     """Re-execute a team in scenarios that no generation has met.
 
     Returns:
-        Plain data: the team's generation; mean, sd and all values of each performance measure and
-        of the robots' mean fitness; S and caste of each robot over all scenarios; the caste table.
+        Plain data: the team's generation; ``spread`` of each performance measure and of the robots'
+        mean fitness; S and caste of each robot over all scenarios; the caste table.
     """
     scenarios = world.scenarios([fold(seed, "test", k) for k in range(n_scenarios)])
     outcome = rollout.evaluate(*team.as_trial(), scenarios)
@@ -36,8 +95,8 @@ def test_team(
         "generation": team.generation,
         "scenarios": n_scenarios,
         "seed": seed,
-        "performance": {name: _spread(v[0]) for name, v in outcome.performance.items()},
-        "fitness": _spread(fitness),
+        "performance": {name: spread(v[0]) for name, v in outcome.performance.items()},
+        "fitness": spread(fitness),
         "specialization": [round(value, 6) for value in portrait.specialization],
         "labels": portrait.labels,
         "castes": portrait.castes,
@@ -45,12 +104,48 @@ def test_team(
     }
 
 
-def _spread(values: npt.NDArray[Any]) -> dict[str, Any]:
-    """Return mean, sample standard deviation (0 for a single value) and the finite values."""
+def shrinkage(result: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Return how much of what a champion was chosen by is left in scenarios that did not choose it.
+
+    Args:
+        result: the testing phase of a run, with its "validation".
+
+    Returns:
+        A row for its robots' mean fitness ("fitness"), which is what chose it, and for each
+        performance measure: its mean at "selection", its ``spread`` in "validation" and "test", and
+        the "ratio" of test to selection, None where selection has no positive value.
+    """
+    about, tested = result["validation"], result["champion"]
+    chosen = next(one for one in about["finalists"] if one["generation"] == about["chosen"])
+    parts = (chosen["selection"], chosen["validation"], tested)
+    found = {"fitness": [part["fitness"] for part in parts]}
+    found |= {name: [part["performance"][name] for part in parts] for name in tested["performance"]}
+    rows = []
+    for measure, (selection, validation, test) in found.items():
+        is_positive = selection is not None and selection > 0 and test["mean"] is not None
+        ratio = test["mean"] / selection if is_positive else None
+        row = {"measure": measure, "selection": selection, "validation": validation, "test": test}
+        rows.append(row | {"ratio": ratio})
+    return rows
+
+
+def spread(values: npt.NDArray[Any]) -> dict[str, Any]:
+    """Return the values of one team's scenarios, a row each, and what they amount to.
+
+    A value that is not a finite number keeps its scenario's place as None and does not count: "n"
+    says how many do, "mean" is theirs (None if there are none), "sd" their sample standard
+    deviation (None below two).
+    """
     numbers = values.astype(np.float64)
     finite = numbers[np.isfinite(numbers)]
     return {
         "mean": float(finite.mean()) if finite.size else None,
-        "sd": float(finite.std(ddof=1)) if finite.size > 1 else 0.0,
-        "values": [float(value) for value in finite],
+        "sd": float(finite.std(ddof=1)) if finite.size > 1 else None,
+        "n": int(finite.size),
+        "values": [_finite(value) for value in numbers],
     }
+
+
+def _finite(value: float) -> float | None:
+    """Return a number that JSON can hold."""
+    return float(value) if np.isfinite(value) else None

@@ -47,6 +47,12 @@ class ConeConfig(MespConfig):
             to be recombined" (7.1.2).
         gd_aggregate: "mean" or "sum" of the distances of rank-paired elites. Choice: the mean.
         threshold_step: change of a threshold (section 3.5: 1 %). Choice: absolute.
+        type_c: whose fitness ranks the elite (type C): "own" is that of the robot on trial, as for
+            type A; "team" is the mean of all robots; "off" leaves the order of type A and saves the
+            evaluations. Choice: "own", as eq. 5.4 for type A.
+        type_c_rounds: teams in which each elite controller is tried for type C; 0 means as many as
+            type A has: one if "systematic", ``rounds`` if "shared". Choice: 0, so that type C never
+            overwrites better evidence.
         use_gdm: ask for similar genotypes (the genotype difference metric).
         use_sdm: ask for similar behaviour (the specialization difference metric).
     """
@@ -57,8 +63,16 @@ class ConeConfig(MespConfig):
     gst: Annotated[float, Ge(0), Le(1)] = 0.2
     gd_aggregate: Literal["mean", "sum"] = "mean"
     threshold_step: Annotated[float, Ge(0), Le(1)] = 0.01
+    type_c: Literal["own", "team", "off"] = "own"
+    type_c_rounds: Annotated[int, Ge(0)] = 0
     use_gdm: bool = True
     use_sdm: bool = True
+
+    @property
+    def n_elite_rounds(self) -> int:
+        """How often each elite controller is tried for type C fitness."""
+        as_type_a = self.rounds if self.evaluation == "shared" else 1
+        return self.type_c_rounds or as_type_a
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -107,16 +121,23 @@ class Cone(Mesp):
         """Return the teams of the state's phase."""
         if state.phase != "elites":
             return super().ask(state)
+        config = self.config
         generator = stream(state.root, "elites", state.generation)
-        m = self.config.genotypes
-        return trials(state, elite_teams(state.active, state.elite, m, generator))
+        teams = np.concatenate(
+            [
+                elite_teams(state.active, state.elite, config.genotypes, generator)
+                for _ in range(config.n_elite_rounds)
+            ]
+        )
+        return trials(state, teams, rounds=config.n_elite_rounds if config.fresh_rounds else 1)
 
     def tell(self, state: State, trials: Trials, scores: Scores) -> State:
         """Return the state after these scores."""
         if state.phase == "elites":
             return self.type_c(count(state, trials, scores), scores)
         told = super().tell(state, trials, scores)
-        return replace(told, phase="elites") if state.phase == "genotypes" else told
+        has_elites = state.phase == "genotypes" and self.config.type_c != "off"
+        return replace(told, phase="elites") if has_elites else told
 
     def type_c(self, state: State, scores: Scores) -> State:
         """Return the state with the elite ranked by type C fitness.
@@ -125,8 +146,12 @@ class Cone(Mesp):
         equal type C keep their order by type A, alike in all sub-populations.
         """
         n_populations, _, n_elite = state.elite.shape
-        robot = np.arange(n_populations).repeat(n_elite)
-        by_rank = credit.of_robot(scores.fitness, robot).reshape(n_populations, n_elite)
+        if self.config.type_c == "team":
+            of_trial = scores.fitness.mean(axis=1)
+        else:
+            robot = np.tile(np.arange(n_populations).repeat(n_elite), self.config.n_elite_rounds)
+            of_trial = credit.of_robot(scores.fitness, robot)
+        by_rank = of_trial.reshape(-1, n_populations, n_elite).mean(axis=0)
         fitness = credit.overwrite(state.fitness, state.elite, by_rank)
         fitness[~state.active] = np.nan
         order = ranking(by_rank)[:, None, :]
