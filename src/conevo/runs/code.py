@@ -136,7 +136,8 @@ def _spans(sessions: Sequence[Record], thing: Callable[[Record], str]) -> list[S
     """
     starts = [session["from_generation"] for session in sessions]
     found: list[Span] = []
-    for session, start, end in zip(sessions, starts, [*starts[1:], None], strict=True):
+    ends = [*starts[1:], None][: len(starts)]
+    for session, start, end in zip(sessions, starts, ends, strict=True):
         one = thing(session)
         if found and found[-1][0] == one:
             start = found.pop()[1]
