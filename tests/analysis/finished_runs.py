@@ -37,7 +37,7 @@ TASKS = {
     ),
     "gacc": Task(
         "gacc-v1",
-        ("delivered", "completed", "optimum"),
+        ("delivered", "completed", "delivered_share"),
         None,
         (*(f"{kind}-{what}" for kind in "ABC" for what in ("detector", "gatherer")), "move"),
     ),
@@ -183,10 +183,18 @@ def _run(
             "measure": [task.measures[0]],
             "optimum": [task.optimum],
             "n_robots": [ROBOTS],
+            "exchanges": [2.0 if is_cone else np.nan],
+            "exchange_share": [0.02 if is_cone else np.nan],
             "run_id": [f"{crc32(run.encode()):08x}"],
             "conevo": ["0.1.0"],
             "warp": ["1.19.0"],
             "kernel_hash": ["0123456789abcdef"],
+        },
+        "measures": {
+            "run": [run] * len(task.measures),
+            "measure": list(task.measures),
+            "unit": ["points"] * len(task.measures),
+            "larger_is_better": [1.0] * len(task.measures),
         },
         "scores": _scores(run, task, level, [names[k] for k in present], rng),
         "generations": {

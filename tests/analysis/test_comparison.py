@@ -17,11 +17,14 @@ from conevo.analysis.comparison import (
     treatments_of,
 )
 from conevo.analysis.frames import Value
+from conevo.worlds.measures import Measure
 
 CONE, MESP, HOM = Treatment("cone", ""), Treatment("mesp", ""), Treatment("homcne", "")
 
 
-def value(environment, treatment, seed, reached, budget="smoke", optimum=None) -> Value:
+def value(
+    environment, treatment, seed, reached, budget="smoke", optimum=None, larger_is_better=True
+) -> Value:
     return Value(
         run=f"{environment}-{treatment.title}-{seed}",
         task=f"rover-v1/{environment}",
@@ -34,7 +37,7 @@ def value(environment, treatment, seed, reached, budget="smoke", optimum=None) -
         variant=treatment.variant,
         seed=seed,
         budget=budget,
-        measure="value",
+        measure=Measure("value", larger_is_better=larger_is_better),
         optimum=optimum,
         value=reached,
     )
@@ -44,9 +47,9 @@ def sample(mean: float, n: int = 12, seed: int = 0, sd: float = 1.0) -> list[flo
     return np.random.default_rng(seed).normal(mean, sd, n).tolist()
 
 
-def cells_of(samples: dict[tuple[str, Treatment], list[float]]) -> dict[Cell, list[Value]]:
+def cells_of(samples: dict[tuple[str, Treatment], list[float]], **about) -> dict[Cell, list[Value]]:
     return {
-        Cell(*key): [value(*key, seed, one) for seed, one in enumerate(reached)]
+        Cell(*key): [value(*key, seed, one, **about) for seed, one in enumerate(reached)]
         for key, reached in samples.items()
     }
 
@@ -109,7 +112,7 @@ def test_every_pair_of_every_environment_is_corrected_together() -> None:
     assert [pair.p_holm for pair in pairs] == pytest.approx(
         [expected[k] for k in range(6)], rel=1e-6
     )
-    assert pairs[1].verdict == "above"
+    assert pairs[1].verdict == "better"
 
 
 def test_pairs_that_differ_in_method_and_level_are_not_compared() -> None:
@@ -139,13 +142,29 @@ def test_what_the_tests_say_is_said_apart_where_they_disagree() -> None:
         (pair,) = compare_all(cells_of({("complex-1", HOM): b, ("complex-1", CONE): a}))
         return pair.verdict
 
-    assert verdict(sample(9.0), sample(5.0, seed=1)) == "above"
-    assert verdict(sample(5.0, seed=1), sample(9.0)) == "below"
-    assert verdict([9.0, 9.1, 9.2], [5.0, 5.1, 5.2]) == "above (t-test only)"
+    assert verdict(sample(9.0), sample(5.0, seed=1)) == "better"
+    assert verdict(sample(5.0, seed=1), sample(9.0)) == "worse"
+    assert verdict([9.0, 9.1, 9.2], [5.0, 5.1, 5.2]) == "better (t-test only)"
     far = [1.0] * 9 + [-400.0]
-    assert verdict([0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1, 0.05], far) == "above (ranks only)"
+    assert (
+        verdict([0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1, 0.05], far) == "better (ranks only)"
+    )
     assert verdict(sample(100.0), sample(100.0, seed=1)) == "alike"
     assert verdict(sample(1.0, sd=3.0), sample(1.0, seed=1, sd=3.0)) == "undecided"
+
+
+def test_the_smaller_of_two_is_better_where_the_world_declares_so() -> None:
+    samples = {("complex-1", HOM): sample(9.0), ("complex-1", CONE): sample(5.0, seed=1)}
+    (more,) = compare_all(cells_of(samples))
+    (less,) = compare_all(cells_of(samples, larger_is_better=False))
+    assert (more.verdict, less.verdict) == ("worse", "better")
+    assert more.result == less.result
+    assert less.gain == -more.gain == pytest.approx(4, abs=1)
+    assert less.a12 == pytest.approx(1 - more.a12)
+    first, second = (aggregate(cells_of(samples, larger_is_better=d))[1] for d in (True, False))
+    assert first.iqm == second.iqm
+    assert first.improvement[HOM].value == pytest.approx(1 - second.improvement[HOM].value)
+    assert second.improvement[HOM].value > 0.95
 
 
 def test_too_few_runs_are_told_from_runs_that_differ_too_little() -> None:

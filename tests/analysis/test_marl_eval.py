@@ -28,8 +28,7 @@ class Campaign:
 
     def add(self, table, **fields):
         given = {
-            name: 0 if kind in ("INTEGER", "BIGINT", "DOUBLE") else ""
-            for name, kind in SCHEMA[table].items()
+            name: 0 if kind != "VARCHAR" else "" for name, kind in SCHEMA[table].items()
         } | fields
         marks = ", ".join("?" for _ in given)
         self.connection.execute(f"INSERT INTO {table} VALUES ({marks})", list(given.values()))
@@ -238,3 +237,17 @@ def test_same_tables_give_the_same_text(campaign):
         text = json.dumps(export(one))
     with Tables(campaign.folder) as other:
         assert json.dumps(export(other)) == text
+
+
+def test_a_measure_of_which_smaller_is_better_is_negated(campaign):
+    run = campaign.run("cone", 1, 1, measure="first_capture")
+    campaign.run("cone", 2, 1, measure="value", family="simple")
+    campaign.add("measures", run=run, measure="first_capture", larger_is_better=False)
+    with campaign.tables() as tables:
+        data = export(tables)
+    assert_documented(data)
+    (less,) = data["rover-v1 complex smoke"]["complex-1"]["cone"].values()
+    assert less["absolute_metrics"] == {"negated-first-capture": [-5.0, -3.0]}
+    assert less[f"step_{STEPS}"]["negated-first-capture"] == [1.0 - GENERATIONS]
+    (more,) = data["rover-v1 simple smoke"]["simple-2"]["cone"].values()
+    assert more["absolute_metrics"] == {"value": [5.0, 3.0]}

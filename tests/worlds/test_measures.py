@@ -42,7 +42,7 @@ def test_every_measure_of_the_package_has_a_unit_and_the_right_direction(entry) 
 def test_a_measure_in_words_and_by_comparison() -> None:
     first = Measure("first_capture", "iterations", larger_is_better=False)
     assert first.heading == "first capture (iterations, smaller is better)"
-    assert first.axis == "first capture (iterations)"
+    assert first.axis == "first capture, iterations"
     assert (first.best([3, 1, 2]), first.is_better(1, 2), first.is_better(2, 2)) == (1, True, False)
     assert [first.reaches(value, 0.5) for value in (0.4, 0.5, 0.6)] == [True, True, False]
     plain = Measure("value")

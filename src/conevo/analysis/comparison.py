@@ -118,6 +118,7 @@ class Pair:
         result: ``statistics.compare`` of a's runs and b's.
         p_holm: Mann-Whitney's p, corrected for all ``n_tests`` pairs of the group.
         n_tests: pairs in the family.
+        larger_is_better: direction of the measure.
     """
 
     environment: str
@@ -126,6 +127,19 @@ class Pair:
     result: Comparison
     p_holm: float | None
     n_tests: int
+    larger_is_better: bool = True
+
+    @property
+    def gain(self) -> float:
+        """By how much the first is better than the second, below 0 if it is worse."""
+        difference = self.result.difference or 0.0
+        return difference if self.larger_is_better else -difference
+
+    @property
+    def a12(self) -> float | None:
+        """The probability that a run of the first is better than one of the second."""
+        above = self.result.a12
+        return above if above is None or self.larger_is_better else 1 - above
 
     @property
     def by_thesis(self) -> bool:
@@ -145,8 +159,8 @@ class Pair:
 
     @property
     def verdict(self) -> str:
-        """What the tests say of the first: above, below, alike or undecided."""
-        side = "above" if (self.result.difference or 0) > 0 else "below"
+        """What the tests say of the first: better, worse, alike or undecided."""
+        side = "better" if self.gain > 0 else "worse"
         if self.by_thesis and self.by_ranks:
             return side
         if self.by_thesis:
@@ -164,8 +178,8 @@ class Aggregate:
         treatment: which.
         environments: how many.
         iqm: interquartile mean of the runs, 95 % stratified bootstrap interval.
-        improvement: over each treatment before it in the order, the probability that a run is above
-            one of that.
+        improvement: over each treatment before it in the order, the probability that a run is
+            better than one of that.
     """
 
     treatment: Treatment
@@ -213,6 +227,7 @@ def compare_all(cells: Mapping[Cell, Sequence[Value]]) -> list[Pair]:
     registry's order comes first, so that a difference is what the newer method gains. Choice: the
     family of Holm's correction is all pairs of the cells given.
     """
+    direction = _larger_is_better(cells)
     made = [
         (environment, a, b, compare(samples[a], samples[b]))
         for environment, samples in _by_environment(cells).items()
@@ -222,7 +237,7 @@ def compare_all(cells: Mapping[Cell, Sequence[Value]]) -> list[Pair]:
     corrected = holm([result.p_mann_whitney for *_, result in made])
     tests = sum(result.p_mann_whitney is not None for *_, result in made)
     return [
-        Pair(environment, a, b, result, p, tests)
+        Pair(environment, a, b, result, p, tests, direction)
         for (environment, a, b, result), p in zip(made, corrected, strict=True)
     ]
 
@@ -243,8 +258,12 @@ def aggregate(cells: Mapping[Cell, Sequence[Value]]) -> list[Aggregate]:
     strata = {treatment: [of[treatment] for of in common] for treatment in treatments}
     if not common:
         return []
+    sign = 1 if _larger_is_better(cells) else -1
+    gains = {
+        treatment: [np.multiply(sign, of) for of in some] for treatment, some in strata.items()
+    }
     improvement = {
-        (a, b): probability_of_improvement(strata[a], strata[b])
+        (a, b): probability_of_improvement(gains[a], gains[b])
         for b, a in combinations(treatments, 2)
     }
     return [
@@ -256,6 +275,11 @@ def aggregate(cells: Mapping[Cell, Sequence[Value]]) -> list[Aggregate]:
         )
         for k, a in enumerate(treatments)
     ]
+
+
+def _larger_is_better(cells: Mapping[Cell, Sequence[Value]]) -> bool:
+    """Return the direction of the measure of some cells, which all have the same one."""
+    return all(one.measure.larger_is_better for values in cells.values() for one in values)
 
 
 def _by_environment(

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from conevo.errors import UsageError
+from conevo.worlds.measures import Measure
 
 __all__ = ["SCHEMA", "Tables", "Value"]
 
@@ -35,10 +36,18 @@ SCHEMA: dict[str, dict[str, str]] = {
         "measure": "VARCHAR",
         "optimum": "DOUBLE",
         "n_robots": "INTEGER",
+        "exchanges": "DOUBLE",
+        "exchange_share": "DOUBLE",
         "run_id": "VARCHAR",
         "conevo": "VARCHAR",
         "warp": "VARCHAR",
         "kernel_hash": "VARCHAR",
+    },
+    "measures": {
+        "run": "VARCHAR",
+        "measure": "VARCHAR",
+        "unit": "VARCHAR",
+        "larger_is_better": "BOOLEAN",
     },
     "scores": {
         "run": "VARCHAR",
@@ -84,7 +93,13 @@ SCHEMA: dict[str, dict[str, str]] = {
         "count": "INTEGER",
     },
 }
-"""Columns of each table and their DuckDB types, as written to and read from NAME.parquet."""
+"""Columns of each table and their DuckDB types, as written to and read from NAME.parquet.
+
+``runs``: exchanges is the number of pairs of sub-populations that recombined between populations,
+in the mean of the generations, exchange_share that of the pairs that could have; both are NULL for
+methods that never do. ``measures``: the world's, as it declares them; of a measure that is not
+listed larger is better.
+"""
 
 
 NEAR = 0.2  # budgets that differ by no more are one
@@ -94,8 +109,8 @@ class Value(NamedTuple):
     """What one run reached: the unit of all statistics.
 
     budget: of the group of runs that may be compared with it, see ``Tables``.
-    measure: which task performance measure ``value`` is; ``optimum``, its largest possible value,
-        is known for a world's main measure only.
+    measure: which task performance measure ``value`` is, with its unit and direction.
+    optimum: its largest possible value, known for a world's main measure only.
     value: mean over the scenarios of a study.
     """
 
@@ -110,7 +125,7 @@ class Value(NamedTuple):
     variant: str
     seed: int
     budget: str
-    measure: str
+    measure: Measure
     optimum: float | None
     value: float
 
@@ -208,9 +223,11 @@ class Tables:
         rows = self._connection.execute(
             """
             SELECT r.run, r.task, r.world, r.environment, r.family, r.number, r.method, r.preset,
-                   r.variant, r.seed, b.budget, s.measure,
+                   r.variant, r.seed, b.budget, s.measure, coalesce(m.unit, ''),
+                   coalesce(m.larger_is_better, true),
                    if(s.measure = r.measure, r.optimum, NULL) AS optimum, avg(s.value) AS value
             FROM runs r JOIN budgets b USING (run) JOIN scores s USING (run)
+                 LEFT JOIN measures m ON m.run = s.run AND m.measure = s.measure
             WHERE s.study = $study AND s.team = $team AND s.measure = coalesce($measure, r.measure)
             GROUP BY ALL
             HAVING isfinite(avg(s.value))
@@ -219,7 +236,10 @@ class Tables:
             """,
             {"study": study, "team": team, "measure": measure},
         ).fetchall()
-        return [Value(*row) for row in rows]
+        return [
+            Value._make((*about, Measure(name, unit, is_larger), optimum, value))
+            for *about, name, unit, is_larger, optimum, value in rows
+        ]
 
     def close(self) -> None:
         """Let go of the connection."""

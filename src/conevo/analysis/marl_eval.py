@@ -10,7 +10,9 @@
 environment       world, family and preset: "rover-v1 complex night" (budgets are never mixed)
 task              "complex-5"
 algorithm         the method, and its variant if it has one
-measure           the main task performance of the world, [1] in a step
+measure           the main task performance of the world, [1] in a step; "negated-NAME" with the
+                  values' signs turned round if smaller is better, as to the library larger always
+                  is
 step_count        team-steps, in equal parts of the fewest that a run of the environment spent
 step_k            the fittest team of the last generation that had ended by then
 absolute_metrics  the champion in its test, [scenarios]
@@ -99,17 +101,25 @@ def _environments(tables: Tables) -> dict[str, Cells]:
         curves[run][1].append(value)
     found: dict[str, Cells] = {}
     rows = tables.query(
-        "SELECT run, world, family, preset, environment, method, variant, measure FROM runs"
+        "SELECT run, world, family, preset, environment, method, variant, measure,"
+        " coalesce(larger_is_better, true) FROM runs LEFT JOIN measures USING (run, measure)"
         " ORDER BY world, family, preset, number, environment, method, variant, seed, run"
     )[1]
-    for run, world, family, preset, task, method, variant, measure in rows:
+    for run, world, family, preset, task, method, variant, measure, larger in rows:
         if run not in tests or run not in curves:
             continue
         if not np.isfinite(np.array(tests[run] + curves[run][1], dtype=float)).all():
             continue
         environment = " ".join(part for part in (world, family, preset) if part)
         algorithm = " ".join(part for part in (method, variant) if part).replace(",", ";")
-        one = _Run(run, measure.replace("_", "-"), *curves[run], tests[run])
+        steps, values = curves[run]
+        one = _Run(run, measure.replace("_", "-"), steps, values, tests[run])
+        if not larger:
+            one = one._replace(
+                measure=f"negated-{one.measure}",
+                values=[-value for value in one.values],
+                test=[-value for value in one.test],
+            )
         found.setdefault(environment, {}).setdefault(task, {}).setdefault(algorithm, []).append(one)
     return found
 

@@ -20,6 +20,7 @@ from conevo.runs.config import RunConfig
 from conevo.runs.directory import as_json
 from conevo.runs.drafts import draft_of
 from conevo.runs.durable import replace_file, sync_directory, writing
+from conevo.worlds.measures import Measure, measures_of
 
 __all__ = ["is_sealed", "seal_tables"]
 
@@ -106,21 +107,25 @@ def _rows(
         provenance = read_json(path / "provenance.json")
         records = read_json_lines(path / "generations.jsonl")
         test = read_json(path / "test.json")
-        measure = next(iter(test["champion"]["performance"]))
+        measures = _measures(provenance, config)
         yield (
             "runs",
             _run_row(planned, config, provenance, records)
             | {
                 "run": name,
-                "measure": measure,
+                "measure": measures[0].name,
                 "optimum": getattr(config.build_world(), "optimum", None),
                 "n_robots": len(test["champion"]["labels"]),
                 "core_seconds": cost / len(names),
+                **_exchange(records),
             },
         )
+        for one in measures:
+            about = {"unit": one.unit, "larger_is_better": one.larger_is_better}
+            yield "measures", {"run": name, "measure": one.name} | about
         for team, title in (("champion", "champion"), ("generation_0", "generation 0")):
-            for one, values in test[team]["performance"].items():
-                about = {"run": name, "study": "test", "team": title, "measure": one}
+            for measure, values in test[team]["performance"].items():
+                about = {"run": name, "study": "test", "team": title, "measure": measure}
                 for scenario, value in enumerate(values["values"]):
                     yield "scores", about | {"scenario": scenario, "value": value}
         for record in records:
@@ -154,6 +159,25 @@ def _run_row(
         "warp": provenance["warp"],
         "kernel_hash": provenance["kernel_hash"],
     }
+
+
+def _measures(provenance: Row, config: RunConfig) -> tuple[Measure, ...]:
+    """Return the measures of a run's world: of its provenance, or else of the world."""
+    declared = provenance.get("world", {}).get("measures", ())
+    return tuple(Measure(**one) for one in declared) or measures_of(config.build_world())
+
+
+def _exchange(records: Sequence[Row]) -> Row:
+    """Return what was exchanged between populations; nothing of methods without thresholds for it.
+
+    A sub-population recombines with one other at most, so that half of them could be pairs.
+    """
+    if all(record["sst"] is None and record["gst"] is None for record in records):
+        return {"exchanges": None, "exchange_share": None}
+    made = sum(record["recombinations"] for record in records)
+    possible = sum(sum(record["n_hidden"]) // 2 for record in records)
+    share = made / possible if possible else 0.0
+    return {"exchanges": made / len(records), "exchange_share": share}
 
 
 def _generation_rows(name: str, record: Row) -> Iterator[tuple[str, Row]]:

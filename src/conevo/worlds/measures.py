@@ -67,8 +67,8 @@ class Measure:
 
     @property
     def axis(self) -> str:
-        """Title and unit, "first capture (iterations)"."""
-        return f"{self.title} ({self.unit})" if self.unit else self.title
+        """Title and unit, "first capture, iterations"."""
+        return f"{self.title}, {self.unit}" if self.unit else self.title
 
     def best(self, values: Iterable[float]) -> float:
         """Return the best of some values."""

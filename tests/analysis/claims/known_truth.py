@@ -18,10 +18,11 @@ from conevo.analysis.frames import SCHEMA
 
 METHODS = ("homcne", "hetcne", "ccga", "mesp", "cone")
 VARIANTS = ("cone-1", "cone-2", "cone-3")
+EXCHANGING = ("cone", "cone-1", "cone-2")
 MEASURES = {
     "rover-v1": ("value", "area"),
     "pursuit-v1": ("capture_time",),
-    "gacc-v1": ("delivered", "optimum"),
+    "gacc-v1": ("delivered",),
 }
 SPECIALISTS = {
     "rover-v1": ("low", "hi"),
@@ -46,6 +47,7 @@ class Cell:
         idle: share of the runs with an idle predator.
         evaluations: team evaluations of every run.
         stage: of a shaping.
+        exchanges: pairs that recombine between populations in a generation, of a hundred.
     """
 
     value: float
@@ -58,6 +60,7 @@ class Cell:
     idle: float = 0.0
     evaluations: int = 50_000
     stage: int = 0
+    exchanges: float = 5.0
 
 
 Truth = dict[tuple[str, str], Cell]  # (environment, method)
@@ -210,8 +213,10 @@ def _about(
         "core_seconds": 1.0,
         "stopped_by": "budget",
         "measure": MEASURES[world][0],
-        "optimum": None,
+        "optimum": 10 * int(number) if world == "gacc-v1" else None,
         "n_robots": 20,
+        "exchanges": cell.exchanges if method in EXCHANGING else None,
+        "exchange_share": cell.exchanges / 100 if method in EXCHANGING else None,
         "run_id": run,
         "conevo": "0.1.0",
         "warp": "1.19.0",
@@ -235,7 +240,7 @@ def _results(
     number = int(environment.rpartition("-")[2])
     parts = 10 * number if world == "gacc-v1" else 1  # what there is to deliver
     value = cell.value * shift * parts
-    seconds = {"area": cell.area * shift, "optimum": 100 * cell.value * shift}
+    seconds = {"area": cell.area * shift}
 
     def played(study: str, team: str, mean: float) -> Iterator[tuple[str, dict[str, Any]]]:
         for measure in MEASURES[world]:

@@ -36,6 +36,8 @@ RUN = {
     "measure": "value",
     "optimum": None,
     "n_robots": 20,
+    "exchanges": None,
+    "exchange_share": None,
     "run_id": "a",
     "conevo": "",
     "warp": "",
@@ -86,12 +88,11 @@ def test_measures_are_means_of_the_champions_test(tmp_path: Path) -> None:
     scores = [
         *score("test", "champion", 10, 30),
         *score("test", "champion", 0.25, 0.75, measure="area"),
-        *score("test", "champion", 40, 60, measure="optimum"),
         *score("test", "generation 0", 1, 1),
         *score("lesion", "whole", 90, 90),
         *score("clones", "whole", 12, 14),
     ]
-    write(tmp_path, runs=[RUN], scores=scores)
+    write(tmp_path, runs=[RUN | {"optimum": 40}], scores=scores)
     assert read(tmp_path, "value") == 20
     assert read(tmp_path, "area") == 0.5
     assert read(tmp_path, "share of the optimum") == 0.5

@@ -71,10 +71,8 @@ class Quantity:
     is_share: bool = False
 
 
-def _performance(measure: str | None, study: str, team: str, scale: float = 1.0) -> Reading:
-    return lambda tables: {
-        one.run: scale * one.value for one in tables.values(measure, study, team)
-    }
+def _performance(measure: str | None, study: str, team: str) -> Reading:
+    return lambda tables: {one.run: one.value for one in tables.values(measure, study, team)}
 
 
 def _query(sql: str) -> Reading:
@@ -85,8 +83,12 @@ def _query(sql: str) -> Reading:
     }
 
 
-def _tested(measure: str, scale: float = 1.0) -> Quantity:
-    return Quantity(_performance(measure, "test", "champion", scale), "no testing phase")
+def _tested(measure: str) -> Quantity:
+    return Quantity(_performance(measure, "test", "champion"), "no testing phase")
+
+
+def _share(tables: Tables) -> dict[str, float]:
+    return {one.run: one.value / one.optimum for one in tables.values() if one.optimum}
 
 
 def _collective(behaviour: str) -> Quantity:
@@ -99,7 +101,7 @@ QUANTITIES: dict[str, Quantity] = {
     "area": _tested("area"),
     "capture_time": _tested("capture_time"),
     "delivered": _tested("delivered"),
-    "share of the optimum": _tested("optimum", scale=0.01),
+    "share of the optimum": Quantity(_share, "no testing phase"),
     "whole": Quantity(_query(LESIONED.format(value="avg(whole.value)")), "no castes replaced"),
     "lesioned": Quantity(
         _query(LESIONED.format(value="avg(lesioned.value)")), "no castes replaced"
@@ -131,13 +133,13 @@ QUANTITIES: dict[str, Quantity] = {
 }
 """Name -> what it is; ``rover``, ``pursuit`` and ``gacc`` say what claims make of them.
 
-value, area, capture_time, delivered: of the testing phase. share of the optimum: in [0, 1]. whole,
-lesioned: of the lesion study, the latter the mean over castes. loss: (whole - lesioned) over the
-larger of them, mean over castes, in [-1, 1]. Choice: so it is the share of the team's performance
-that is lost, as in tables 4.5, 5.7 and 6.9, and where a team gains it cannot be beyond all bounds;
-a team that never achieves anything has none. evolved, clones: of the clones study, the latter the
-best team of clones. complementary: evolved, of teams with at least two behaviours. The others are 1
-or 0.
+value, area, capture_time, delivered: of the testing phase. share of the optimum: of the world's
+main measure, in [0, 1]. whole, lesioned: of the lesion study, the latter the mean over castes.
+loss: (whole - lesioned) over the larger of them, mean over castes, in [-1, 1]. Choice: so it is the
+share of the team's performance that is lost, as in tables 4.5, 5.7 and 6.9, and where a team gains
+it cannot be beyond all bounds; a team that never achieves anything has none. evolved, clones: of
+the clones study, the latter the best team of clones. complementary: evolved, of teams with at least
+two behaviours. The others are 1 or 0.
 """
 
 

@@ -23,6 +23,7 @@ from conevo.analysis.exhibits import (
 from conevo.analysis.ranks import EXACT_RUNS
 from conevo.analysis.sections.scope import Scope, place_names, sizes
 from conevo.analysis.statistics import ALPHA
+from conevo.worlds.measures import Measure
 
 __all__ = ["comparisons"]
 
@@ -30,7 +31,7 @@ TESTS = (
     "p (t): Student's independent t-test, two-sided, uncorrected, as in the thesis; p (Welch): the "
     "same without equal variances; p (MW): Mann-Whitney, exact up to {exact} runs; p (MW, Holm): "
     "the same, corrected by Holm for all {n} pairs of this table; A12: probability that a run of "
-    "the first is above one of the second (Vargha and Delaney)."
+    "the first is better than one of the second (Vargha and Delaney)."
 )
 
 
@@ -65,8 +66,9 @@ def comparisons(scope: Scope) -> Section:
         Figure(
             f"{scope.stem}-significance",
             f"Significant differences in task performance ({scope.unit})",
-            f"+: the first reached more, −: less; the number is Mann-Whitney's p after Holm's "
-            f"correction over {pairs[0].n_tests} pairs. {size} per sample.",
+            f"+: the first is better, −: worse ({scope.main.direction}); the number is "
+            f"Mann-Whitney's p after Holm's correction over {pairs[0].n_tests} pairs. {size} per "
+            "sample.",
             (),
             [_pair_row(scope, pair) for pair in pairs],
             drawing=figures.heat_map(
@@ -77,17 +79,18 @@ def comparisons(scope: Scope) -> Section:
                 x_label=scope.axis,
             ),
         ),
-        _pair_table(scope, pairs, scope.stem, scope.unit, is_open=len(pairs) <= 12),
+        _pair_table(scope, pairs, scope.stem, scope.main, is_open=len(pairs) <= 12),
     ]
     for measure, others in scope.others.items():
         made = compare_all(others)
-        unit = measure.replace("_", " ")
-        exhibits.append(_pair_table(scope, made, f"{scope.stem}-{measure}", unit, is_open=False))
+        exhibits.append(
+            _pair_table(scope, made, f"{scope.stem}-{measure.name}", measure, is_open=False)
+        )
     return Section("Comparisons", text, exhibits)
 
 
 def _cell_text(pair: Pair) -> str:
-    sign = "+" if (pair.result.difference or 0) > 0 else "−"
+    sign = "+" if pair.gain > 0 else "−"
     p = p_value(pair.p_holm)
     return f"{sign} {p.removeprefix('0')}" if p[0] in "0" else f"{sign} {p}"
 
@@ -107,14 +110,14 @@ def _pair_row(scope: Scope, pair: Pair) -> dict[str, Any]:
         "p_welch": result.p_welch,
         "p_mann_whitney": result.p_mann_whitney,
         "p_holm": pair.p_holm,
-        "a12": result.a12,
+        "a12": pair.a12,
         "smallest_p": result.smallest_p,
         "verdict": pair.verdict,
     }
 
 
 def _pair_table(
-    scope: Scope, pairs: Sequence[Pair], stem: str, unit: str, *, is_open: bool
+    scope: Scope, pairs: Sequence[Pair], stem: str, measure: Measure, *, is_open: bool
 ) -> Table:
     columns = [
         Column("environment", "environment", plain),
@@ -132,10 +135,16 @@ def _pair_table(
     ]
     tests = TESTS.format(n=pairs[0].n_tests if pairs else 0, exact=EXACT_RUNS)
     note = (
-        f"Difference: mean of the first less that of the second; 95 % interval: Welch; {tests} "
+        f"{measure.direction.capitalize()}. Difference: mean of the first less that of the second; "
+        f"95 % interval: Welch; {tests} "
         "Alike: no test below 0.05 and the interval inside ±15 % of the larger mean."
     )
     rows = [_pair_row(scope, pair) for pair in pairs]
     return Table(
-        f"{stem}-comparisons", f"Every two methods compared: {unit}", note, columns, rows, is_open
+        f"{stem}-comparisons",
+        f"Every two methods compared: {measure.axis}",
+        note,
+        columns,
+        rows,
+        is_open,
     )

@@ -3,7 +3,7 @@
 Nitschke 2009, sections 4.6.5, 4.6.6, 5.5.3, 5.5.4, 6.5.4, 6.5.5. Choice: what a run loses is told
 in percent of the larger of the two performances, as in the claims, so that a team that reached
 almost nothing before cannot outweigh all others; the thesis' percent of the unchanged team is that
-of the means.
+of the means. Of a measure of which smaller is better, what is added is lost.
 """
 
 from __future__ import annotations
@@ -27,11 +27,21 @@ class _Team(NamedTuple):
     caste: str
     whole: float
     value: float
+    larger_is_better: bool
+
+    @property
+    def scale(self) -> float:
+        """The larger of the two, whatever their signs."""
+        return max(abs(self.whole), abs(self.value))
 
     @property
     def lost(self) -> float:
-        """What is lost, in percent of the larger of the two: -100 to 100, below 0 if it gained."""
-        return 100 * (self.whole - self.value) / max(self.whole, self.value)
+        """What is lost, in percent of the larger of the two, below 0 if the team gained.
+
+        Between -100 and 100 unless the two have different signs.
+        """
+        lost = self.whole - self.value if self.larger_is_better else self.value - self.whole
+        return 100 * lost / self.scale
 
 
 def lesions(scope: Scope) -> Section:
@@ -91,8 +101,9 @@ def _teams(scope: Scope, study: str) -> tuple[dict[Cell, list[_Team]], int]:
             of = dict(values.get(one.run, {}))
             whole = of.pop("whole", None)
             if whole is not None:
-                own = [_Team(one.run, caste, whole, value) for caste, value in of.items()]
-                able = [team for team in own if max(team.whole, team.value) > 0]
+                direction = scope.main.larger_is_better
+                own = [_Team(one.run, caste, whole, v, direction) for caste, v in of.items()]
+                able = [team for team in own if team.scale > 0]
                 teams += able
                 lost += len(own) - len(able)
         if teams:
@@ -128,8 +139,9 @@ def _figure(
     return Figure(
         f"{scope.stem}-{study}",
         f"Task performance ({scope.unit}) that is lost with a caste {what}",
-        f"{note} Percent of the larger of the two; below 0 the changed team reached more. A point "
-        "per run: the mean over its castes; beside them the mean with Student's 95 % interval. "
+        f"{note} Percent of the larger of the two; below 0 the changed team was better "
+        f"({scope.main.direction}). A point per run: the mean over its castes; "
+        "next to them the mean with Student's 95 % interval. "
         f"{size} per cell.",
         (),
         rows,

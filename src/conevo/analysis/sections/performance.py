@@ -80,7 +80,8 @@ def performance(scope: Scope) -> Section:
         Table(
             f"{scope.stem}-performance",
             f"Task performance ({scope.unit}) by environment and method",
-            "Mean over runs of the mean over fresh scenarios; n: runs; 95 % interval: Student's t; "
+            f"{scope.main.direction.capitalize()}. Mean over runs of the mean over fresh "
+            "scenarios; n: runs; 95 % interval: Student's t; "
             "generation 0: the fittest team of the first generation in the same scenarios; p (KS): "
             "Kolmogorov-Smirnov against the normal fitted to the runs, as in the thesis, which is "
             "too large; p (Lilliefors): the same distance, judged correctly.",
@@ -90,7 +91,7 @@ def performance(scope: Scope) -> Section:
         ),
     ]
     exhibits += [*_pooled(scope), *_others(scope)]
-    return Section(f"Task performance: {scope.unit}", _warnings(scope), exhibits)
+    return Section(f"Task performance: {scope.main.heading}", _warnings(scope), exhibits)
 
 
 def _ends(one: Summary) -> tuple[float, float, float] | None:
@@ -165,16 +166,16 @@ def _pooled(scope: Scope) -> list[Exhibit]:
         Column("n", "n"),
         Column("iqm", "IQM"),
         Column("interval", "95 % interval", interval),
-        *(Column(f"above {t.title}", f"P(above {t.title})", plain) for t in others),
+        *(Column(f"better than {t.title}", f"P(better than {t.title})", plain) for t in others),
     ]
     return [
         Table(
             f"{scope.stem}-aggregate",
             f"All environments together: {scale}",
             f"Environments: {found[0].environments}; n: runs; IQM: "
-            "interquartile mean of the runs; P(above X): probability of improvement, that a run is "
-            "above one of X in the same environment; 95 % intervals: stratified bootstrap, 2000 "
-            "resamples.",
+            "interquartile mean of the runs; P(better than X): probability of improvement, that a "
+            f"run is better than one of X in the same environment ({scope.main.direction}); 95 % "
+            "intervals: stratified bootstrap, 2000 resamples.",
             columns,
             [_aggregate_row(one) for one in found],
         )
@@ -188,7 +189,7 @@ def _aggregate_row(one: Aggregate) -> dict[str, Any]:
         "iqm": one.iqm.value,
         "interval": (one.iqm.low, one.iqm.high),
     } | {
-        f"above {other.title}": f"{number(p.value)}"
+        f"better than {other.title}": f"{number(p.value)}"
         + (f" ({interval((p.low, p.high))})" if p.low is not None else "")
         for other, p in one.improvement.items()
     }
@@ -198,7 +199,12 @@ def _others(scope: Scope) -> list[Exhibit]:
     """Return a table of the measures beside the main one."""
     rows = [
         scope.key(environment, treatment)
-        | {"measure": measure.replace("_", " "), "n": len(values)}
+        | {
+            "measure": measure.title,
+            "unit": measure.unit,
+            "direction": measure.direction,
+            "n": len(values),
+        }
         | _mean_and_sd([one.value for one in values])
         for measure, cells in scope.others.items()
         for (environment, treatment), values in cells.items()
@@ -208,6 +214,8 @@ def _others(scope: Scope) -> list[Exhibit]:
     columns = [
         Column("environment", "environment", plain),
         Column("measure", "measure", plain),
+        Column("unit", "unit", plain),
+        Column("direction", "direction", plain),
         Column("treatment", "method", plain),
         Column("n", "n"),
         Column("mean", "mean"),

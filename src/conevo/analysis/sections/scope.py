@@ -9,6 +9,7 @@ from typing import Any
 from conevo.analysis.comparison import Cell, Group, Treatment, group_values, treatments_of
 from conevo.analysis.exhibits import slug
 from conevo.analysis.frames import Tables, Value
+from conevo.worlds.measures import Measure
 
 __all__ = ["Scope", "named", "place_names", "scopes", "sizes", "span"]
 
@@ -34,7 +35,7 @@ class Scope:
     stem: str
     cells: Cells
     first: Cells
-    others: Mapping[str, Cells]
+    others: Mapping[Measure, Cells]
 
     @property
     def treatments(self) -> list[Treatment]:
@@ -48,13 +49,18 @@ class Scope:
 
     @property
     def measure(self) -> str:
+        """The name of the world's main measure."""
+        return self.main.name
+
+    @property
+    def main(self) -> Measure:
         """The world's main measure."""
         return next(iter(self.cells.values()))[0].measure
 
     @property
     def unit(self) -> str:
-        """The main measure as axes call it."""
-        return self.measure.replace("_", " ")
+        """The main measure as axes call it, with its unit."""
+        return self.main.axis
 
     @property
     def axis(self) -> str:
@@ -89,9 +95,9 @@ def scopes(tables: Tables) -> list[Scope]:
     for group, cells in main.items():
         stem = slug(f"{group.world.rpartition('-v')[0] or group.world}-{group.family}")
         same = sum(one.stem.startswith(stem) for one in found)
-        own = next(iter(cells.values()))[0].measure
+        own = next(iter(cells.values()))[0].measure.name
         others = {
-            measure: groups[group]
+            next(iter(groups[group].values()))[0].measure: groups[group]
             for measure, groups in by_measure.items()
             if group in groups and measure != own
         }
