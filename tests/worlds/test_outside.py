@@ -124,7 +124,8 @@ def test_a_run_notices_that_its_world_has_changed_before_anything_in_it_runs(
     light: Path, tmp_path: Path
 ) -> None:
     path = interrupted(tmp_path / "run", f"{light}:dark-1").path
-    before = {p: p.read_bytes() for p in path.rglob("*") if p.is_file()}
+    light = path / "inputs" / "light.py"  # the run's own copy
+    before = {p: p.read_bytes() for p in path.rglob("*") if p.is_file() and p != light}
     witness = tmp_path / "witness"
     light.write_text(f"{TEXT}\nopen({str(witness)!r}, 'w')\n")
     for use in (lambda run: run.resume(threads=1), lambda run: run.test(threads=1)):
@@ -137,7 +138,7 @@ def test_a_run_notices_that_its_world_has_changed_before_anything_in_it_runs(
     assert not witness.exists()
     light.unlink()
     with pytest.raises(UsageError, match=r"cannot read the world file .*light\.py: No such file"):
-        conevo.Run(path)
+        conevo.Run(path).test(threads=1)
     assert {p: p.read_bytes() for p in path.rglob("*") if p.is_file()} == before
     light.write_text(TEXT)
     assert conevo.Run(path).resume(threads=1).status == "finished"
@@ -249,9 +250,9 @@ def test_shaping_through_the_environments_of_a_file(tmp_path: Path) -> None:
     shaping.resume(threads=1)
     assert shaping.tasks == ["light-v1/dark-1", "light-v1/dark-2", "light-v1/dark-3"]
     assert [run.status for run in shaping.stages] == ["finished"] * 3
-    written(file, ('"dark-1",', names), ("start", "begin"))
+    written(shaping.path / "inputs" / "light.py", ('"dark-1",', names), ("start", "begin"))
     with pytest.raises(UsageError, match="has changed"):
-        type(shaping)(shaping.path)
+        _ = type(shaping)(shaping.path).configs
 
 
 def say(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:

@@ -18,8 +18,9 @@ A configuration file has three tables. ``[run]`` also holds the three names::
     [method]
     genotypes = 20
 
-The world may be one in a file of its own, ``world = "FILE.py:ENVIRONMENT"``; a run keeps the file's
-whole path, and its digest beside it as ``world_digest``, which is checked when it is given.
+The world may be one in a file of its own, ``world = "FILE.py:ENVIRONMENT"``; ``world_digest`` next
+to it is checked when it is given. A file is named from the folder of the configuration file; a run
+has copies of its own (``runs.inputs``).
 
 Presets (``presets/*.toml``) hold the same three tables, with ``method`` split by method, for any
 world; a world's own table replaces that one. A variant ("cone-1") takes its family's values
@@ -38,7 +39,7 @@ import functools
 import hashlib
 import json
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
@@ -119,6 +120,8 @@ class RunConfig:
     """A fully resolved run.
 
     ``world_params`` and ``method_config`` are the world's and the method's own frozen dataclasses.
+    ``changed`` names the settings that are not as the preset has them, "run.generations"; the seed
+    is none of them.
     """
 
     entry: WorldEntry
@@ -128,6 +131,7 @@ class RunConfig:
     run: RunSettings
     world_params: Any
     method_config: Any
+    changed: tuple[str, ...] = dataclasses.field(default=(), compare=False)
 
     @property
     def world(self) -> str:
@@ -170,29 +174,60 @@ class RunConfig:
         task = self.task.replace("/", "-")
         return f"{task}-{self.method}-{self.preset}-s{self.run.seed}-{self.run_id[:6]}"
 
-    def tables(self) -> dict[str, dict[str, Any]]:
-        """Return the three tables of the configuration file, every value spelt out."""
+    def tables(self, folder: Path | None = None) -> dict[str, dict[str, Any]]:
+        """Return the three tables of the configuration file, every value spelt out.
+
+        Args:
+            folder: of that file; files in it are named from there, others by their whole path.
+        """
         world = {"world": self.address}
         if self.entry.digest:
             world["world_digest"] = self.entry.digest
         names = {"method": self.method, "preset": self.preset}
-        return {
+        tables = {
             "run": world | names | _set_fields(self.run),
             "world": _set_fields(self.world_params),
             "method": _set_fields(self.method_config),
         }
+        if folder is not None:
+            for table in tables.values():
+                for key in _files_of(table):
+                    path = Path(table[key])
+                    if path.is_relative_to(folder.resolve()):
+                        table[key] = path.relative_to(folder.resolve()).as_posix()
+        return tables
 
-    def to_toml(self) -> str:
-        """Return the text that ``resolve(file=...)`` turns back into this configuration."""
-        return tomli_w.dumps(self.tables())
+    def to_toml(self, folder: Path | None = None) -> str:
+        """Return the text that ``resolve(file=...)`` turns back into this configuration.
+
+        Args:
+            folder: of the file that it is written to.
+        """
+        return tomli_w.dumps(self.tables(folder))
+
+
+def _files_of(table: Mapping[str, Any]) -> list[str]:
+    """Return the keys of a table whose values are files: those with a digest next to them."""
+    return [key.removesuffix("_digest") for key in table if key.endswith("_digest") and table[key]]
 
 
 @dataclass(frozen=True)
 class _Value:
-    """A value and the place it was read from."""
+    """A value and the place it was read from; a file is named from ``folder``."""
 
     value: Any
     place: str
+    folder: Path | None = None
+
+    @property
+    def as_file(self) -> Any:
+        """The value if it is the name of a file, "prey.npz" or "FILE.py:ENVIRONMENT"."""
+        text = self.value
+        if self.folder is None or not isinstance(text, str):
+            return text
+        name = text.rpartition(":")[0] if ".py:" in text else text
+        is_file = Path(name).suffix or ("/" in name and (self.folder / name).is_file())
+        return str(self.folder / text) if is_file else text
 
 
 Layer = dict[str, dict[str, _Value]]  # section -> key -> value
@@ -206,6 +241,7 @@ def resolve(
     file: str | Path | None = None,
     overrides: Mapping[str, Any] | None = None,
     place: str = "in overrides",
+    folder: Path | None = None,
 ) -> RunConfig:
     """Return the one configuration that all layers together describe.
 
@@ -219,9 +255,11 @@ def resolve(
         overrides: single settings, "run.generations" -> 5; a key that only one section has may be
             written without its section.
         place: where ``overrides`` came from, for error messages.
+        folder: from which ``world`` and ``overrides`` name files, by default the working directory.
 
     Raises:
-        UsageError: an unknown name or a value that is not allowed; nothing has been written.
+        UsageError: an unknown name or a value that is not allowed; a preset that would change
+            nothing, as the file sets all that it does; nothing has been written.
         EnvironmentFailure: the file cannot be read.
     """
     from conevo.evolution.methods.registry import METHODS
@@ -229,7 +267,10 @@ def resolve(
 
     layers: list[Layer] = [_read_file(Path(file))] if file is not None else []
     given = dict(overrides or {})
-    single, short = _split_keys(given, place)
+    single, short = _split_keys(given, place, folder)
+    if world is not None:
+        world = _Value(world, place, folder).as_file
+    own_preset = layers[0].get("run", {}).get("preset") if layers else None
     names = _take_names([*layers, single], {"world": world, "method": method, "preset": preset})
     if not names["world"]:
         raise UsageError("which world? Name one as WORLD/ENVIRONMENT, for example rover/complex-1")
@@ -250,6 +291,8 @@ def resolve(
             )
         single.setdefault("run", {})["seed"] = _Value(seed, "as the seed")
     base = _read_preset(names["preset"], entry.name, names["method"])
+    if own_preset is not None and names["preset"] != own_preset.value:
+        _refuse_label(names["preset"], base, layers[0], own_preset.place)
     built = {name: _build(name, part, [base, *layers, single]) for name, part in parts.items()}
     try:
         entry.build(environment, built["world"])
@@ -263,6 +306,7 @@ def resolve(
         run=built["run"],
         world_params=built["world"],
         method_config=built["method"],
+        changed=tuple(_changed(parts, built, base)),
     )
 
 
@@ -297,34 +341,36 @@ def parse_assignments(texts: Iterable[str]) -> dict[str, Any]:
 
 
 def _read_file(path: Path) -> Layer:
-    return _as_layer(read_toml(path), f"in {path}")
+    return _as_layer(read_toml(path), f"in {path}", path.resolve().parent)
 
 
-def _as_layer(tables: Mapping[str, Any], place: str) -> Layer:
+def _as_layer(tables: Mapping[str, Any], place: str, folder: Path | None = None) -> Layer:
     layer: Layer = {}
     for section, values in tables.items():
         if section not in SECTIONS:
             raise unknown_name("section", section, SECTIONS, place)
         if not isinstance(values, Mapping):
             raise UsageError(f"{section} {place} must be a table: [{section}]")
-        layer[section] = {key: _Value(value, place) for key, value in values.items()}
+        layer[section] = {key: _Value(value, place, folder) for key, value in values.items()}
     return layer
 
 
-def _split_keys(given: Mapping[str, Any], place: str) -> tuple[Layer, dict[str, _Value]]:
+def _split_keys(
+    given: Mapping[str, Any], place: str, folder: Path | None
+) -> tuple[Layer, dict[str, _Value]]:
     """Separate settings with a section from short ones."""
     dotted: Layer = {}
     short: dict[str, _Value] = {}
     for key, value in given.items():
         section, dot, name = key.partition(".")
         if not dot:
-            short[key] = _Value(value, place)
+            short[key] = _Value(value, place, folder)
         elif section not in SECTIONS:
             raise unknown_name("section", section, SECTIONS, f"in {key!r} {place}")
         elif name in given:
             raise UsageError(f"{key} {place}: the same setting is given as {name}, too")
         else:
-            dotted.setdefault(section, {})[name] = _Value(value, place)
+            dotted.setdefault(section, {})[name] = _Value(value, place, folder)
     return dotted, short
 
 
@@ -341,10 +387,31 @@ def _take_names(layers: list[Layer], asked: Mapping[str, str | None]) -> dict[st
         for name, found in given.items():
             if found is not None and not isinstance(found.value, str):
                 raise UsageError(f"run.{name} = {shown(found.value)} {found.place}: must be a name")
-            names[name] = found.value if found is not None else names[name]
+            if found is not None:
+                names[name] = found.as_file if name == "world" else found.value
     if asked["world"] is not None:
         names["world_digest"] = ""
     return names | {name: value for name, value in asked.items() if value is not None}
+
+
+def _refuse_label(preset: str, base: Layer, file: Layer, place: str) -> None:
+    """Raise UsageError if a preset would set nothing that the configuration file does not set."""
+    if all(key in file.get(section, {}) for section in base for key in base[section]):
+        raise UsageError(
+            f"preset {preset!r} would change nothing but the run's label: every value that it sets "
+            f"is already set {place}; leave the preset out, or remove those values from the file"
+        )
+
+
+def _changed(parts: Mapping[str, type], built: Mapping[str, Any], base: Layer) -> Iterator[str]:
+    """Yield the settings that are not as the preset has them, without the seed and digests."""
+    for section, part in parts.items():
+        preset = base.get(section, {})
+        for field in dataclasses.fields(part):
+            plain = preset[field.name].value if field.name in preset else field.default
+            is_own = field.name != "seed" and not field.name.endswith("_digest")
+            if is_own and getattr(built[section], field.name) != plain:
+                yield f"{section}.{field.name}"
 
 
 def _section_of(key: str, parts: Mapping[str, type], place: str) -> str:
@@ -384,6 +451,8 @@ def _build(section: str, part: Any, layers: Iterable[Layer]) -> Any:
             if key not in hints:
                 known = [f"{section}.{name}" for name in hints]
                 raise unknown_name("key", f"{section}.{key}", known, given.place)
+            if f"{key}_digest" in hints:
+                given = dataclasses.replace(given, value=given.as_file)
             values[key] = _check(f"{section}.{key}", hints[key], given)
     try:
         return part(**values)

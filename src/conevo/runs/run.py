@@ -96,6 +96,7 @@ def start(
     about = {
         "run_id": config.run_id,
         "preset": config.preset,
+        "changed": list(config.changed),
         "command": command,
         "kernel_hash": lab.rollout.kernel_hash,
         "created": provenance.now(),

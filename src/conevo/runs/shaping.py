@@ -3,6 +3,7 @@
 Nitschke 2009, sections 4.3 (prey) and 6.4.2 (construction)::
 
     shaping.toml    the resolved configuration of every stage; never changes
+    inputs/         copies of the files that it names: a world's, and its prey
     stage-1/ ...    the runs, each as any other; a stage appears when the one before is sealed
     generations.jsonl   every generation of all stages with the environment that it saw; written
                     when a stage is sealed
@@ -30,6 +31,7 @@ from conevo.runs.config import RunConfig, resolve
 from conevo.runs.directory import CONFIG, SHAPING, Directory, appearing, refuse_existing
 from conevo.runs.durable import replace_file
 from conevo.runs.evolved_prey import PREY, PREY_TASKS, save_prey
+from conevo.runs.inputs import keep_inputs
 from conevo.runs.lab import Lab
 from conevo.runs.run import RUNS, Record, Run, Watch, start
 from conevo.worlds.registry import resolve as resolve_world
@@ -95,14 +97,14 @@ def start_shaping(
     state: State | None = None
     for stage in configs:
         state = Lab.equip(stage, threads, device).first_state(state)
-    about = {
-        "format": FORMAT,
-        "command": command,
-        "device": device,
-        "run_ids": [stage.run_id for stage in configs],
-        "stages": [stage.tables() for stage in configs],
-    }
     with appearing(path) as draft:
+        about = {
+            "format": FORMAT,
+            "command": command,
+            "device": device,
+            "run_ids": [stage.run_id for stage in configs],
+            "stages": [keep_inputs(stage, draft).tables(draft) for stage in configs],
+        }
         replace_file(draft / SHAPING, tomli_w.dumps(about).encode())
     return Shaping(path)
 
@@ -345,7 +347,8 @@ def _read(path: Path) -> dict[str, Any]:
         command, device = about["command"], about["device"]
     except (KeyError, TypeError) as error:
         raise UsageError(f"{path} is damaged: {error}") from error
-    configs = [resolve(overrides=stage, place=f"in {path}") for stage in settings]
+    folder = path.parent.resolve()
+    configs = [resolve(overrides=one, place=f"in {path}", folder=folder) for one in settings]
     if [config.run_id for config in configs] != run_ids:
         raise UsageError(f"{path} was changed after the shaping was started; start another one")
     return {"configs": configs, "command": command, "device": device}

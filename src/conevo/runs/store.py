@@ -3,6 +3,7 @@
 ::
 
     config.toml                 the resolved configuration; never changes
+    inputs/                     copies of the files that it names: a world's, and its prey
     provenance.json             versions, kernel hash, machine, sessions; replaced whole
     origin.npz                  the first state, if the run begins with the populations of another
     generations.jsonl           one line per generation, on the disk before the next begins
@@ -35,6 +36,7 @@ from conevo.runs.champions import Finalists, Team
 from conevo.runs.config import RunConfig, resolve
 from conevo.runs.directory import CONFIG, Directory, appearing, as_json
 from conevo.runs.durable import append_line, replace_file, writing
+from conevo.runs.inputs import keep_inputs
 
 __all__ = ["Store", "create"]
 
@@ -58,7 +60,8 @@ def create(path: Path, config: RunConfig, provenance: Record, first: State | Non
         EnvironmentFailure: the directory cannot be written.
     """
     with appearing(path) as draft:
-        replace_file(draft / CONFIG, config.to_toml().encode())
+        kept = keep_inputs(config, draft)
+        replace_file(draft / CONFIG, kept.to_toml(draft).encode())
         replace_file(draft / PROVENANCE, as_json(provenance))
         if first is not None:
             identity = _identity(provenance) | {"method": config.method}
