@@ -23,6 +23,7 @@ from conevo.reading import (
     read_bytes,
     read_json,
     read_json_lines,
+    read_last_line,
     read_text,
     read_toml,
 )
@@ -152,6 +153,23 @@ TOML = {
     b"a = 1\na = 2": "Cannot overwrite",
     b"a =": "Invalid value",
 }
+
+
+@pytest.mark.parametrize("n", [0, 1, 100, 8190, 8191, 8192, 8193, 20_000])
+def test_the_last_whole_line_is_found_without_reading_the_file(n: int, tmp_path: Path) -> None:
+    path = tmp_path / "log"
+    last = b"x" * n
+    for before in (b"", b"first\n", b"y" * 50_000 + b"\n"):
+        for torn in (b"", b"torn", b"z" * 9000):
+            path.write_bytes(before + last + b"\n" + torn)
+            assert read_last_line(path) == last
+    path.write_bytes(b"torn")
+    assert read_last_line(path) == b""
+    path.write_bytes(b"")
+    assert read_last_line(path) == b""
+    assert "its last line has more than 100 bytes" in refused(
+        lambda path: read_last_line(path, 100), path, b"a\n" + b"x" * 100 + b"\n"
+    )
 
 
 @pytest.mark.parametrize("content", TOML, ids=[str(k) for k in range(len(TOML))])

@@ -21,9 +21,11 @@ import re
 import stat
 import tomllib
 import zipfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 from conevo.errors import EnvironmentFailure, UsageError, shown
 
@@ -39,6 +41,7 @@ __all__ = [
     "read_bytes",
     "read_json",
     "read_json_lines",
+    "read_last_line",
     "read_text",
     "read_toml",
     "whole_lines",
@@ -80,15 +83,27 @@ def read_bytes(path: Path, limit: int = MOST_ARRAYS, name: str = "") -> bytes:
         EnvironmentFailure: it cannot be read.
     """
     name = name or str(path)
+    with _opened(path, name) as file:
+        size = os.fstat(file.fileno()).st_size
+        _refuse_large(size, limit, name)
+        return file.read(size)
+
+
+@contextmanager
+def _opened(path: Path, name: str) -> Iterator[BinaryIO]:
+    """Yield a regular file that is open for reading.
+
+    Raises:
+        DamagedFile: it is not a regular file.
+        EnvironmentFailure: it cannot be read.
+    """
     try:
         # Looked at before it is opened: opening alone makes some devices act.
         _refuse_special(os.stat(path), name)
         handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
         with os.fdopen(handle, "rb") as file:
-            found = os.fstat(handle)
-            _refuse_special(found, name)
-            _refuse_large(found.st_size, limit, name)
-            return file.read(found.st_size)
+            _refuse_special(os.fstat(handle), name)
+            yield file
     except OSError as error:
         raise EnvironmentFailure(f"cannot read {name}: {error.strerror or error}") from error
     except ValueError as error:  # a null byte in the path
@@ -160,6 +175,26 @@ def read_json_lines(path: Path, model: type | None = None) -> list[dict[str, Any
         parse_json(line, f"{path}", model, f" in line {number}")
         for number, line in enumerate(lines, 1)
     ]
+
+
+def read_last_line(path: Path, limit: int = MIB) -> bytes:
+    """Return the last whole line of a file, b"" if it has none; only the file's end is read.
+
+    Raises:
+        DamagedFile: it is not a regular file, or the line is longer than ``limit`` bytes.
+        EnvironmentFailure: it cannot be read.
+    """
+    name = str(path)
+    with _opened(path, name) as file:
+        size = os.fstat(file.fileno()).st_size
+        for most in (min(8192, limit), limit):
+            file.seek(max(size - most, 0))
+            lines = whole_lines(file.read(most))
+            if len(lines) > 1 or (lines and size <= most):
+                return lines[-1]
+            if size <= most:
+                return b""
+    raise DamagedFile(f"{name} is damaged: its last line has more than {limit:,} bytes")
 
 
 def whole_lines(content: bytes) -> list[bytes]:

@@ -47,7 +47,9 @@ def test_while_none_is_finished_the_progress_of_those_at_work_counts(campaign):
     first = next(iter(campaign.planned))
     log = campaign.places.run(first) / "generations.jsonl"
     log.parent.mkdir(parents=True)
-    log.write_text('{"team_evaluations": 5}\n{"team_eval')  # one of two generations, one torn
+    (log.parent / "config.toml").write_text("[run]\ngenerations = 2\nbudget_evaluations = 0\n")
+    one = '{"generation": 0, "team_evaluations": 5}\n'
+    log.write_text(f'{one}{{"team_eval')  # one of two generations, one torn
     known = standing(campaign, ("running", 0.0, 90.0), WAITS, WAITS, WAITS)
     assert remaining_seconds(campaign, known, 1, 100.0) == pytest.approx(10 + 3 * 20)
 

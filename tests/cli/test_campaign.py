@@ -1,6 +1,7 @@
 """The verbs for campaigns, as a user types them; also what is refused, with nothing written."""
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -159,3 +160,28 @@ def test_a_job_array_has_the_runs_that_are_not_finished(conevo, tmp_path):
     conevo("campaign", "start", "tiny", "--executor", "serial", "--quiet")
     code, _, err = conevo("campaign", "slurm", "tiny")
     assert (code, "no run left" in err) == (2, True)
+
+
+def test_status_shows_runs_that_slurm_tasks_or_a_resume_carry_out(conevo, tmp_path):
+    from conevo.runs.directory import Directory
+
+    campaign = tiny_campaign(tmp_path / "campaigns")
+    first, second, *_ = campaign.planned
+    for label, n in ((first, 1), (second, 0)):
+        path = campaign.places.run(label)
+        path.mkdir(parents=True)
+        (path / "config.toml").write_text("[run]\ngenerations = 2\nbudget_evaluations = 0\n")
+        lines = [f'{{"generation": {k}, "team_evaluations": 9}}\n' for k in range(n)]
+        (path / "generations.jsonl").write_text("".join(lines))
+    with Directory(campaign.places.run(first), "run").locked():
+        code, out, _ = conevo("campaign", "status", "tiny", "--runs")
+        found = json.loads(conevo("campaign", "status", "tiny", "--json")[1])
+    assert code == 0
+    assert "campaigns/tiny: running without a coordinator, 3 pending, 1 running\n" in out
+    assert re.search(r"^last generation written \d+ s ago$", out, re.M)
+    assert re.search(rf"^{first} +running +1 of 2 generations +\d+ s ago +0", out, re.M)
+    assert re.search(rf"^{second} +pending +0", out, re.M)
+    assert (found["running"], found["runs"][0]["state"]) == (False, "running")
+    assert (found["runs"][0]["generations"], found["runs"][0]["generations_planned"]) == (1, 2)
+    assert found["runs"][1]["written"] is None
+    assert "not running, 4 pending" in conevo("campaign", "status", "tiny")[1]

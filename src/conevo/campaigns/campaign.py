@@ -25,15 +25,16 @@ from collections import deque
 from collections.abc import Callable
 from pathlib import Path
 
+from conevo.campaigns.ended import read_ended
 from conevo.campaigns.executors import Ending, Executor, Job
 from conevo.campaigns.ledger import Entry, Ledger
 from conevo.campaigns.places import Places
 from conevo.campaigns.plan import Plan, PlannedRun
 from conevo.campaigns.plan_file import read_plan
+from conevo.campaigns.progress import is_held
 from conevo.campaigns.tables import seal_tables
 from conevo.campaigns.work import planned_runs
 from conevo.errors import UsageError
-from conevo.reading import read_json
 from conevo.runs.directory import Directory, appearing
 from conevo.runs.durable import replace_file
 
@@ -128,17 +129,34 @@ class Campaign:
         return not planned.studies or all(self.places.study(n).is_file() for n in planned.names)
 
     def standings(self) -> dict[str, Entry]:
-        """Return how every run stands, in the order of the plan; writes nothing."""
+        """Return the state of every run, in the order of the plan; writes nothing.
+
+        A run is running if its coordinator says so, or if any process holds its lock: a SLURM task
+        or a ``conevo resume``. It has failed if the ledger says so, or if a worker without a
+        coordinator has written that it did.
+        """
         known = {entry.label: entry for entry in self.ledger.entries()}
+        is_coordinated = self.is_running
         found = {}
         for label in self.planned:
             entry = known.get(label, Entry(label, "pending", 0, "", 0, None, 0.0))
             if self.is_finished(label):
                 entry = dataclasses.replace(entry, state="finished")
-            elif entry.state == "finished" or (entry.state == "running" and not self.is_running):
+            elif is_held(self.places, label):
+                entry = dataclasses.replace(entry, state="running")
+            elif entry.state == "finished" or (entry.state == "running" and not is_coordinated):
                 entry = dataclasses.replace(entry, state="pending")
+            if entry.state == "pending" and entry.attempts == 0:
+                entry = self._ended_alone(entry)
             found[label] = entry
         return found
+
+    def _ended_alone(self, entry: Entry) -> Entry:
+        """Return what is known of a run whose end no coordinator has seen."""
+        ended = read_ended(self.places.ended(entry.label))
+        if ended is None or ended["status"] != "failed":
+            return entry
+        return dataclasses.replace(entry, state="failed", reason=ended["message"])
 
     def stop(self) -> None:
         """Ask the coordinator to stop: its workers write their checkpoints and leave.
@@ -161,6 +179,8 @@ class Campaign:
         with self.locked():
             self._reconcile()
             failed = [label for label, one in self.standings().items() if one.state == "failed"]
+            for label in failed:
+                self.places.ended(label).unlink(missing_ok=True)
             self.ledger.put(failed, "pending", "to be tried again")
         return failed
 
@@ -221,15 +241,19 @@ class Campaign:
         next_seal = time.monotonic() + SEAL_EVERY
         while waiting or at_work:
             free = executor.cores - sum(job.threads for job in at_work.values())
-            while waiting and free >= threads:
-                share = max(threads, free // len(waiting))
-                job = Job(self.path, waiting.popleft(), share)
+            ready = self._ready(waiting, free) if waiting and free >= threads else deque()
+            while ready and free >= threads:
+                share = max(threads, free // len(ready))
+                job = Job(self.path, ready.popleft(), share)
+                waiting.remove(job.label)
                 at_work[job.label] = job
                 free -= share
                 self.places.ended(job.label).unlink(missing_ok=True)
                 self.ledger.begin(job.label, share, time.time())
                 executor.submit(job)
-            for ending in executor.wait(LOOK):
+            if waiting and not at_work:
+                time.sleep(LOOK)  # others carry out what is left
+            for ending in executor.wait(LOOK) if at_work else ():
                 del at_work[ending.label]
                 if self._settle(ending) == "pending":
                     waiting.appendleft(ending.label)
@@ -244,18 +268,30 @@ class Campaign:
             if watch is not None:
                 watch(self, None)
 
+    def _ready(self, waiting: deque[str], most: int) -> deque[str]:
+        """Return runs that nobody carries out; what others have finished waits no more."""
+        free: deque[str] = deque()
+        for label in list(waiting):
+            if len(free) == most:
+                break
+            if self.is_finished(label):
+                waiting.remove(label)
+                self.ledger.put([label], "finished", "found finished")
+            elif not is_held(self.places, label):
+                free.append(label)
+        return free
+
     def _settle(self, ending: Ending) -> str:
         """Write down how a worker ended, and return the state of its run."""
         label, path = ending.label, self.places.ended(ending.label)
         attempts = 1 + next(e.attempts for e in self.ledger.entries() if e.label == label)
-        if not path.is_file():
+        if (ended := read_ended(path)) is None:
             lost = ending.lost or f"left without a word; see {self.places.log(label)}"
             state = "pending" if attempts < ATTEMPTS else "failed"
             self.ledger.end(label, state, f"{lost} (attempt {attempts} of {ATTEMPTS})")
             return state
-        ended = read_json(path)
-        state = ended["status"]
+        state = str(ended["status"])
         if state == "failed" and ended["origin"] == "machine" and attempts < ATTEMPTS:
             state = "pending"
         self.ledger.end(label, state, ended["message"], ended["core_seconds"])
-        return str(state)
+        return state

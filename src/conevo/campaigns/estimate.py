@@ -7,8 +7,7 @@ from statistics import fmean
 
 from conevo.campaigns.campaign import Campaign
 from conevo.campaigns.ledger import Entry
-from conevo.errors import ConevoError
-from conevo.reading import parse_json, read_bytes, whole_lines
+from conevo.campaigns.progress import progress_of
 
 __all__ = ["remaining_seconds"]
 
@@ -38,8 +37,9 @@ def remaining_seconds(
     running = [label for label, entry in entries.items() if entry.state == "running"]
     if not known:
         for label in running:
-            share, passed = _share(campaign, label), _passed(entries[label], at)
-            if share > 0:
+            share = progress_of(campaign.places, planned[label]).share
+            passed = _passed(entries[label], at)
+            if share > 0 and passed > 0:
                 for key in _keys(campaign, label):
                     known.setdefault(key, []).append(passed / share)
     for label, entry in entries.items():
@@ -63,23 +63,3 @@ def _keys(campaign: Campaign, label: str) -> list[tuple[str, ...]]:
 def _passed(entry: Entry, at: float) -> float:
     """Return the core seconds that an attempt has had."""
     return max(at - (entry.began or at), 0.0) * entry.threads
-
-
-def _share(campaign: Campaign, label: str) -> float:
-    """Return the share of a run that is over: of its generations, or of its budget."""
-    planned = campaign.planned[label]
-    over = 0.0
-    try:
-        configs = planned.configs()
-        for name, config in zip(planned.names, configs, strict=True):
-            path = campaign.places.run(name) / "generations.jsonl"
-            lines = whole_lines(read_bytes(path)) if path.is_file() else []
-            if lines:
-                budget = config.run.budget_evaluations
-                spent = (
-                    parse_json(lines[-1], str(path))["team_evaluations"] / budget if budget else 0.0
-                )
-                over += min(max(len(lines) / config.run.generations, spent), 1.0)
-        return over / len(configs)
-    except (ConevoError, KeyError, TypeError):
-        return 0.0

@@ -33,6 +33,10 @@ __all__ = ["carry_out", "core_seconds", "main", "planned_runs"]
 PATIENCE = 600.0  # seconds to wait for another worker that is just about to leave a run
 
 
+class _InUse(Exception):
+    """Another worker is at work on the run, and stays."""
+
+
 def planned_runs(root: Path) -> dict[str, PlannedRun]:
     """Return the runs of a campaign by label, in the order of the plan.
 
@@ -61,7 +65,7 @@ def carry_out(root: Path, label: str, threads: int, *, spent_before: float = 0.0
         spent_before: core seconds of this process that are not the run's.
 
     Returns:
-        Whether it is finished. If not, ``ended/LABEL.json`` says why.
+        Whether it is finished. If not, ``ended/LABEL.json`` says why, unless another worker has it.
     """
     began = time.perf_counter()
     ending: dict[str, Any] = {"status": "finished", "origin": "", "message": "", "traceback": ""}
@@ -73,6 +77,9 @@ def carry_out(root: Path, label: str, threads: int, *, spent_before: float = 0.0
         found = _evolve(places, planned[label], threads)
         if planned[label].studies:
             _study(places, planned[label], found, threads)
+    except _InUse:
+        sys.stderr.write(f"{label} is in use by another worker, and left to it\n")
+        return False  # whoever has it writes how it ended
     except Exception as error:
         ending = {"status": "failed", **_describe(error)}
     ending |= {
@@ -128,6 +135,8 @@ def _evolve(places: Places, planned: PlannedRun, threads: int) -> Run | Shaping:
     deadline = time.monotonic() + PATIENCE
     while found.status == "running" and time.monotonic() < deadline:
         time.sleep(0.2)
+    if found.status == "running":
+        raise _InUse
     if found.status != "finished":
         found.resume(threads=threads)
     return found

@@ -16,6 +16,7 @@ from conevo.campaigns.executors import usable_cores
 from conevo.campaigns.ledger import STATES, Entry
 from conevo.campaigns.plan import PlannedRun
 from conevo.campaigns.plan_file import preset_names, read_preset
+from conevo.campaigns.progress import last_written, progress_of
 from conevo.cli.find import campaigns_in
 from conevo.cli.text import duration, table
 from conevo.errors import ConevoError
@@ -89,24 +90,77 @@ def print_status(campaign: Campaign, with_runs: bool, as_json: bool) -> bool:
     if as_json:
         rows = [
             {"run": e.label, "state": e.state, "attempts": e.attempts, "reason": e.reason}
+            | _how_far(campaign, e)
             for e in entries.values()
         ]
         about = {"campaign": str(campaign.path), "running": campaign.is_running}
         click.echo(json.dumps(about | {"seconds_left": left, "runs": rows}))
         return bool(failed)
     click.echo(f"{campaign.plan.title or campaign.plan.name} (preset {campaign.plan.preset})")
-    running = "running" if campaign.is_running else "not running"
     rest = f", about {duration(left)} left" if left is not None else ""
-    click.echo(f"{campaign.path}: {running}, {counts(entries)}{rest}\n")
+    click.echo(f"{campaign.path}: {_whose(campaign, entries)}, {counts(entries)}{rest}")
+    if sign := _sign_of_life(campaign, entries):
+        click.echo(sign)
+    click.echo()
     if with_runs:
-        rows_of = [[e.label, e.state, str(e.attempts), e.reason] for e in entries.values()]
-        click.echo(table(["run", "state", "attempts", "reason"], rows_of))
+        rows_of = [
+            [e.label, e.state, *_progress(campaign, e), str(e.attempts), e.reason]
+            for e in entries.values()
+        ]
+        click.echo(table(["run", "state", "done", "last written", "attempts", "reason"], rows_of))
     else:
         head, cells = grid(campaign.planned.values(), entries)
         click.echo(table(head, cells))
     for entry in failed:
         click.echo(f"failed {entry.label}: {entry.reason}")
     return bool(failed)
+
+
+def _whose(campaign: Campaign, entries: Mapping[str, Entry]) -> str:
+    """Return who carries the campaign out, as far as can be seen from here."""
+    if campaign.is_running:
+        return "running"
+    if any(entry.state == "running" for entry in entries.values()):
+        return "running without a coordinator"
+    return "not running"
+
+
+def _sign_of_life(campaign: Campaign, entries: Mapping[str, Entry]) -> str:
+    """Return when a run that is not finished was last written, whoever writes it and where."""
+    labels = [e.label for e in entries.values() if e.state in ("pending", "running")]
+    at = max(filter(None, (last_written(campaign.places, label) for label in labels)), default=None)
+    return "" if at is None else f"last generation written {_ago(at)}"
+
+
+def _ago(at: float) -> str:
+    return f"{duration(max(time.time() - at, 0.0))} ago"
+
+
+def _progress(campaign: Campaign, entry: Entry) -> tuple[str, str]:
+    """Return how far a run is, and when it was last written, for a table."""
+    found = progress_of(campaign.places, campaign.planned[entry.label])
+    if found.written is None:
+        return "", ""
+    done = f"{found.generations}"
+    if entry.state == "finished":
+        return f"{done} generations", ""
+    if found.budget:
+        done = f"{found.evaluations:,} of {found.budget:,} evaluations"
+    elif found.of:
+        done = f"{done} of {found.of} generations"
+    return done, _ago(found.written)
+
+
+def _how_far(campaign: Campaign, entry: Entry) -> dict[str, Any]:
+    """Return the same as JSON has it."""
+    found = progress_of(campaign.places, campaign.planned[entry.label])
+    return {
+        "generations": found.generations,
+        "generations_planned": found.of,
+        "evaluations": found.evaluations,
+        "budget": found.budget,
+        "written": found.written,
+    }
 
 
 def counts(entries: Mapping[str, Entry]) -> str:

@@ -1,0 +1,48 @@
+"""How the last worker of a run ended: the file ``ended/LABEL.json``, written by the worker."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal
+
+from typing_extensions import TypedDict
+
+from conevo.reading import DamagedFile, read_json
+
+__all__ = ["Ended", "read_ended"]
+
+
+class Ended(TypedDict):
+    """What a worker wrote, as far as it is read again.
+
+    status: whether the run is finished and studied. origin: of a failure: the "machine", the
+    "request" or the "program". message: of a failure. core_seconds: of the attempt.
+    """
+
+    status: Literal["finished", "failed"]
+    origin: str
+    message: str
+    core_seconds: float
+
+
+def read_ended(path: Path) -> Ended | None:
+    """Return how a worker ended; None if it has not written that, or the file is damaged.
+
+    A damaged one is as none: the run's directory shows what there is, and the next worker writes
+    another.
+
+    Raises:
+        EnvironmentFailure: it cannot be read.
+    """
+    if not path.is_file():
+        return None
+    try:
+        found = read_json(path, Ended)
+    except DamagedFile:
+        return None
+    return Ended(
+        status=found["status"],
+        origin=found["origin"],
+        message=found["message"],
+        core_seconds=found["core_seconds"],
+    )
