@@ -197,6 +197,16 @@ def _run(
             "larger_is_better": [1.0] * len(task.measures),
         },
         "scores": _scores(run, task, level, [names[k] for k in present], rng),
+        "champions": {
+            "run": [run] * 2,
+            "generation": [generations - 1] * 2,
+            "finalists": [3] * 2,
+            "measure": ["fitness", task.measures[0]],
+            "selection": [8.0, 2 * level],
+            "validation": [6.0, 1.5 * level],
+            "test": [2.0, level],
+            "ratio": [0.25, 0.5],
+        },
         "generations": {
             "run": [run] * generations,
             "generation": steps,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import re
+import shutil
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -15,7 +16,9 @@ import pytest
 from analysis.finished_runs import Cell, cells, mean_of, write_campaign
 from conevo.analysis.frames import Tables
 from conevo.analysis.report import sections_of, write_report
+from conevo.analysis.sections.champions import champions
 from conevo.analysis.sections.overview import read_campaign
+from conevo.analysis.sections.scope import scopes
 from conevo.errors import UsageError
 
 PLACES = ["rover/complex-1", "rover/complex-2", "pursuit/team-4"]
@@ -78,7 +81,8 @@ def test_the_page_stands_alone_and_its_links_lead_somewhere(report) -> None:
 def test_every_section_is_there_and_says_n_and_tests(report) -> None:
     text = (report / "index.html").read_text()
     for title in ("What was run", r"Task performance: value \(points, larger is better\)",
-                  "Comparisons", "Learning", "Castes", "Lesions", "Behavioural validation: clones",
+                  "How champions were chosen", "Comparisons", "Learning", "Castes", "Lesions",
+                  "Behavioural validation: clones",
                   "Measures of specialization", "Behaviours", "Claims of the thesis",
                   "How to repeat it"):  # fmt: skip
         assert re.search(rf"<h[23]>{title}</h[23]>", text), title
@@ -89,6 +93,42 @@ def test_every_section_is_there_and_says_n_and_tests(report) -> None:
     for test in ("Student", "Welch", "Mann-Whitney", "Holm", "Kolmogorov-Smirnov", "Lilliefors"):
         assert test in text
     assert "The thesis has 20 runs per cell; here are 4." in text
+
+
+def test_what_chose_the_champions_stands_next_to_what_is_left_of_them(report) -> None:
+    rows = rows_of(report / "numbers/rover-complex-chosen.csv")
+    assert [(row["measure"], row["n"]) for row in rows] == [("fitness", "4")] * 6 + [
+        ("value", "4")
+    ] * 6
+    means = {
+        (row["environment"], row["method"]): float(row["mean"])
+        for row in rows_of(report / "numbers/rover-complex-performance.csv")
+    }
+    for row in rows:
+        level = means[row["environment"], row["method"]]
+        expected = [8, 6, 2, 0.25]
+        if row["measure"] == "value":
+            expected = [float(row["test"]) * factor for factor in (2, 1.5, 1)] + [0.5]
+            assert float(row["test"]) == pytest.approx(level, rel=0.1)
+        found = [float(row[key]) for key in ("selection", "validation", "test", "ratio")]
+        assert found == pytest.approx(expected)
+
+
+def test_scenarios_without_a_finite_value_are_counted_in_words(campaign, tmp_path) -> None:
+    copy = shutil.copytree(campaign, tmp_path / "copy", ignore=lambda *_: ["report"])
+    scores = copy / "tables" / "scores.parquet"
+    first = "SELECT min(run) FROM old WHERE contains(run, 'pursuit')"
+    with duckdb.connect() as connection:
+        connection.sql(f"CREATE TABLE old AS FROM read_parquet('{scores}')")
+        connection.sql(
+            f"UPDATE old SET value = NULL WHERE run = ({first}) AND study = 'test' AND scenario < 2"
+            " AND measure = 'capture_time' AND team = 'champion'"
+        )
+        connection.sql(f"COPY old TO '{scores}' (FORMAT parquet)")
+    with Tables(copy / "tables") as tables:
+        told = [champions(scope).text for scope in scopes(tables)]
+    (sentence,) = [line for lines in told for line in lines]
+    assert sentence.startswith("Not finite: capture time of the champions of 1 of 12 runs, in 2 of")
 
 
 def test_what_failed_is_listed_and_escaped(report) -> None:

@@ -1,4 +1,5 @@
 import json
+import shutil
 
 import numpy as np
 import pytest
@@ -6,6 +7,9 @@ import pytest
 from campaigns.plans import tiny_campaign
 from conevo.analysis.frames import SCHEMA, Tables
 from conevo.campaigns.executors import Serial
+from conevo.campaigns.places import Places
+from conevo.campaigns.tables import seal_tables
+from conevo.runs.champions import shrinkage
 from conevo.runs.directory import read_json
 from conevo.runs.run import Run
 
@@ -64,6 +68,45 @@ def test_scores_are_those_of_the_testing_phase(campaign, tables):
                     f"AND team = '{title}' AND measure = '{measure}' ORDER BY scenario"
                 )
                 assert [value for (value,) in rows] == values["values"]
+
+
+def test_champions_are_those_of_the_validation(campaign, tables):
+    for label in campaign.planned:
+        run = Run(campaign.places.run(label))
+        columns, rows = tables.query(f"SELECT * FROM champions WHERE run = '{label}'")
+        about = run.test_result["validation"]
+        expected = [
+            {
+                "run": label,
+                "generation": run.champion.generation,
+                "finalists": len(about["finalists"]),
+                "measure": row["measure"],
+                "selection": row["selection"],
+                "validation": row["validation"]["mean"],
+                "test": row["test"]["mean"],
+                "ratio": row["ratio"],
+            }
+            for row in shrinkage(run.test_result)
+        ]
+        assert [dict(zip(columns, row, strict=True)) for row in rows] == expected
+        assert [row["measure"] for row in expected] == ["fitness", "value", "area"]
+
+
+def test_a_value_that_is_not_finite_keeps_its_scenario(campaign, tmp_path):
+    places = Places(shutil.copytree(campaign.path, tmp_path / "copy"))
+    label = min(campaign.planned)
+    path = places.run(label) / "test.json"
+    test = read_json(path)
+    test["champion"]["performance"]["value"]["values"][1] = None
+    path.write_text(json.dumps(test))
+    shutil.rmtree(places.tables)
+    seal_tables(places, list(campaign.planned.values()), {})
+    with Tables(places.tables) as opened:
+        _, rows = opened.query(
+            f"SELECT scenario, value FROM scores WHERE run = '{label}' AND study = 'test' "
+            "AND team = 'champion' AND measure = 'value' ORDER BY scenario"
+        )
+    assert rows == list(enumerate(test["champion"]["performance"]["value"]["values"]))
 
 
 def test_generations_and_castes_are_those_of_the_log(campaign, tables):

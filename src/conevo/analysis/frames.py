@@ -57,6 +57,16 @@ SCHEMA: dict[str, dict[str, str]] = {
         "scenario": "INTEGER",
         "value": "DOUBLE",
     },
+    "champions": {
+        "run": "VARCHAR",
+        "generation": "INTEGER",
+        "finalists": "INTEGER",
+        "measure": "VARCHAR",
+        "selection": "DOUBLE",
+        "validation": "DOUBLE",
+        "test": "DOUBLE",
+        "ratio": "DOUBLE",
+    },
     "generations": {
         "run": "VARCHAR",
         "generation": "INTEGER",

@@ -30,6 +30,7 @@ from conevo.analysis.marl_eval import export
 from conevo.analysis.sections.behaviours import behaviours
 from conevo.analysis.sections.budgets import Spent, headings, spent_by
 from conevo.analysis.sections.castes import castes
+from conevo.analysis.sections.champions import champions
 from conevo.analysis.sections.claims import claims
 from conevo.analysis.sections.comparisons import comparisons
 from conevo.analysis.sections.interventions import clones, lesions
@@ -103,6 +104,7 @@ def _about(scope: Scope, title: str, spent: Spent) -> Section:
     histories = read_histories(scope.tables, scope.group)
     parts = [
         performance(scope),
+        champions(scope),
         comparisons(scope),
         learning(scope, histories),
         castes(scope, histories),

@@ -16,6 +16,7 @@ from conevo.analysis.frames import SCHEMA
 from conevo.campaigns.places import Places
 from conevo.campaigns.plan import PlannedRun
 from conevo.reading import read_json, read_json_lines
+from conevo.runs.champions import shrinkage
 from conevo.runs.config import RunConfig
 from conevo.runs.directory import as_json
 from conevo.runs.drafts import draft_of
@@ -128,6 +129,8 @@ def _rows(
                 about = {"run": name, "study": "test", "team": title, "measure": measure}
                 for scenario, value in enumerate(values["values"]):
                     yield "scores", about | {"scenario": scenario, "value": value}
+        for row in shrinkage(test) if "validation" in test else ():
+            yield "champions", _champion_row(name, test["validation"], row)
         for record in records:
             yield from _generation_rows(name, record)
         if places.study(name).is_file():
@@ -201,6 +204,12 @@ def _generation_rows(name: str, record: Row) -> Iterator[tuple[str, Row]]:
     for caste, robots in record["castes"].items():
         about = {"run": name, "generation": generation}
         yield "castes", about | {"caste": caste, "robots": robots}
+
+
+def _champion_row(name: str, validation: Row, row: Row) -> Row:
+    means = {key: row[key]["mean"] for key in ("validation", "test")}
+    about = {"run": name, "generation": validation["chosen"]}
+    return about | {"finalists": len(validation["finalists"])} | row | means
 
 
 def _study_rows(name: str, study: Row) -> Iterator[tuple[str, Row]]:

@@ -10,10 +10,10 @@ import click
 
 from conevo.cli.text import castes, count, duration, mean, n_finite, neurons, number, spread, table
 from conevo.evolution.methods.registry import METHODS
+from conevo.runs.champions import shrinkage
 from conevo.runs.code import changes_text, sessions_of
 from conevo.runs.config import RunConfig, resolve
 from conevo.runs.run import Run
-from conevo.runs.testing import shrinkage
 
 __all__ = [
     "generations_table",
