@@ -25,6 +25,8 @@ def say(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureF
     """Return a function that runs a command in an empty directory; no browser opens."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("webbrowser.open", lambda address: True)
+    monkeypatch.setattr("webbrowser.get", lambda: object())
+    monkeypatch.setenv("DISPLAY", ":0")
 
     def run(*arguments: str) -> Said:
         monkeypatch.setattr(sys, "argv", ["conevo", *arguments])

@@ -9,6 +9,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import threading
 import urllib.request
 from dataclasses import replace
 from pathlib import Path
@@ -17,7 +18,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from conevo.cli.main import main
 from conevo.cli.seeing import bar
+from conevo.replay.live.server import LiveServer
 from conevo.replay.trajectory import Trajectory
 from runs.tiny import evolve_tiny
 
@@ -30,7 +33,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("made")
     evolve_tiny(folder / "cone", **LONG)
     evolve_tiny(folder / "homcne", "homcne")
-    more = {"world__iterations": 100, "world__n_robots": 10}
+    more = {"world__iterations": 100, "world__n_robots": 10, "run__seed": 2}
     evolve_tiny(folder / "later", "homcne", **more)  # its champion is not of generation 0
     evolve_tiny(folder / "pursuit", task="pursuit/team-10")
     evolve_tiny(folder / "gacc", task="gacc/complex-9")
@@ -147,6 +150,26 @@ def test_a_film_a_poster_and_what_their_options_do(say, here) -> None:
     with Image.open(said.out.strip()) as film:
         assert film.n_frames == 4
         assert film.width > 2 * 200
+
+
+def test_films_that_differ_have_names_that_differ(say, here) -> None:
+    base = ("film", "homcne", "--size", "200", "--threads", "1")
+    others = [
+        ("--gif",),
+        ("--gif", "--from", "4"),
+        ("--gif", "--to", "4"),
+        ("--gif", "--from", "4", "--to", "7", "--every", "3"),
+        ("--gif", "--every", "3"),
+        ("--gif", "--every", "3", "--fps", "10"),
+        ("--gif", "--every", "3", "--colour", "caste"),
+        ("--poster", "3"),
+        ("--poster", "4"),
+    ]
+    said = [say(*base, *other) for other in others]
+    assert [one.code for one in said] == [0] * len(others), said
+    assert len({one.out for one in said}) == len(others)
+    assert said[3].out.strip().endswith("-from-4-to-7-every-3-size-200.gif")
+    assert "exists already" in say(*base, "--gif").err
 
 
 @pytest.mark.parametrize(
@@ -281,6 +304,34 @@ def test_watch_serves_until_it_is_interrupted(here, monkeypatch) -> None:
     _, err = watching.communicate(timeout=20)
     assert (watching.returncode, err) == (0, "")
     assert {path: path.stat().st_mtime_ns for path in here.rglob("*")} == before
+
+
+def test_watch_serves_while_a_browser_does_not_return(here, monkeypatch) -> None:
+    monkeypatch.chdir(here)
+    monkeypatch.setenv("DISPLAY", ":0")
+    answers: list[str] = []
+    served = threading.Event()
+
+    def browser(address: str) -> bool:
+        answers.append(fetched(f"{address}state.json"))  # before it returns
+        served.set()
+        return True
+
+    def serve(watched, port, replay, on_ready) -> None:
+        with LiveServer(watched, port, replay) as server:
+            on_ready(server.address)
+            until = threading.Thread(target=lambda: (served.wait(20), server.shutdown()))
+            until.start()
+            server.serve_forever(poll_interval=0.01)
+            until.join()
+
+    monkeypatch.setattr("webbrowser.get", lambda: object())
+    monkeypatch.setattr("webbrowser.open", browser)
+    monkeypatch.setattr("conevo.replay.live.server.serve", serve)
+    with pytest.raises(SystemExit) as ended:
+        main(["watch", "cone"])
+    assert ended.value.code == 0
+    assert [run["label"] for run in json.loads(answers[0])["runs"]] == ["cone"]
 
 
 def spawn_watch(*what: str) -> subprocess.Popen[str]:

@@ -62,7 +62,12 @@ def film(
     if out:
         refuse_file(Path(out))
     seen = trajectories(what, **which)
-    path = Path(out) if out else REPLAYS / f"{name_of(seen)}.{kind}"
+    asked = {
+        "from": first, "to": last, "every": every, "at": poster, "fps": fps, "size": size,
+        "by": colour if colour != "action" else None,
+    }  # fmt: skip
+    name = "-".join([name_of(seen), *(f"{k}-{v}" for k, v in asked.items() if v is not None)])
+    path = Path(out) if out else REPLAYS / f"{name}.{kind}"
     refuse_file(path)
     painter = Painter(stages(seen, what, which["beside"]), size or SIZES[kind], colour)
     if poster is not None:

@@ -7,7 +7,8 @@ from typing import Any
 
 import click
 
-from conevo.cli.seeing import epoch_options, open_page
+from conevo.cli.browser import open_page
+from conevo.cli.seeing import epoch_options
 
 __all__ = ["replay"]
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from conevo.replay.stage import Stage
     from conevo.replay.trajectory import Trajectory
 
-__all__ = ["REPLAYS", "bar", "epoch_options", "name_of", "open_page", "stages", "trajectories"]
+__all__ = ["REPLAYS", "bar", "epoch_options", "name_of", "stages", "trajectories"]
 
 REPLAYS = Path("replays")  # where pages and films are put unless told otherwise
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -121,14 +121,6 @@ def name_of(seen: list[Trajectory]) -> str:
     ]
     name = "-beside-".join(re.sub(r"[^\w.-]+", "-", one).strip("-.") for one in names)
     return name[:200] or "epoch"  # the label of a file from elsewhere may be anything
-
-
-def open_page(address: str) -> None:
-    """Open a page in the browser, or say that there is none."""
-    import webbrowser
-
-    if not webbrowser.open(address):
-        click.echo(f"conevo: note: no browser found here; open {address} in one", err=True)
 
 
 @contextmanager

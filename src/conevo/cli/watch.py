@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from conevo.cli.seeing import open_page
+from conevo.cli.browser import open_while_serving
 
 if TYPE_CHECKING:
     from conevo.replay.live.watched import Watched
@@ -34,7 +34,7 @@ def watch(what: str | None, port: int, no_browser: bool) -> None:
     def on_ready(address: str) -> None:
         click.echo(f"{address}  (Ctrl-C ends it; the runs go on)")
         if not no_browser:
-            open_page(address)
+            open_while_serving(address)
 
     serve(watched, port, lambda label: _champion_page(*watched.champion(label)), on_ready)
 
