@@ -163,14 +163,25 @@ def read_json(path: Path, model: type | None = None, limit: int = MOST_TEXT) -> 
     return parse_json(read_bytes(path, limit), str(path), model)
 
 
-def read_json_lines(path: Path, model: type | None = None) -> list[dict[str, Any]]:
-    """Return the objects in a file that holds one per line; a torn last line does not count.
+def read_json_lines(
+    path: Path, model: type | None = None, *, is_log: bool = False
+) -> list[dict[str, Any]]:
+    """Return the objects in a file that holds one per line.
+
+    Args:
+        path: the file.
+        model: what the objects must be, see ``check``; anything if None.
+        is_log: whether lines are appended, so that a kill may leave a torn last one, which does
+            not count.
 
     Raises:
         DamagedFile: a line is not such an object; it is named by its number.
         EnvironmentFailure: it cannot be read.
     """
-    lines = whole_lines(read_bytes(path, MOST_LOG))
+    content = read_bytes(path, MOST_LOG)
+    lines = whole_lines(content)
+    if not is_log and content and not content.endswith(b"\n"):
+        raise DamagedFile(f"{path} is damaged: line {len(lines) + 1} is not whole")
     return [
         parse_json(line, f"{path}", model, f" in line {number}")
         for number, line in enumerate(lines, 1)

@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from conevo import palette
 from conevo.errors import EnvironmentFailure, UsageError
-from conevo.replay import film, palette
+from conevo.replay import film
 from conevo.replay.drawing.panel import PAGE, Panel
 from conevo.replay.drawing.planes import RGB
 from conevo.replay.picture import Painter

@@ -202,21 +202,21 @@ def command(path: Path, settings: dict[str, Any]) -> list[str]:
 def test_kills_between_and_within_the_stages_are_not_noticed(tmp_path: Path) -> None:
     path, settings = tmp_path / "killed", tiny_settings("cone") | BRIEF
     first = ["run", "rover/complex-3", "--shape", *command(path, settings)]
-    killed_at(r"/\.killed\.\w+/shaping\.toml", *first)
+    killed_at(r"/\.killed\.\w+/killed/shaping\.toml", *first)
     assert not path.exists()
-    killed_at(r"/\.stage-1\.\w+/config\.toml", *first)
+    killed_at(r"/\.stage-1\.\w+/stage-1/config\.toml", *first)
     assert Shaping(path).status == "interrupted"
     assert Shaping(path).stages == []
     for begun, pattern in (
         (1, r"stage-1/generations\.jsonl$"),  # in the first generation of all
         (1, r"stage-1/DONE"),
         (1, r"killed/generations\.jsonl"),  # between two stages
-        (1, r"/\.stage-2\.\w+/origin\.npz"),
-        (2, r"stage-2/provenance\.json"),
+        (1, r"/\.stage-2\.\w+/stage-2/origin\.npz"),
+        (2, r"killed/stage-2/provenance\.json"),
         (2, r"stage-2/teams/generation-0000"),  # before a stage's first generation ends
         (2, r"stage-2/checkpoint-b"),
         (2, r"stage-2/test\.json"),
-        (2, r"/\.stage-3\.\w+/generations"),
+        (2, r"/\.stage-3\.\w+/stage-3/generations"),
         (3, r"stage-3/checkpoint-a"),
         (3, r"killed/DONE"),  # with all stages finished
     ):
@@ -236,7 +236,7 @@ def test_kills_while_construction_is_learned_in_turn_are_not_noticed(tmp_path: P
     arguments = ["run", "gacc/complex-4", "--shape", *command(path, settings)]
     for begun, pattern in (
         (1, r"stage-1/checkpoint-b"),
-        (1, r"/\.stage-2\.\w+/config\.toml"),  # between two stages
+        (1, r"/\.stage-2\.\w+/stage-2/config\.toml"),  # between two stages
         (3, r"stage-3/generations\.jsonl$"),
         (4, r"stage-4/test\.json"),
     ):

@@ -424,5 +424,5 @@ def test_a_file_that_is_no_prey_set_is_refused_without_advice_to_unpickle_it(tmp
     path.write_text("format = 1")
     with pytest.raises(UsageError) as caught:
         world("pursuit/team-1", prey=str(path))
-    assert "no prey set (not an npz file)" in str(caught.value)
+    assert "prey.toml is damaged or not a prey set" in str(caught.value)
     assert "pickle" not in str(caught.value)

@@ -106,7 +106,7 @@ def _rows(
     for name, config in zip(names, configs, strict=True):
         path = places.run(name)
         provenance = read_json(path / "provenance.json")
-        records = read_json_lines(path / "generations.jsonl")
+        records = read_json_lines(path / "generations.jsonl", is_log=True)
         test = read_json(path / "test.json")
         measures = _measures(provenance, config)
         yield (

@@ -52,6 +52,8 @@ def planned_runs(root: Path) -> dict[str, PlannedRun]:
         ]
     except TypeError as error:
         raise UsageError(f"{path} is damaged: {error}") from error
+    if not runs:
+        raise UsageError(f"{path} is damaged: it lists no run")
     return {run.label: run for run in runs}
 
 

@@ -121,7 +121,7 @@ class Store(Directory):
             UsageError: a line in the middle is damaged.
         """
         path = self.path / GENERATIONS
-        records = read_json_lines(path) if os.path.lexists(path) else []
+        records = read_json_lines(path, is_log=True) if os.path.lexists(path) else []
         for number, record in enumerate(records):
             if record.get("generation") != number:
                 raise DamagedFile(

@@ -95,7 +95,7 @@ class PursuitParams(ArenaParams):
                 raise UsageError(f"world.prey_digest belongs to a prey file, not to {self.prey!r}")
             return
         path = Path(self.prey)
-        if not path.exists() and path.name == self.prey and not path.suffix:
+        if not self.prey or (not path.exists() and path.name == self.prey and not path.suffix):
             raise unknown_name("prey", self.prey, PREY_MODES, "(and no such file)")
         found = prey_sets.load(path).digest
         if self.prey_digest not in ("", found):
