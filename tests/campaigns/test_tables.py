@@ -9,9 +9,9 @@ from conevo.analysis.frames import SCHEMA, Tables
 from conevo.campaigns.executors import Serial
 from conevo.campaigns.places import Places
 from conevo.campaigns.tables import seal_tables
-from conevo.runs.champions import shrinkage
 from conevo.runs.directory import read_json
 from conevo.runs.run import Run
+from conevo.runs.shrinkage import shrinkage
 
 
 @pytest.fixture(scope="module")

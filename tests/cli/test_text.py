@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -100,9 +101,9 @@ def test_pace_counts_down_to_the_last_generation_or_the_end_of_the_budget(tmp_pa
     for generation in range(2):
         pace.add({"team_evaluations": 100 * (generation + 1), "seconds": 2.0})
     assert pace.rate == 50
-    pace.settings = type(pace.settings)(generations=250, budget_evaluations=1000)
+    pace.settings = replace(pace.settings, generations=250, budget_evaluations=1000)
     assert pace.remaining(1) == 16  # 800 evaluations left at 50 per second
-    pace.settings = type(pace.settings)(generations=5, budget_evaluations=1000)
+    pace.settings = replace(pace.settings, generations=5, budget_evaluations=1000)
     assert pace.remaining(1) == 6  # three generations of two seconds
 
 

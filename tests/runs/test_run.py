@@ -15,9 +15,10 @@ import conevo
 from conevo.errors import EnvironmentFailure, UsageError
 from conevo.evolution.methods.registry import METHODS
 from conevo.rng import fold
-from conevo.runs.champions import Team, finalists, sampled_generations, shrinkage
+from conevo.runs.champions import Team, finalists, sampled_generations
 from conevo.runs.config import resolve
 from conevo.runs.run import start
+from conevo.runs.shrinkage import shrinkage
 from conevo.runs.testing import spread
 from runs.tiny import TASK, content, evolve_tiny, tiny_settings
 

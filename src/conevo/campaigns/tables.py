@@ -16,11 +16,11 @@ from conevo.analysis.frames import SCHEMA
 from conevo.campaigns.places import Places
 from conevo.campaigns.plan import PlannedRun
 from conevo.reading import read_json, read_json_lines
-from conevo.runs.champions import shrinkage
 from conevo.runs.config import RunConfig
 from conevo.runs.directory import as_json
 from conevo.runs.drafts import draft_of
 from conevo.runs.durable import replace_file, sync_directory, writing
+from conevo.runs.shrinkage import shrinkage
 from conevo.worlds.measures import Measure, measures_of
 
 __all__ = ["is_sealed", "seal_tables"]

@@ -63,7 +63,7 @@ def carry_on(
     def carry(run: Run, stage: int = 0) -> None:
         of = before = 0
         if not isinstance(found, Run):
-            of, before = len(found.configs), len(found.generations()) - len(run.generations())
+            of, before = len(found.outlines), len(found.generations()) - len(run.generations())
         with watching(run, style, stage, of, before) as watch:
             run.resume(
                 threads=threads,

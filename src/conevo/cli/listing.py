@@ -92,12 +92,12 @@ def _runs(folder: str | None) -> Rows:
         try:
             found = find(str(path))
             runs = [found] if isinstance(found, Run) else found.stages
-            configs = [found.config] if isinstance(found, Run) else found.configs
-            done = sum(len(run.generations()) for run in runs)
-            count = f"{done}/{sum(config.run.generations for config in configs)}"
-            status, config = found.status, configs[-1]
-            task = config.task if isinstance(found, Run) else span(found)
-            about = (task, config.method, config.preset, str(config.run.seed))
+            outlines = [found.outline] if isinstance(found, Run) else found.outlines
+            done = sum(run.n_generations for run in runs)
+            count = f"{done}/{sum(outline.generations for outline in outlines)}"
+            status, last = found.status, outlines[-1]
+            task = last.task if isinstance(found, Run) else span(found)
+            about = (task, last.method, last.preset, str(last.seed))
         except ConevoError as error:
             count, status, about = "", f"damaged: {error}", ("", "", "", "")
         names = ("run", "world", "method", "preset", "seed", "generations", "status")

@@ -33,7 +33,7 @@ def watching(
         n_stages: the stages of that shaping.
         before: generations of its stages before this one.
     """
-    heading = (f"stage {stage} of {n_stages}: " if stage else "") + title(run.config)
+    heading = (f"stage {stage} of {n_stages}: " if stage else "") + title(run.outline)
     if style == "live":
         from rich.live import Live
 
@@ -47,7 +47,7 @@ def watching(
 
         def add(run: Run, record: Record) -> None:
             place = {"number": before + record["generation"], "stage": stage}
-            place["task"] = run.config.task
+            place["task"] = run.outline.task
             click.echo(json.dumps((place if stage else {}) | record))
 
         yield add if style == "json" else lambda run, record: None
@@ -58,7 +58,7 @@ class Pace:
 
     def __init__(self, run: Run) -> None:
         records = run.generations()
-        self.settings = run.config.run
+        self.settings = run.outline
         self.spent = records[-1]["team_evaluations"] if records else 0
         self.recent: list[tuple[float, int]] = []  # seconds and evaluations of a generation
 
@@ -107,7 +107,7 @@ class Lines:
     def add(self, run: Run, record: Record) -> None:
         """Print a generation if it is time to."""
         self.pace.add(record)
-        total, generation = run.config.run.generations, record["generation"]
+        total, generation = run.outline.generations, record["generation"]
         if time.monotonic() < self.next and generation + 1 < total:
             return
         self.next = time.monotonic() + self.pause
@@ -125,7 +125,7 @@ class Display:
     """The live view on a terminal."""
 
     def __init__(self, run: Run, heading: str = "") -> None:
-        self.run, self.heading, self.pace = run, heading or title(run.config), Pace(run)
+        self.run, self.heading, self.pace = run, heading or title(run.outline), Pace(run)
         self.records, self.started = run.generations(), time.monotonic()
 
     def add(self, run: Run, record: Record) -> None:

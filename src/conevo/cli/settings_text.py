@@ -104,8 +104,8 @@ def print_dry_run(configs: Sequence[RunConfig], path: Path, as_json: bool) -> No
     click.echo(f"# {path} (nothing was written)")
     for one, price in zip(configs, prices, strict=True):
         click.echo(
-            f"# {title(one)}: {count(price.evaluations)} team evaluations in the first generation, "
-            f"at most {count(price.generations)} generations, "
+            f"# {title(one.outline)}: {count(price.evaluations)} team evaluations in the first "
+            f"generation, at most {count(price.generations)} generations, "
             f"about {price.team_steps:.2g} team-steps"
         )
     click.echo(configs[-1].to_toml().rstrip())

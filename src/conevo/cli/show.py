@@ -50,7 +50,7 @@ def _everything(run: Run) -> dict[str, Any]:
         "run": str(run.path),
         "status": run.status,
         "changed_files": run.changed_files,
-        "config": run.config.tables(),
+        "config": run.tables(),
         "provenance": run.provenance,
         "generations": run.generations(),
         "test": run.test_result,

@@ -18,7 +18,7 @@ __all__ = ["print_shaping_end", "shaping_text", "span", "stage_summary", "stages
 
 def span(shaping: Shaping) -> str:
     """Return the tasks of a shaping in short: "rover-v1/complex-1 to complex-3"."""
-    first, last = shaping.configs[0], shaping.configs[-1]
+    first, last = shaping.outlines[0], shaping.outlines[-1]
     return f"{first.task} to {last.environment}"
 
 
@@ -52,9 +52,9 @@ def shaping_text(shaping: Shaping, n_rows: int = 0) -> str:
     records = shaping.generations()
     seconds = sum(record["seconds"] for record in records)
     parts = [
-        title(shaping.configs[-1]).replace(shaping.configs[-1].task, span(shaping)),
+        title(shaping.outlines[-1]).replace(shaping.outlines[-1].task, span(shaping)),
         f"{shaping.path}: {state}",
-        f"{len(stages)} of {len(shaping.configs)} stages begun, {len(records)} generations, "
+        f"{len(stages)} of {len(shaping.outlines)} stages begun, {len(records)} generations, "
         f"{duration(seconds)}",
         *changes_text(shaping.sessions),
     ]
@@ -71,7 +71,7 @@ def stage_summary(run: Run) -> dict[str, Any]:
     """Return a stage in one object."""
     return {
         "run": str(run.path),
-        "task": run.config.task,
+        "task": run.outline.task,
         "status": run.status,
         "generations": len(run.generations()),
         "test": run.test_result,
@@ -119,9 +119,9 @@ def _table(stages: list[Run]) -> str:
         rows.append(
             [
                 str(stage),
-                run.config.task,
+                run.outline.task,
                 run.status,
-                f"{len(records)}/{run.config.run.generations}",
+                f"{len(records)}/{run.outline.generations}",
                 count(records[-1]["team_evaluations"] if records else 0),
                 "-" if champion is None else str(champion.generation),
                 *("-" if s is None else spread(s, tested["scenarios"]) for s in spreads),

@@ -10,10 +10,10 @@ import click
 
 from conevo.cli.text import castes, count, duration, mean, n_finite, neurons, number, spread, table
 from conevo.evolution.methods.registry import METHODS
-from conevo.runs.champions import shrinkage
 from conevo.runs.code import changes_text, sessions_of
-from conevo.runs.config import RunConfig, resolve
+from conevo.runs.outline import Outline
 from conevo.runs.run import Run
+from conevo.runs.shrinkage import shrinkage
 
 __all__ = [
     "generations_table",
@@ -27,10 +27,11 @@ __all__ = [
 ]
 
 
-def title(config: RunConfig) -> str:
+def title(outline: Outline) -> str:
     """Return one line that names a run."""
-    name = METHODS[config.method].title
-    return f"{config.task}, {name}, preset {config.preset}, seed {config.run.seed}"
+    known = METHODS.get(outline.method)
+    name = known.title if known else outline.method
+    return f"{outline.task}, {name}, preset {outline.preset}, seed {outline.seed}"
 
 
 def print_end(run: Run, style: str) -> None:
@@ -49,7 +50,10 @@ def print_end(run: Run, style: str) -> None:
 def run_text(run: Run, n_rows: int) -> str:
     """Return a finished or unfinished run as text."""
     records = run.generations()
-    parts = [title(run.config), _state(run), *changes_text(sessions_of(run.provenance))]
+    about = run.provenance
+    parts = [title(run.outline), _state(run), *changes_text(sessions_of(about))]
+    if changed := about.get("changed"):
+        parts.append(f"other than preset {run.outline.preset}: {', '.join(changed)}")
     if records:
         parts += ["", generations_table(spaced(records, n_rows))]
     if run.test_result:
@@ -150,12 +154,11 @@ def next_commands(run: Run) -> list[str]:
     """Return the exact commands for what can be done with a finished run, each after a comment."""
     config = run.config
     other = "mesp" if config.method.startswith("cone") else "cone"
-    plain = resolve(config.address, config.method, config.preset).tables()
+    tables = config.tables()
     changes = [
-        f" --set {section}.{key}={value}"
-        for section in ("run", "world")
-        for key, value in config.tables()[section].items()
-        if key != "seed" and value != plain[section].get(key)
+        f" --set {section}.{key}={tables[section][key]}"
+        for section, _, key in (name.partition(".") for name in config.changed)
+        if section in ("run", "world") and key in tables[section]
     ]
     seed = config.run.seed
     world = shlex.quote(config.address)
@@ -179,7 +182,7 @@ def _state(run: Run) -> str:
         state += f" {about['finished']} (stopped by: {about['stopped_by']})"
         changed = run.changed_files
         state += f"; CHANGED SINCE: {', '.join(changed)}" if changed else ""
-    spent = f"{len(records)} of {run.config.run.generations} generations"
+    spent = f"{len(records)} of {run.outline.generations} generations"
     if records:
         last = records[-1]
         seconds = sum(record["seconds"] for record in records)

@@ -15,8 +15,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
-import numpy as np
-
 from conevo.reading import DamagedFile, read_arrays
 from conevo.runs.durable import replace_file
 
@@ -38,6 +36,8 @@ def save(path: Path, record: Any, identity: Mapping[str, str]) -> None:
         record: a dataclass instance.
         identity: what the file belongs to; ``load`` asks for the same.
     """
+    import numpy as np
+
     fields = {field.name: getattr(record, field.name) for field in dataclasses.fields(record)}
     arrays = {name: value for name, value in fields.items() if isinstance(value, np.ndarray)}
     rest = {
@@ -91,6 +91,8 @@ def content_digest(path: Path) -> str:
 
 
 def _digest(about: Mapping[str, Any], arrays: Mapping[str, Any]) -> str:
+    import numpy as np
+
     digest = hashlib.blake2b(json.dumps(about, sort_keys=True).encode(), digest_size=16)
     for name in sorted(arrays):
         array = np.ascontiguousarray(arrays[name])

@@ -36,8 +36,6 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import hashlib
-import json
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
@@ -51,6 +49,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from conevo.errors import UsageError, shown, unknown_name
 from conevo.reading import DamagedFile, parse_toml, read_toml
+from conevo.runs.outline import Outline, identify, outline_of
 
 if TYPE_CHECKING:
     from conevo.worlds.protocol import World
@@ -159,14 +158,12 @@ class RunConfig:
         A file counts by its content: where a value has a digest beside it ("prey_digest"), the
         path does not count. Neither does that of a world's file.
         """
-        tables = self.tables()
-        del tables["run"]["preset"]
-        tables["run"]["world"] = self.task
-        for table in (tables["world"], tables["method"]):
-            for key in [key for key in table if key.endswith("_digest") and table[key]]:
-                table.pop(key.removesuffix("_digest"), None)
-        text = json.dumps(tables, sort_keys=True)
-        return hashlib.blake2b(text.encode(), digest_size=6).hexdigest()
+        return identify(self.tables(), self.task)
+
+    @property
+    def outline(self) -> Outline:
+        """What names the run."""
+        return outline_of(self.tables(), self.task)
 
     @property
     def label(self) -> str:

@@ -20,7 +20,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from conevo.runs.code import code_digest, version
-from conevo.worlds.measures import measures_of
 
 if TYPE_CHECKING:
     from conevo.worlds.protocol import World
@@ -47,6 +46,8 @@ def describe_world(world: World) -> dict[str, Any]:
 
     ``optimum`` is the largest possible value of the main measure, None where none is known.
     """
+    from conevo.worlds.measures import measures_of
+
     return {
         "name": world.name,
         "environment": world.environment,

@@ -4,21 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from conevo.errors import UsageError
-from conevo.evolution.protocol import State
 from conevo.runs import provenance
-from conevo.runs.champions import Team, finalists, fittest_team, sampled_generations
 from conevo.runs.code import last_code, refuse_other_code
-from conevo.runs.config import RunConfig, resolve
 from conevo.runs.directory import refuse_existing
-from conevo.runs.lab import Lab
-from conevo.runs.loop import evolve_generations
+from conevo.runs.outline import Outline
 from conevo.runs.store import Store, create
-from conevo.runs.testing import test_team, validate
-from conevo.worlds.measures import measures_of
+
+# A run is looked at more often than it is carried on: what simulates it is loaded where it is used.
+if TYPE_CHECKING:
+    from conevo.evolution.protocol import State
+    from conevo.runs.champions import Team
+    from conevo.runs.config import RunConfig
+    from conevo.runs.lab import Lab
 
 __all__ = ["RUNS", "Run", "evolve", "start"]
 
@@ -57,6 +59,8 @@ def evolve(
         UsageError: a name or value that is not allowed, or ``out`` exists; nothing was written.
         EnvironmentFailure: no such device, full disk, no permission.
     """
+    from conevo.runs.config import resolve
+
     settings = resolve(world, method, preset, seed, config, overrides)
     run = start(settings, out, threads=threads, device=device)
     return run.resume(threads=threads, watch=_print_line if progress else None)
@@ -87,6 +91,8 @@ def start(
             origin is unfinished, was changed since, or its populations do not fit.
         EnvironmentFailure: no such device, full disk, no permission; nothing was written.
     """
+    from conevo.runs.lab import Lab
+
     ancestor, ancestry = (None, {}) if origin is None else origin.ancestry()
     suffix = f"-from-{ancestry['origin']['checkpoint'][:6]}" if ancestry else ""
     path = Path(out) if out is not None else RUNS / f"{config.label}{suffix}"
@@ -122,7 +128,16 @@ class Run:
         self._store = Store(Path(path))
         self._lab = lab
         self.path = self._store.path
-        self.config: RunConfig = self._store.read_config()
+        self.outline: Outline = self._store.read_outline()
+
+    @cached_property
+    def config(self) -> RunConfig:
+        """Its settings, all of them; this loads its world.
+
+        Raises:
+            UsageError: the world's file is not there, or is not the one it was made with.
+        """
+        return self._store.read_config()
 
     def __repr__(self) -> str:
         return f"Run({str(self.path)!r})"
@@ -162,6 +177,15 @@ class Run:
         """Files of a finished run that are not as they were when it was sealed."""
         return self._store.check_seal() if self._store.is_finished else []
 
+    @property
+    def n_generations(self) -> int:
+        """Number of finished generations."""
+        return self._store.count_generations()
+
+    def tables(self) -> dict[str, Any]:
+        """Return the three tables of its configuration as they are written; loads no world."""
+        return self._store.read_tables()
+
     def generations(self) -> list[Record]:
         """Return the record of every finished generation."""
         return self._store.read_generations()
@@ -190,6 +214,10 @@ class Run:
         kept = self.team(generation)
         if kept is not None:
             return kept
+        from conevo.runs.champions import fittest_team
+        from conevo.runs.loop import evolve_generations
+        from conevo.worlds.measures import measures_of
+
         teams: list[Team] = []
 
         def keep(state: State, record: Record) -> None:
@@ -230,10 +258,10 @@ class Run:
                 f"{self.path} was changed since it was finished ({', '.join(changed)}): "
                 f"no run can begin with its populations"
             )
-        state, digest = self._store.load_final(self.config.method)
+        state, digest = self._store.load_final(self.outline.method)
         about = {
             "path": str(self.path),
-            "run_id": self.config.run_id,
+            "run_id": self.provenance["run_id"],
             "generation": state.generation,
             "checkpoint": digest,
         }
@@ -307,6 +335,8 @@ class Run:
     def _test(
         self, lab: Lab, team: Team, scenarios: int | None = None, seed: int | None = None
     ) -> Record:
+        from conevo.runs.testing import test_team
+
         return test_team(
             lab.rollout,
             lab.world,
@@ -317,6 +347,8 @@ class Run:
 
     def _conclude(self, lab: Lab) -> None:
         """Choose the champion among the finalists, and test it."""
+        from conevo.runs.testing import validate
+
         store, settings = self._store, self.config.run
         champion, validation = validate(
             lab.rollout,
@@ -353,6 +385,8 @@ class Run:
 
     def _equip(self, threads: int | None) -> Lab:
         """Return what the run needs, after checking that it is what it was started with."""
+        from conevo.runs.lab import Lab
+
         lab, self._lab = self._lab, None
         about = self.provenance
         if lab is None:
@@ -366,6 +400,10 @@ class Run:
         return lab
 
     def _evolve(self, lab: Lab, watch: Watch | None, remark: Callable[[str], None] | None) -> str:
+        from conevo.runs.champions import finalists, fittest_team, sampled_generations
+        from conevo.runs.loop import evolve_generations
+        from conevo.worlds.measures import measures_of
+
         store, settings, method = self._store, self.config.run, self.config.method
         state, problem = store.load_checkpoint(method)
         if state is None:
@@ -425,5 +463,5 @@ class Run:
 def _print_line(run: Run, record: Record) -> None:
     """Print one generation (``progress=True``)."""
     name, value = next(iter(record["performance"].items()))
-    total = run.config.run.generations
+    total = run.outline.generations
     print(f"generation {record['generation'] + 1}/{total}  {name} {value:g}", flush=True)  # noqa: T201 (asked for)

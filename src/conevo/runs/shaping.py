@@ -18,23 +18,24 @@ import hashlib
 import json
 import os
 from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import tomli_w
 
 from conevo.errors import UsageError
-from conevo.evolution.protocol import State
 from conevo.reading import read_bytes, read_toml
 from conevo.runs.code import last_code, refuse_other_code, sessions_of
-from conevo.runs.config import RunConfig, resolve
 from conevo.runs.directory import CONFIG, SHAPING, Directory, appearing, refuse_existing
 from conevo.runs.durable import replace_file
 from conevo.runs.evolved_prey import PREY, PREY_TASKS, save_prey
-from conevo.runs.inputs import keep_inputs
-from conevo.runs.lab import Lab
+from conevo.runs.outline import Outline, identify, outline_of
 from conevo.runs.run import RUNS, Record, Run, Watch, start
-from conevo.worlds.registry import resolve as resolve_world
+
+if TYPE_CHECKING:
+    from conevo.evolution.protocol import State
+    from conevo.runs.config import RunConfig
 
 __all__ = ["Shaping", "label", "start_shaping", "tasks_up_to"]
 
@@ -48,6 +49,8 @@ def tasks_up_to(task: str) -> list[str]:
     Raises:
         UsageError: no such task, or none comes before it.
     """
+    from conevo.worlds.registry import resolve as resolve_world
+
     entry, environment = resolve_world(task)
     family, _, number = environment.rpartition("-")
     if not (family and number.isdecimal() and int(number) > 1):
@@ -89,6 +92,10 @@ def start_shaping(
             not fit the next stage, or ``out`` exists; nothing was written.
         EnvironmentFailure: no such device, full disk, no permission.
     """
+    from conevo.runs.config import resolve
+    from conevo.runs.inputs import keep_inputs
+    from conevo.runs.lab import Lab
+
     if not tasks:
         raise UsageError("a shaping needs at least one task")
     configs = [resolve(task, method, preset, seed, config, overrides, place) for task in tasks]
@@ -102,6 +109,7 @@ def start_shaping(
             "format": FORMAT,
             "command": command,
             "device": device,
+            "tasks": [stage.task for stage in configs],
             "run_ids": [stage.run_id for stage in configs],
             "stages": [keep_inputs(stage, draft).tables(draft) for stage in configs],
         }
@@ -124,7 +132,21 @@ class Shaping:
         self.path = self._directory.path
         about = _read(self.path / SHAPING)
         self._command, self._device = str(about["command"]), str(about["device"])
-        self.configs: list[RunConfig] = about["configs"]
+        self._settings: list[Record] = about["settings"]
+        self._run_ids: list[str] = about["run_ids"]
+        self.outlines: list[Outline] = about["outlines"]
+
+    @cached_property
+    def configs(self) -> list[RunConfig]:
+        """The settings of every stage; this loads its world.
+
+        Raises:
+            UsageError: a world's file is not there, or is not the one it was made with.
+        """
+        from conevo.runs.config import resolve
+
+        place, folder = f"in {self.path / SHAPING}", self.path.resolve()
+        return [resolve(overrides=one, place=place, folder=folder) for one in self._settings]
 
     def __repr__(self) -> str:
         return f"Shaping({str(self.path)!r})"
@@ -139,7 +161,7 @@ class Shaping:
     @property
     def tasks(self) -> list[str]:
         """World and environment of every stage, in order."""
-        return [config.task for config in self.configs]
+        return [outline.task for outline in self.outlines]
 
     @property
     def stages(self) -> list[Run]:
@@ -149,11 +171,11 @@ class Shaping:
             UsageError: a stage is not the one that was planned.
         """
         begun: list[Run] = []
-        for number, config in enumerate(self.configs, start=1):
+        for number, run_id in enumerate(self._run_ids, start=1):
             if not (self._stage_path(number) / CONFIG).is_file():
                 break
             run = Run(self._stage_path(number))
-            if run.config.run_id != config.run_id:
+            if run.provenance["run_id"] != run_id:
                 raise UsageError(f"{run.path} is not stage {number} of {self.path / SHAPING}")
             begun.append(run)
         return begun
@@ -290,7 +312,7 @@ class Shaping:
             self.refuse_other_code()
         with self._directory.locked():
             self.refuse_finished()
-            for number in range(1, len(self.configs) + 1):
+            for number in range(1, len(self.outlines) + 1):
                 run = self._stage(number, threads)
                 if run.status != "finished":
                     carry(run, number)
@@ -334,21 +356,28 @@ def label(configs: Sequence[RunConfig]) -> str:
 
 
 def _read(path: Path) -> dict[str, Any]:
-    """Return what a shaping file says, with the stages' configurations as ``configs``."""
+    """Return what a shaping file says, with settings and outline of every stage; loads no world."""
     try:
         about = read_toml(path)
         if about["format"] != FORMAT:
             raise UsageError(f"{path} was written by another version of conevo")
         stages, run_ids = about["stages"], about["run_ids"]
+        tasks = about.get("tasks", ["" for _ in stages])
         settings = [
             {f"{part}.{key}": stage[part][key] for part in stage for key in stage[part]}
             for stage in stages
         ]
-        command, device = about["command"], about["device"]
-    except (KeyError, TypeError) as error:
+        found = {name: about[name] for name in ("command", "device")}
+        outlines = [
+            outline_of(stage, task, str(path)) for stage, task in zip(stages, tasks, strict=True)
+        ]
+        is_changed = len(run_ids) != len(stages) or any(
+            identify(stage, one.task) != run_id
+            for stage, one, run_id in zip(stages, outlines, run_ids, strict=True)
+            if "/" in one.task  # conevo 0.1.0 did not write what a world in a file is called
+        )
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise UsageError(f"{path} is damaged: {error}") from error
-    folder = path.parent.resolve()
-    configs = [resolve(overrides=one, place=f"in {path}", folder=folder) for one in settings]
-    if [config.run_id for config in configs] != run_ids:
+    if is_changed:
         raise UsageError(f"{path} was changed after the shaping was started; start another one")
-    return {"configs": configs, "command": command, "device": device}
+    return found | {"settings": settings, "outlines": outlines, "run_ids": run_ids}

@@ -26,17 +26,28 @@ import json
 import os
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from conevo.errors import UsageError
-from conevo.evolution.protocol import State
-from conevo.reading import DamagedFile, read_bytes, read_json, read_json_lines, whole_lines
+from conevo.reading import (
+    MOST_LOG,
+    MOST_TOML,
+    DamagedFile,
+    read_bytes,
+    read_json,
+    read_json_lines,
+    read_toml,
+    whole_lines,
+)
 from conevo.runs import checkpoint
-from conevo.runs.champions import Finalists, Team
-from conevo.runs.config import RunConfig, resolve
 from conevo.runs.directory import CONFIG, Directory, appearing, as_json
 from conevo.runs.durable import append_line, replace_file, writing
-from conevo.runs.inputs import keep_inputs
+from conevo.runs.outline import Outline, digest_of, read_outline
+
+if TYPE_CHECKING:
+    from conevo.evolution.protocol import State
+    from conevo.runs.champions import Team
+    from conevo.runs.config import RunConfig
 
 __all__ = ["Store", "create"]
 
@@ -59,10 +70,13 @@ def create(path: Path, config: RunConfig, provenance: Record, first: State | Non
         UsageError: something is there already; it is left as it is.
         EnvironmentFailure: the directory cannot be written.
     """
+    from conevo.runs.inputs import keep_inputs
+
     with appearing(path) as draft:
         kept = keep_inputs(config, draft)
-        replace_file(draft / CONFIG, kept.to_toml(draft).encode())
-        replace_file(draft / PROVENANCE, as_json(provenance))
+        text = kept.to_toml(draft).encode()
+        replace_file(draft / CONFIG, text)
+        replace_file(draft / PROVENANCE, as_json(provenance | {"config_digest": digest_of(text)}))
         if first is not None:
             identity = _identity(provenance) | {"method": config.method}
             checkpoint.save(draft / ORIGIN, first, identity)
@@ -86,19 +100,29 @@ class Store(Directory):
 
     # --- what the run is --------------------------------------------------------------------------
 
-    def read_config(self) -> RunConfig:
-        """Return the run's configuration.
+    def read_outline(self) -> Outline:
+        """Return what the run is, without its world.
 
         Raises:
-            UsageError: it is not the one the run was started with.
+            UsageError: the configuration is not the one the run was started with.
         """
-        config = resolve(file=self.path / CONFIG)
-        if config.run_id != self.read_provenance().get("run_id"):
-            raise UsageError(
-                f"{self.path / CONFIG} was changed after the run was started; start another run "
-                f"with --config {self.path / CONFIG} --out DIR"
-            )
-        return config
+        path = self.path / CONFIG
+        return read_outline(read_bytes(path, MOST_TOML), self.read_provenance(), str(path))
+
+    def read_tables(self) -> dict[str, Any]:
+        """Return the tables of the configuration as they are written."""
+        return read_toml(self.path / CONFIG)
+
+    def read_config(self) -> RunConfig:
+        """Return the run's configuration; this loads its world.
+
+        Raises:
+            UsageError: it is not the one the run was started with, or its world is not there.
+        """
+        from conevo.runs.config import resolve
+
+        self.read_outline()
+        return resolve(file=self.path / CONFIG)
 
     def read_provenance(self) -> Record:
         """Return versions, machine and sessions."""
@@ -129,6 +153,19 @@ class Store(Directory):
                 )
         return records
 
+    def count_generations(self) -> int:
+        """Return the number of finished generations; only a line that looks wrong is parsed.
+
+        Raises:
+            UsageError: a line is cut, or is not the one that belongs there.
+        """
+        path = self.path / GENERATIONS
+        lines = whole_lines(read_bytes(path, MOST_LOG)) if os.path.lexists(path) else []
+        for number, line in enumerate(lines):
+            if not (line.startswith(b'{"generation": %d,' % number) and line.endswith(b"}")):
+                return len(self.read_generations())
+        return len(lines)
+
     def cut_generations(self, count: int) -> list[Record]:
         """Keep the log's first ``count`` lines and return them.
 
@@ -156,10 +193,14 @@ class Store(Directory):
 
     def save_finalists(self, teams: Sequence[Team]) -> None:
         """Replace the fittest teams so far; they are ranked."""
+        from conevo.runs.champions import Finalists
+
         checkpoint.save(self.path / FINALISTS, Finalists.of(teams), self._identity())
 
     def load_finalists(self) -> list[Team]:
         """Return the fittest teams so far, the fittest first; none before the first generation."""
+        from conevo.runs.champions import Finalists
+
         path = self.path / FINALISTS
         if not path.is_file():
             return []
@@ -184,6 +225,8 @@ class Store(Directory):
         return self.path / "teams" / f"generation-{generation:04d}.npz"
 
     def _load_team(self, path: Path) -> Team | None:
+        from conevo.runs.champions import Team
+
         return checkpoint.load(path, Team, self._identity()) if os.path.lexists(path) else None
 
     # --- checkpoints ------------------------------------------------------------------------------
@@ -203,6 +246,8 @@ class Store(Directory):
         Raises:
             UsageError: there are checkpoints, but none is usable.
         """
+        from conevo.evolution.protocol import State
+
         states: dict[int, State] = {}
         problems: list[str] = []
         for slot, name in enumerate(CHECKPOINTS):
@@ -231,6 +276,8 @@ class Store(Directory):
             UsageError: the file is damaged or foreign.
             EnvironmentFailure: the file is lost.
         """
+        from conevo.evolution.protocol import State
+
         if "origin" not in self.read_provenance():
             return None
         return checkpoint.load(self.path / ORIGIN, State, self._identity() | {"method": method})

@@ -1,0 +1,127 @@
+"""What a run is, by its own files alone: they are read, and no world or method is loaded.
+
+So a run can be looked at on any machine, quickly, and without running anybody's world file.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from pathlib import PurePath
+from typing import Any
+
+from conevo.errors import UsageError
+from conevo.reading import DamagedFile, parse_toml
+
+__all__ = ["Outline", "digest_of", "identify", "outline_of", "read_outline"]
+
+Tables = Mapping[str, Mapping[str, Any]]
+NAMES = ("world", "method", "preset")
+NUMBERS = {"seed": 0, "generations": 1, "budget_evaluations": 0}  # name -> smallest
+
+
+@dataclass(frozen=True)
+class Outline:
+    """What names a run.
+
+    Attributes:
+        task: world and environment, "rover-v1/complex-1".
+        method, preset, seed: as its configuration has them.
+        generations: planned ones.
+        budget_evaluations: team evaluations it may spend, 0 for any number.
+    """
+
+    task: str
+    method: str
+    preset: str
+    seed: int
+    generations: int
+    budget_evaluations: int
+
+    @property
+    def environment(self) -> str:
+        """Name of the environment, "complex-1"."""
+        return self.task.rpartition("/")[2]
+
+
+def identify(tables: Tables, task: str, without: Collection[str] = ("preset",)) -> str:
+    """Return twelve hex digits that change with any value in the tables of a configuration.
+
+    A file counts by its content: where a value has a digest next to it ("prey_digest"), the path
+    does not count. Neither does that of a world's file: ``task`` stands for it.
+
+    Args:
+        tables: every value spelt out.
+        task: world and environment.
+        without: keys of ``[run]`` that do not count.
+    """
+    found = {section: dict(table) for section, table in tables.items()}
+    found["run"] = {k: v for k, v in found["run"].items() if k not in without} | {"world": task}
+    for section in ("world", "method"):
+        table = found[section]
+        for key in [key for key in table if key.endswith("_digest") and table[key]]:
+            table.pop(key.removesuffix("_digest"), None)
+    text = json.dumps(found, sort_keys=True)
+    return hashlib.blake2b(text.encode(), digest_size=6).hexdigest()
+
+
+def digest_of(content: bytes) -> str:
+    """Return the digest of a file's content, by which an unchanged one is known at once."""
+    return hashlib.blake2b(content, digest_size=16).hexdigest()
+
+
+def outline_of(tables: Tables, task: str = "", place: str = "config.toml") -> Outline:
+    """Return the outline in the tables of a configuration.
+
+    Args:
+        tables: those of a run; ``[run]`` is enough.
+        task: where it is known; else it is the world's address, without the folder of a file.
+        place: where they were read, for messages.
+
+    Raises:
+        DamagedFile: something is missing or not what it should be.
+    """
+    run = tables.get("run")
+    if not isinstance(run, Mapping):
+        raise DamagedFile(f"{place} is damaged: it has no table [run]")
+    for name in NAMES:
+        if not isinstance(run.get(name), str):
+            raise DamagedFile(f"{place} is damaged: run.{name} must be text")
+    for name, least in NUMBERS.items():
+        if type(run.get(name)) is not int or not least <= run[name] < 2**63:
+            raise DamagedFile(f"{place} is damaged: run.{name} must be a whole number from {least}")
+    address = run["world"]
+    known = task or (PurePath(address).name if ".py:" in address else address)
+    return Outline(known, run["method"], run["preset"], *(run[name] for name in NUMBERS))
+
+
+def read_outline(content: bytes, provenance: Mapping[str, Any], place: str) -> Outline:
+    """Return the outline of a run, after checking that its configuration is the one it was made of.
+
+    Args:
+        content: of its config.toml.
+        provenance: of the run.
+        place: path of config.toml, for messages.
+
+    Raises:
+        UsageError: the configuration was changed, or is damaged.
+    """
+    header = provenance.get("world")
+    task = f"{header['name']}/{header['environment']}" if header else ""
+    text = content.decode("utf-8", "replace")
+    if provenance.get("config_digest") == digest_of(content):
+        # [run] comes first; the whole file takes five times as long to parse.
+        return outline_of(parse_toml(text.partition("\n[world]\n")[0], place), task, place)
+    tables = parse_toml(text, place)
+    outline = outline_of(tables, task, place)
+    is_own_file = ".py:" in tables["run"]["world"]
+    if not {"world", "method"} <= tables.keys() or (
+        (task or not is_own_file) and identify(tables, outline.task) != provenance.get("run_id")
+    ):
+        raise UsageError(
+            f"{place} was changed after the run was started; start another run with --config "
+            f"{place} --out DIR"
+        )
+    return outline
