@@ -47,7 +47,8 @@ class Cell:
         idle: share of the runs with an idle predator.
         evaluations: team evaluations of every run.
         stage: of a shaping.
-        exchanges: pairs that recombine between populations in a generation, of a hundred.
+        exchanges, exchange_share: pairs that recombine between populations in a generation, and
+            their share of those that could.
     """
 
     value: float
@@ -61,6 +62,7 @@ class Cell:
     evaluations: int = 50_000
     stage: int = 0
     exchanges: float = 5.0
+    exchange_share: float = 0.05
 
 
 Truth = dict[tuple[str, str], Cell]  # (environment, method)
@@ -216,7 +218,7 @@ def _about(
         "optimum": 10 * int(number) if world == "gacc-v1" else None,
         "n_robots": 20,
         "exchanges": cell.exchanges if method in EXCHANGING else None,
-        "exchange_share": cell.exchanges / 100 if method in EXCHANGING else None,
+        "exchange_share": cell.exchange_share if method in EXCHANGING else None,
         "run_id": run,
         "conevo": "0.1.0",
         "warp": "1.19.0",

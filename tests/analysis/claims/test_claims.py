@@ -13,6 +13,9 @@ from conevo.analysis.claims import CLAIMS, Claim, Verdict, verdicts
 from conevo.analysis.frames import Tables
 
 BY_ID = {claim.id: claim for claim in CLAIMS}
+CONTRADICTORY = {"R6", "G8"}  # by the thesis itself
+ALIKE = {"R2", "R4", "R6", "R8", "P2", "G3"}  # claims that something is
+CAUTIOUS = {"R1", "R5", "R9", "R10", "P9", "P10", "G2", "G5"}
 Change = Callable[[Truth], None]
 
 
@@ -125,7 +128,9 @@ def test_there_are_32_claims_each_with_its_source() -> None:
 def test_all_are_reproduced_where_all_are_true(as_claimed: Path) -> None:
     with Tables(as_claimed) as tables:
         found = verdicts(tables, [c for c in CLAIMS if c.id[0] == as_claimed.name])
-    assert {one.id: one.verdict for one in found} == {one.id: "reproduced" for one in found}
+    assert {one.id: one.alone for one in found} == {one.id: "reproduced" for one in found}
+    ids = {one.id for one in found}
+    assert {one.id for one in found if one.verdict != one.alone} == CONTRADICTORY & ids
     for one in found:
         assert one.effect
         assert one.low is not None
@@ -133,7 +138,8 @@ def test_all_are_reproduced_where_all_are_true(as_claimed: Path) -> None:
         assert one.low <= one.high
         assert one.budget.startswith("smoke, about 50,000 team evaluations")
         held = len(one.cells)
-        assert one.why == f"{held} of {held} hold"
+        assert one.why.partition("; power: ")[0] == f"{held} of {held} hold"
+        assert (one.power is not None) == ("power" in one.why) == (one.id in ALIKE)
 
 
 @pytest.mark.parametrize("identity", WRONG)
@@ -144,8 +150,11 @@ def test_not_reproduced_where_one_thing_is_turned_round(identity: str, tmp_path:
     verdict = judged(
         write_tables(tmp_path, world, truth, n=20 if world == "pursuit-v1" else 10), BY_ID[identity]
     )
-    assert verdict.verdict == "not reproduced"
+    assert verdict.alone == "not reproduced"
     assert told in verdict.why
+    expected = "not judged: the thesis contradicts itself"
+    assert verdict.verdict == (expected if identity in CONTRADICTORY else "not reproduced")
+    assert bool(verdict.caution) == (identity in CONTRADICTORY | CAUTIOUS)
 
 
 FURTHER = [
@@ -165,7 +174,7 @@ def test_each_part_counts(identity: str, apply: Change, expected: str, tmp_path:
     world, truth = truth_of(BY_ID[identity])
     apply(truth)
     n = 20 if world == "pursuit-v1" else 10
-    assert judged(write_tables(tmp_path, world, truth, n), BY_ID[identity]).verdict == expected
+    assert judged(write_tables(tmp_path, world, truth, n), BY_ID[identity]).alone == expected
 
 
 @pytest.mark.parametrize("identity", WRONG)
@@ -180,7 +189,7 @@ def test_undecided_where_environments_are_missing(identity: str, tmp_path: Path)
     verdict = judged(
         write_tables(tmp_path, world, few, n=20 if world == "pursuit-v1" else 10), claim
     )
-    assert verdict.verdict == f"undecided: {len(kept)} of {len(all_places)} environments"
+    assert verdict.alone == f"undecided: {len(kept)} of {len(all_places)} environments"
     assert "no runs of" in verdict.why
 
 
@@ -192,7 +201,7 @@ def test_undecided_where_two_runs_scatter_widely(letter: str, tmp_path: Path) ->
         change(ALL_TEAMS, METHODS, clones=0.9)(truth)
     with Tables(write_tables(tmp_path, world, truth, n=2, noise=0.8)) as tables:
         found = verdicts(tables, [c for c in CLAIMS if c.id[0] == letter])
-    assert {one.id: one.verdict for one in found} == {
+    assert {one.id: one.alone for one in found} == {
         one.id: "undecided: n too small" for one in found
     }
     compared = [one for one in found if one.tests.startswith("t-test") and one.n == "2"]
@@ -210,3 +219,47 @@ def test_undecided_without_a_run(tmp_path: Path) -> None:
     for one in without:
         assert one.verdict == "undecided: no such runs"
         assert (one.effect, one.n, one.budget, one.low) == ("", "0", "", None)
+
+
+WITHOUT_CONE = {"R2", "R4", "R8", "R10", "P5", "P6", "P9", "G3"}  # or with it among all methods
+
+
+@pytest.mark.parametrize("letter", TRUTHS)
+def test_not_tested_where_cone_exchanged_next_to_nothing(letter: str, tmp_path: Path) -> None:
+    world, make = TRUTHS[letter]
+    truth = {key: dataclasses.replace(cell, exchanges=0.3) for key, cell in make().items()}
+    with Tables(write_tables(tmp_path, world, truth, n=20 if letter == "P" else 10)) as tables:
+        found = {one.id: one for one in verdicts(tables, [c for c in CLAIMS if c.id[0] == letter])}
+    for identity, one in found.items():
+        is_free = identity in WITHOUT_CONE
+        assert one.alone == ("reproduced" if is_free else "not tested: no exchange"), identity
+        assert ("not tested: no exchange between populations" in one.why) != is_free
+
+
+def test_contradicted_without_cone_is_contradicted_without_exchange(tmp_path: Path) -> None:
+    world, truth = truth_of(BY_ID["R3"])
+    truth = {key: dataclasses.replace(cell, exchanges=0.0) for key, cell in truth.items()}
+    change(["complex-10"], "hetcne", value=2600)(truth)
+    assert judged(write_tables(tmp_path, world, truth), BY_ID["R3"]).verdict == "not reproduced"
+
+
+@pytest.mark.parametrize(
+    ("exchanges", "share", "is_tested"),
+    [
+        (0.9, 0.09, False),
+        (1.0, 0.01, True),
+        (0.5, 0.1, True),
+        (0.0, 0.0, False),
+        (99.0, 0.99, True),
+    ],
+)
+def test_exchange_hardly_ran_below_one_pair_and_a_tenth(
+    exchanges: float, share: float, is_tested: bool, tmp_path: Path
+) -> None:
+    world, truth = truth_of(BY_ID["R7"])
+    truth = {
+        key: dataclasses.replace(cell, exchanges=exchanges, exchange_share=share)
+        for key, cell in truth.items()
+    }
+    verdict = judged(write_tables(tmp_path, world, truth), BY_ID["R7"]).verdict
+    assert verdict == ("reproduced" if is_tested else "not tested: no exchange")

@@ -9,6 +9,7 @@ from __future__ import annotations
 from conevo.analysis.claims.statements import Compare, Part, Sample, within
 
 __all__ = [
+    "BY_WORLD",
     "CNE",
     "COEVOLUTION",
     "COMPLEX",
@@ -38,6 +39,7 @@ VARIANTS = ("cone-1", "cone-2", "cone-3")
 
 ABOUT = 0.1  # how far from a published share a share may be
 MOST = 0.5  # of the runs
+BY_WORLD = "decided by the world as well: heuristic teams also differ between the two families"
 
 
 def _named(family: str) -> tuple[str, ...]:

@@ -1,4 +1,4 @@
-"""One statement of a claim against its runs: holds, contradicted, or open.
+"""One statement of a claim against its runs: holds, contradicted, open, or not tested.
 
 "Above" is contradicted by a significant difference the other way and by samples shown to be alike;
 "alike" by a significant difference. Each comparison is decided twice: by the t-test, as in the
@@ -6,6 +6,8 @@ thesis, and by Mann-Whitney with Holm's correction over all comparisons of the c
 
 - Choice: a share holds if its 95 % interval (Clopper-Pearson; of a mean Student's t) lies inside
   the range that the claim comes to, is contradicted if it lies outside, and else stays open.
+- Choice: a statement about CONE is not tested by runs in which it hardly exchanged anything between
+  its populations: there it is Multi-Agent ESP with type C fitness.
 - Choice: a statement about several environments together says nothing until all have runs.
 """
 
@@ -38,7 +40,8 @@ class Outcome(Enum):
     CONTRADICTED = 0
     OPEN = 1
     HOLDS = 2
-    MISSING = 3
+    UNTESTED = 3
+    MISSING = 4
 
 
 @dataclass(frozen=True)
@@ -124,6 +127,8 @@ def _cell(
     estimate = _estimate(statement, runs)
     if runs.present != set(statement.environments):
         by_t = by_rank = Outcome.MISSING
+    elif runs.is_idle:
+        by_t = by_rank = Outcome.UNTESTED
     elif isinstance(statement, Compare):
         by_t = by_rank = Outcome.OPEN
         if comparison is not None:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from conevo.analysis.claims.statements import Compare, Sample, Within
 from conevo.analysis.comparison import levels_of
+from conevo.analysis.exchange import is_idle
 from conevo.analysis.frames import Tables
 
 __all__ = ["QUANTITIES", "Evidence", "Gathered", "Quantity", "RunOf", "read_evidence"]
@@ -52,6 +53,9 @@ SEVERAL_CASTES = (
     "count(DISTINCT caste) FILTER (WHERE caste NOT IN ('non-specialized', 'move')) >= 2"
 )
 LOSS = "avg((whole.value - lesioned.value) / nullif(greatest(whole.value, lesioned.value), 0))"
+
+Exchange = tuple[float | None, float | None]
+OF_ONE_ROBOT = ("clones", "clones of a specialist")  # whatever its population exchanged
 
 Reading = Callable[[Tables], dict[str, float]]
 
@@ -144,11 +148,16 @@ two behaviours. The others are 1 or 0.
 
 
 class RunOf(NamedTuple):
-    """A run of some method in some environment."""
+    """A run of some method in some environment.
+
+    exchanges, exchange_share: as in the table of runs; None of methods that never exchange.
+    """
 
     run: str
     seed: int
     budget: str
+    exchanges: float | None = None
+    exchange_share: float | None = None
 
 
 @dataclass(frozen=True)
@@ -159,11 +168,19 @@ class Gathered:
         samples: run values of each sample of the statement.
         present: environments that all samples have runs in.
         budgets: of these runs.
+        exchange: pairs of sub-populations that recombined between populations in a generation, and
+            of those that could have; of the sample with the least, None if no sample's runs could.
     """
 
     samples: tuple[list[float], ...]
     present: frozenset[str]
     budgets: frozenset[str]
+    exchange: Exchange = (None, None)
+
+    @property
+    def is_idle(self) -> bool:
+        """Whether a sample is of methods that exchange between populations, and hardly did."""
+        return is_idle(*self.exchange)
 
 
 @dataclass
@@ -200,6 +217,7 @@ class Evidence:
     def _gather_two(self, a: Sample, b: Sample) -> Gathered:
         first: list[float] = []
         second: list[float] = []
+        runs: tuple[list[RunOf], list[RunOf]] = ([], [])
         present: set[str] = set()
         budgets: set[str] = set()
         for here, there in zip(a.environments, b.environments, strict=True):
@@ -215,9 +233,14 @@ class Evidence:
                 continue
             first += [value for _, value in of_a[chosen_a]]
             second += [value for _, value in of_b[chosen_b]]
+            runs[0].extend(self._runs(a, here, chosen_a))
+            runs[1].extend(self._runs(b, there, chosen_b))
             present |= {here, there}
             budgets |= {chosen_a, chosen_b}
-        return Gathered((first, second), frozenset(present), frozenset(budgets))
+        asked = zip((a, b), runs, strict=True)
+        made = [_exchange(of) for one, of in asked if one.quantity not in OF_ONE_ROBOT]
+        least = min((one for one in made if one[0] is not None), default=(None, None))
+        return Gathered((first, second), frozenset(present), frozenset(budgets), least)
 
     def _gather_one(self, sample: Sample) -> Gathered:
         """Return the runs of a sample.
@@ -242,7 +265,20 @@ class Evidence:
                 for _, own in sorted(by_seed.items())
                 if len(own) == len(present)
             ]
-        return Gathered((flat,), present, frozenset(chosen.values()))
+        runs = [
+            run for place, budget in chosen.items() for run in self._runs(sample, place, budget)
+        ]
+        return Gathered((flat,), present, frozenset(chosen.values()), _exchange(runs))
+
+    def _runs(self, sample: Sample, environment: str, budget: str) -> list[RunOf]:
+        """Return the runs of a sample in one environment at one budget."""
+        values = self.read(sample.quantity)
+        return [
+            one
+            for method in sample.methods
+            for one in self.runs.get((environment, method), ())
+            if one.run in values and one.budget == budget
+        ]
 
     def by_budget(self, sample: Sample, environment: str) -> dict[str, list[tuple[int, float]]]:
         """Return seeds and values of a sample's runs in one environment, apart by budget."""
@@ -268,18 +304,19 @@ def read_evidence(tables: Tables) -> list[Evidence]:
         return read[quantity]
 
     _, rows = tables.query(
-        "SELECT world, preset, variant, environment, method, run, seed, budget"
+        "SELECT world, preset, variant, environment, method, run, seed, budget, exchanges,"
+        " exchange_share"
         " FROM runs JOIN budgets USING (run) ORDER BY ALL"
     )
     variants: dict[tuple[str, str], dict[str, set[str]]] = defaultdict(lambda: defaultdict(set))
     for world, preset, variant, _, method, *_ in rows:
         variants[world, preset][method].add(variant)
     groups: dict[tuple[str, str, str], Evidence] = {}
-    for world, preset, variant, environment, method, run, seed, budget in rows:
+    for world, preset, variant, environment, method, *about in rows:
         for whole in _joined(variant, method, variants[world, preset]):
             key = (world, preset, whole)
             group = groups.setdefault(key, Evidence(*key, cached))
-            group.runs.setdefault((environment, method), []).append(RunOf(run, seed, budget))
+            group.runs.setdefault((environment, method), []).append(RunOf(*about))
     return [groups[key] for key in sorted(groups)]
 
 
@@ -297,6 +334,15 @@ def _joined(variant: str, method: str, variants: Mapping[str, set[str]]) -> list
     others = set().union(*(some for name, some in variants.items() if name != method))
     longer = [one for one in others - variants[method] if own < levels_of(one).items()]
     return sorted(longer) + ([variant] if variant in others or not longer else [])
+
+
+def _exchange(runs: Sequence[RunOf]) -> Exchange:
+    """Return what runs exchanged between populations, in the mean; nothing unless all could."""
+    made = [one.exchanges for one in runs if one.exchanges is not None]
+    shares = [one.exchange_share for one in runs if one.exchange_share is not None]
+    if not runs or len(made) < len(runs) or len(shares) < len(runs):
+        return None, None
+    return math.fsum(made) / len(runs), math.fsum(shares) / len(runs)
 
 
 def _usual(of: Mapping[str, list[tuple[int, float]]]) -> str:

@@ -12,6 +12,7 @@ Nitschke 2009, sections 6.4 and 6.5, appendix D.
 from __future__ import annotations
 
 from conevo.analysis.claims.cases import (
+    BY_WORLD,
     CNE,
     COEVOLUTION,
     COMPLEX_9,
@@ -47,6 +48,7 @@ GACC: tuple[Claim, ...] = (
                 across("share of the optimum", COEVOLUTION, zip(COMPLEX_9, SIMPLE[:9], strict=True))
             ),
         ),
+        caution=BY_WORLD,
     ),
     Claim(
         "G3",
@@ -76,6 +78,7 @@ GACC: tuple[Claim, ...] = (
             SIMPLE,
             {"homcne": 0.48, "hetcne": 0.47, "ccga": 0.51, "mesp": 0.54, "cone": 0.55},
         ),
+        caution=BY_WORLD,
     ),
     Claim(
         "G6",
@@ -97,6 +100,7 @@ GACC: tuple[Claim, ...] = (
         "6.5.5",
         "gacc",
         (Part(cloned("clones", COMPLEX_9, METHODS)),),
+        contradiction="6.5.5 ends with non-specialized clones alike to HomCNE and HetCNE",
     ),
     Claim(
         "G9",

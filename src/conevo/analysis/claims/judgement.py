@@ -1,7 +1,9 @@
 """Verdicts: claims held against evidence.
 
 A claim is reproduced if its statements hold in all the environments that it needs, not reproduced
-if they are contradicted in too many for that, and undecided otherwise.
+if they are contradicted in too many for that, and undecided otherwise; not tested if all that is
+open depends on an exchange between populations that hardly ran, and not judged if the thesis says
+the opposite elsewhere.
 
 - Choice: where the two tests lead to different verdicts the claim is undecided, and both are told.
 - Choice: the effect that is shown is that of the statement on which the verdict hangs: of the
@@ -14,18 +16,24 @@ from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+import numpy.typing as npt
+
 from conevo.analysis.claims import wording
 from conevo.analysis.claims.catalogue import CLAIMS
 from conevo.analysis.claims.cells import Cell, Outcome, measure
 from conevo.analysis.claims.evidence import QUANTITIES, Evidence, read_evidence
-from conevo.analysis.claims.statements import Claim, Part, Sample
+from conevo.analysis.claims.statements import Claim, Compare, Part, Sample
 from conevo.analysis.frames import Tables
+from conevo.analysis.power import CAMPAIGNS, Drawn, draw, found_alike
 
 __all__ = ["Verdict", "judge", "verdicts"]
 
 REPRODUCED = "reproduced"
 NOT_REPRODUCED = "not reproduced"
 UNDECIDED = "undecided: "
+UNTESTED = "not tested: no exchange"
+NOT_JUDGED = "not judged: the thesis contradicts itself"
 
 
 @dataclass(frozen=True)
@@ -39,7 +47,14 @@ class Verdict:
         tests: names of the tests and intervals used.
         n: runs per sample, "20" or "3 to 20".
         budget: preset and team evaluations, then the variant.
-        verdict: "reproduced", "not reproduced" or "undecided: " and why.
+        verdict: "reproduced", "not reproduced", "not tested: no exchange", "not judged: the thesis
+            contradicts itself", or "undecided: " and why.
+        alone: the verdict if nothing else in the thesis counted.
+        caution: what the thesis says elsewhere, what the verdict does not cover, what decides it.
+        power: how likely the claim's methods would be found alike if they were exactly so; None of
+            claims that ask for no likeness, or without runs.
+        exchange: pairs of sub-populations of CONE that recombined between populations in a
+            generation, and of those that could have: of the statement with the least.
         why: what was counted, contradicted and missing.
         cells: every statement with its numbers.
     """
@@ -54,6 +69,10 @@ class Verdict:
     n: str
     budget: str
     verdict: str
+    alone: str
+    caution: str
+    power: float | None
+    exchange: tuple[float | None, float | None]
     why: str
     cells: tuple[Cell, ...]
 
@@ -89,9 +108,12 @@ def judge(claim: Claim, evidence: Evidence) -> Verdict:
     budgets = sorted({budget for cell in cells for budget in cell.gathered.budgets})
     spent = [*(budgets or [evidence.preset]), evidence.variant]
     low, high = key.interval if key else (None, None)
+    power = _power(claim, cells)
+    alone = by_rank if agree else f"{UNDECIDED}the tests disagree"
     why = [
         *wording.counts(cells),
         *([] if agree else [f"t-test: {by_t}; Mann-Whitney with Holm: {by_rank}"]),
+        *wording.power(power),
         *wording.too_few(cells),
         *wording.lacking(cells, evidence),
     ]
@@ -105,7 +127,14 @@ def judge(claim: Claim, evidence: Evidence) -> Verdict:
         tests=wording.tests(cells),
         n=wording.sizes(cells),
         budget="; ".join(one for one in spent if one),
-        verdict=by_rank if agree else f"{UNDECIDED}the tests disagree",
+        verdict=NOT_JUDGED if claim.contradiction and key else alone,
+        alone=alone,
+        caution=claim.contradiction or claim.caution,
+        power=power,
+        exchange=min(
+            (cell.gathered.exchange for cell in cells if cell.gathered.exchange[0] is not None),
+            default=(None, None),
+        ),
         why="; ".join(why),
         cells=tuple(cells),
     )
@@ -136,6 +165,8 @@ def _verdict(
         return NOT_REPRODUCED
     if all(outcome is Outcome.HOLDS for outcome in parts):
         return REPRODUCED
+    if Outcome.UNTESTED in parts:
+        return UNTESTED
     if Outcome.OPEN in parts:
         still = [c for c, o in zip(cells, outcomes, strict=True) if o is Outcome.OPEN]
         is_zero = all(cell.is_zero for cell in still)
@@ -150,14 +181,46 @@ def _part(part: Part, outcomes: Sequence[Outcome]) -> Outcome:
     by_place: dict[tuple[str, ...], set[Outcome]] = defaultdict(set)
     for statement, outcome in zip(part.statements, outcomes, strict=True):
         by_place[statement.environments].add(outcome)
-    order = (Outcome.CONTRADICTED, Outcome.OPEN, Outcome.MISSING, Outcome.HOLDS)
+    order = (
+        Outcome.CONTRADICTED,
+        Outcome.UNTESTED,
+        Outcome.OPEN,
+        Outcome.MISSING,
+        Outcome.HOLDS,
+    )
     settled = [next(o for o in order if o in found) for found in by_place.values()]
     need = len(settled) if part.need is None else part.need
     if settled.count(Outcome.CONTRADICTED) > len(settled) - need:
         return Outcome.CONTRADICTED
     if settled.count(Outcome.HOLDS) >= need:
         return Outcome.HOLDS
-    return Outcome.OPEN if Outcome.OPEN in settled else Outcome.MISSING
+    return next(o for o in order[1:] if o in settled)
+
+
+def _power(claim: Claim, cells: Sequence[Cell]) -> float | None:
+    """Return how likely what is claimed to be alike is found so in campaigns where it is."""
+    alike, start = [], 0
+    for part in claim.parts:
+        own, start = cells[start : start + len(part.statements)], start + len(part.statements)
+        if all(isinstance(s, Compare) and s.expect == "alike" for s in part.statements):
+            alike.append((part, own))
+    if not alike or any(cell.by_t is Outcome.MISSING for _, own in alike for cell in own):
+        return None
+    drawn: dict[Sample, Drawn | None] = {}
+    holds = np.ones(CAMPAIGNS, dtype=bool)
+    for part, own in alike:
+        by_place: dict[tuple[str, ...], list[npt.NDArray[np.bool_]]] = defaultdict(list)
+        for cell in own:
+            for sample, values in zip(cell.statement.samples, cell.gathered.samples, strict=True):
+                if sample not in drawn:
+                    drawn[sample] = draw(values, len(drawn))
+            a, b = (drawn[sample] for sample in cell.statement.samples)
+            if a is None or b is None:
+                return None
+            by_place[cell.statement.environments].append(found_alike(a, b))
+        found = np.sum([np.all(of, axis=0) for of in by_place.values()], axis=0)
+        holds &= found >= (part.need or len(by_place))
+    return float(holds.mean())
 
 
 def _absence(cells: Sequence[Cell], evidence: Evidence) -> str:

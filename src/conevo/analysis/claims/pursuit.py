@@ -122,6 +122,7 @@ PURSUIT: tuple[Claim, ...] = (
                 )
             ),
         ),
+        caution="the teams of figure 4.12 were composed by hand; these evolved",
     ),
     Claim(
         "P10",
@@ -138,5 +139,6 @@ PURSUIT: tuple[Claim, ...] = (
                 )
             ),
         ),
+        caution="its other half, least in HomCNE and HetCNE, is contradicted by table 4.5",
     ),
 )

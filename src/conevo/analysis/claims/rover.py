@@ -15,6 +15,7 @@ from __future__ import annotations
 from itertools import combinations
 
 from conevo.analysis.claims.cases import (
+    BY_WORLD,
     CNE,
     COEVOLUTION,
     COMPLEX,
@@ -39,6 +40,7 @@ ROVER: tuple[Claim, ...] = (
         "5.4.2",
         "rover",
         (Part(above("value", COMPLEX, ("cone",), OTHERS)),),
+        caution="value only; 5.4.2 speaks of task performance, which is value and area",
     ),
     Claim(
         "R2",
@@ -67,6 +69,7 @@ ROVER: tuple[Claim, ...] = (
         "5.4.1",
         "rover",
         (Part(across("value", COEVOLUTION, zip(COMPLEX, SIMPLE, strict=True))),),
+        caution=BY_WORLD,
     ),
     Claim(
         "R6",
@@ -74,6 +77,7 @@ ROVER: tuple[Claim, ...] = (
         "5.4.1",
         "rover",
         (Part(alike("area", SIMPLE + COMPLEX, combinations(METHODS, 2)), need=11),),
+        contradiction="5.4.1 has it alike in most environments, 5.4.2 in some of 7 to 10 only",
     ),
     Claim(
         "R7",
@@ -98,6 +102,7 @@ ROVER: tuple[Claim, ...] = (
         "5.5.2",
         "rover",
         has_castes("several castes", COMPLEX, ("cone",)),
+        caution="tables 5.15 and 5.16 show three specialized castes in all ten environments",
     ),
     Claim(
         "R10",
@@ -105,6 +110,7 @@ ROVER: tuple[Claim, ...] = (
         "5.4.1",
         "rover",
         has_castes("one caste", SIMPLE + COMPLEX, CNE),
+        caution="tables 5.7 and 5.8 name the caste: med or hi; here any one caste counts",
     ),
     Claim(
         "R11",

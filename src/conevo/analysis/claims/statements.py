@@ -104,6 +104,8 @@ class Claim:
         source: section of the thesis.
         world: name without version.
         parts: what has to hold.
+        contradiction: where the thesis says the opposite; such a claim is not judged.
+        caution: what a verdict does not cover, or what else decides it.
     """
 
     id: str
@@ -111,6 +113,8 @@ class Claim:
     source: str
     world: str
     parts: tuple[Part, ...]
+    contradiction: str = ""
+    caution: str = ""
 
 
 def above(

@@ -16,6 +16,7 @@ __all__ = [
     "lacking",
     "name_of",
     "place_of",
+    "power",
     "sizes",
     "tests",
     "too_few",
@@ -97,11 +98,21 @@ def counts(cells: Sequence[Cell]) -> list[str]:
     if worst := sorted(of[Outcome.CONTRADICTED], key=lambda cell: cell.weight):
         names = [f"{place_of(cell.statement)} {what_of(cell.statement)}" for cell in worst]
         told.append(f"{len(worst)} contradicted ({'; '.join(_few(names))})")
+    if untested := of[Outcome.UNTESTED]:
+        told.append(f"{len(untested)} not tested: no exchange between populations")
     if of[Outcome.OPEN]:
         told.append(f"{len(of[Outcome.OPEN])} open")
     if of[Outcome.MISSING]:
         told.append(f"{len(of[Outcome.MISSING])} without all their runs")
     return told
+
+
+def power(found: float | None) -> list[str]:
+    """Return how likely the rule is to find alike what is."""
+    if found is None:
+        return []
+    share = "less than 1 %" if found < 0.01 else f"{found:.0%}".replace("%", " %")
+    return [f"power: of campaigns like this one in which all are alike {share} show it"]
 
 
 def too_few(cells: Sequence[Cell]) -> list[str]:

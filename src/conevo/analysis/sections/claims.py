@@ -7,6 +7,7 @@ from typing import Any
 
 from conevo.analysis.claims import Verdict, verdicts
 from conevo.analysis.claims.wording import place_of, what_of
+from conevo.analysis.exchange import per_generation
 from conevo.analysis.exhibits import Column, Section, Table, interval, number, p_value, plain
 from conevo.analysis.frames import Tables
 
@@ -14,32 +15,20 @@ __all__ = ["claims"]
 
 
 def claims(tables: Tables) -> Section:
-    """Return every claim with effect, interval, tests, runs, budget and verdict."""
-    found = verdicts(tables)
-    rows = [
-        {
-            "id": one.id,
-            "place": f"{one.id} ({one.source})",
-            "claim": one.claim,
-            "source": one.source,
-            "effect": one.effect,
-            "interval": (one.low, one.high),
-            "n": one.n,
-            "budget": one.budget,
-            "tests": one.tests,
-            "how": f"{one.tests}; {one.budget}",
-            "verdict": one.verdict,
-            "why": one.why,
-        }
-        for one in found
-    ]
-    about = [row for row in rows if row["n"] not in ("", "0")]
-    kinds = Counter(str(row["verdict"]).partition(":")[0] for row in rows)
+    """Return every claim that the runs are about, with effect, interval, tests and verdict."""
+    title = "Claims of the thesis"
+    every = verdicts(tables)
+    found = [one for one in every if one.n not in ("", "0")]
+    absent = sum(one.n in ("", "0") for one in every)
+    rest = f"{absent} of the thesis' claims are about runs that this campaign does not have."
+    if not found:
+        return Section(title, [rest])
+    kinds = Counter(one.verdict.partition(":")[0] for one in found)
     text = [
-        "What the thesis claims and runs can test, each claim judged by these runs alone. Of "
-        f"{len(rows)} verdicts: "
+        "What the thesis claims and these runs can test, each claim judged by them alone: "
         + ", ".join(f"{n} {kind}" for kind, n in sorted(kinds.items()))
-        + f"; {len(rows) - len(about)} claims are about runs that this campaign does not have."
+        + "."
+        + (f" {rest}" if absent else "")
     ]
     columns = [
         Column("place", "claim", plain),
@@ -47,17 +36,46 @@ def claims(tables: Tables) -> Section:
         Column("effect", "effect", plain, is_wide=True),
         Column("interval", "95 % interval", interval),
         Column("n", "n", plain),
+        Column("exchanges", "exchange", plain),
         Column("how", "tests; budget", plain, is_wide=True),
         Column("verdict", "verdict", plain, is_wide=True),
-        Column("why", "why", plain, is_wide=True),
+        Column("reasons", "why", plain, is_wide=True),
     ]
     note = (
-        "n: runs per sample. Significant: p < 0.05, by the t-test uncorrected as in the thesis and "
+        "n: runs per sample. Exchange: pairs of sub-populations of CONE that recombined between "
+        "populations in a generation, and of those that could have; where that is next to nothing "
+        "(fewer than one pair, and fewer than a tenth) statements about CONE are not tested. "
+        "Significant: p < 0.05, by the t-test uncorrected as in the thesis and "
         "by Mann-Whitney with Holm's correction over the claim; alike: no significant difference, "
-        "and the interval of the difference inside ±15 % of the larger mean."
+        "and the interval of the difference inside ±15 % of the larger mean. Power: how often "
+        "methods that are exactly alike would be found so, with as many runs that scatter as much."
     )
-    table = Table("claims", "Claims of the thesis", note, columns, rows)
-    return Section("Claims of the thesis", text, [table, _statements(found)])
+    table = Table("claims", title, note, columns, [_row(one) for one in found])
+    return Section(title, text, [table, _statements(found)])
+
+
+def _row(one: Verdict) -> dict[str, Any]:
+    """Return a claim's row."""
+    reasons = [one.caution, one.why]
+    if one.alone != one.verdict:
+        reasons.insert(1, f"by itself: {one.alone}")
+    exchanges, share = one.exchange
+    return {
+        "id": one.id,
+        "place": f"{one.id} ({one.source})",
+        "claim": one.claim,
+        "source": one.source,
+        "effect": one.effect,
+        "interval": (one.low, one.high),
+        "n": one.n,
+        "exchanges": per_generation(exchanges, share),
+        "budget": one.budget,
+        "tests": one.tests,
+        "how": f"{one.tests}; {one.budget}",
+        "verdict": one.verdict,
+        "power": one.power,
+        "reasons": "; ".join(reason for reason in reasons if reason),
+    }
 
 
 def _statements(found: list[Verdict]) -> Table:

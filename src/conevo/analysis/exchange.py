@@ -1,0 +1,29 @@
+"""What CONE's populations exchanged, in words: without it CONE is MESP with type C fitness."""
+
+from __future__ import annotations
+
+__all__ = ["FEW_PAIRS", "FEW_SHARE", "is_idle", "per_generation"]
+
+FEW_PAIRS, FEW_SHARE = 1.0, 0.1
+
+
+def is_idle(exchanges: float | None, share: float | None) -> bool:
+    """Return whether an exchange between populations hardly ran; False where there is none to run.
+
+    Choice: if in the mean of a generation fewer than one pair of sub-populations recombined, and
+    fewer than a tenth of the pairs that could have; in a team of twenty rovers a hundred could.
+
+    Args:
+        exchanges: pairs of sub-populations per generation, None of methods that never exchange.
+        share: of the pairs that could have recombined.
+    """
+    if exchanges is None or share is None:
+        return False
+    return exchanges < FEW_PAIRS and share < FEW_SHARE
+
+
+def per_generation(exchanges: float | None, share: float | None) -> str:
+    """Return "0.3 pairs (0.3 %)"; nothing of methods that never exchange."""
+    if exchanges is None or share is None:
+        return ""
+    return f"{exchanges:.3g} pairs ({100 * share:.2g} %)"

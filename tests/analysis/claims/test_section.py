@@ -1,0 +1,55 @@
+"""Claims in a report: only those that its runs are about, with what a reader must know of each."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+from analysis.claims.known_truth import rover, write_tables
+from conevo.analysis.frames import Tables
+from conevo.analysis.sections.claims import claims
+
+
+def test_two_methods_have_the_claims_about_them_and_one_line_for_the_rest(tmp_path: Path) -> None:
+    truth = {
+        key: dataclasses.replace(cell, exchanges=0.003, exchange_share=0.00003)
+        for key, cell in rover().items()
+        if key[0].startswith(("simple", "complex")) and key[1] in ("mesp", "cone")
+    }
+    with Tables(write_tables(tmp_path, "rover-v1", truth, 10)) as tables:
+        section = claims(tables)
+    table = section.exhibits[0]
+    rows = {row["id"]: row for row in table.rows}
+    assert list(rows) == ["R1", "R5", "R6", "R9", "R11", "R12"]
+    assert (
+        "26 of the thesis' claims are about runs that this campaign does not have"
+        in (section.text[0])
+    )
+    assert "1 not judged" in section.text[0]
+    assert rows["R9"]["verdict"] == "not tested: no exchange"
+    assert rows["R9"]["exchanges"] == "0.003 pairs (0.003 %)"
+    assert rows["R6"]["verdict"] == "not judged: the thesis contradicts itself"
+    assert rows["R6"]["reasons"].startswith("5.4.1 has it alike in most environments, 5.4.2 in")
+    assert "by itself: not tested: no exchange" in rows["R6"]["reasons"]
+    assert rows["R5"]["reasons"].startswith("decided by the world as well")
+
+
+def test_the_power_of_the_rule_is_next_to_what_is_to_be_alike(tmp_path: Path) -> None:
+    truth = {key: cell for key, cell in rover().items() if key[1] in ("homcne", "hetcne")}
+    with Tables(write_tables(tmp_path, "rover-v1", truth, 20, 0.1)) as tables:
+        rows = {row["id"]: row for row in claims(tables).exhibits[0].rows}
+    assert 0.25 < rows["R4"]["power"] < 0.45
+    share = round(100 * rows["R4"]["power"])
+    assert f"in which all are alike {share} % show it" in rows["R4"]["reasons"]
+    assert rows["R10"]["power"] is None
+    assert "power" not in rows["R10"]["reasons"]
+
+
+def test_a_campaign_about_no_claim_has_one_line(tmp_path: Path) -> None:
+    truth = {("simple-1", "cone-3"): next(iter(rover().values()))}
+    with Tables(write_tables(tmp_path, "rover-v1", truth, 2)) as tables:
+        section = claims(tables)
+    assert section.exhibits == ()
+    assert section.text == [
+        "32 of the thesis' claims are about runs that this campaign does not have."
+    ]
