@@ -23,21 +23,27 @@ from pages import Row, put, table, write
 
 RESULTS = Path(__file__).parent / "results"
 NUMBERS, PAGE = RESULTS / "learning.csv", RESULTS / "learning.md"
-SHARED, OFF = {"method.fresh_rounds": False}, {"method.type_c": "off"}
-OWN, TEAM = {"method.type_c": "own"}, {"method.type_c": "team"}
-ONE = {"method.type_c_rounds": 1}
+SAME: Row = {"method.fresh_rounds": False}
+OWN, TEAM, ONE = {"method.type_c": "own"}, {"method.type_c": "team"}, {"method.type_c_rounds": 1}
+FEWER: Row = {"method.genotypes": 20, "method.rounds": 10}
 VARIANTS: dict[str, tuple[str, Row]] = {
     "HomCNE": ("homcne", {}),
     "HetCNE": ("hetcne", {}),
     "CCGA": ("ccga", {}),
-    "CCGA, same scenarios in all rounds": ("ccga", SHARED),
+    "CCGA, same scenarios in all rounds": ("ccga", SAME),
     "MESP": ("mesp", {}),
-    "MESP, same scenarios in all rounds": ("mesp", SHARED),
-    "CONE, type C off": ("cone", OFF),
+    "MESP, same scenarios in all rounds": ("mesp", SAME),
+    "MESP, 20 genotypes in 10 rounds": ("mesp", FEWER),
+    "CONE, type C off": ("cone", {}),
+    "CONE, same scenarios in all rounds": ("cone", SAME),
+    "CONE, 20 genotypes in 10 rounds": ("cone", FEWER),
     "CONE, type C own": ("cone", OWN),
     "CONE, type C team": ("cone", TEAM),
     "CONE, type C own, one round": ("cone", OWN | ONE),
-    "CONE, type C own, one round, same scenarios in all rounds": ("cone", OWN | ONE | SHARED),
+    "as in 0.1.0: 20 genotypes, same scenarios, type C own, one round": (
+        "cone",
+        FEWER | SAME | OWN | ONE,
+    ),
 }
 
 

@@ -218,6 +218,7 @@ def _run(
             "sst": 0.5 - 0.2 * progress if is_cone else np.full(generations, np.nan),
             "gst": 0.2 + 0.1 * progress if is_cone else np.full(generations, np.nan),
             "recombinations": rng.integers(0, 5, generations) * is_cone,
+            "type_c_evaluations": np.zeros(generations, dtype=int),
             "hidden": np.full(generations, 10.0),
         },
         "castes": {

@@ -66,10 +66,11 @@ def test_a_generation_shares_scenarios_and_all_fittest_teams_share_others() -> N
         return evaluate(Trials(phase, generation, genes, team)).outcome.counts
 
     assert counts("genotypes", 4).shape[1] == 2
-    np.testing.assert_array_equal(counts("genotypes", 4), counts("lesion", 4))
+    np.testing.assert_array_equal(counts("genotypes", 4), counts("elites", 4))
     assert not np.array_equal(counts("genotypes", 4), counts("genotypes", 5))
     assert counts("fittest", 4).shape[1] == 3
     np.testing.assert_array_equal(counts("fittest", 4), counts("fittest", 5))
+    np.testing.assert_array_equal(counts("fittest", 4), counts("lesion", 6))
 
 
 def test_each_round_of_trials_meets_scenarios_of_its_own() -> None:

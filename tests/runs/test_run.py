@@ -82,17 +82,22 @@ def test_a_target_ends_a_run_at_the_first_generation_that_reaches_it(tmp_path: P
 
 
 def test_the_record_of_a_generation(tmp_path: Path) -> None:
-    run = evolve_tiny(tmp_path / "run", run__epochs=2, run__fittest_epochs=3, world__iterations=12)
+    run = evolve_tiny(tmp_path / "run", run__epochs=2, run__fittest_epochs=3, method__type_c="own")
+    evaluations = steps = lesions = 0
     for number, record in enumerate(run.generations()):
         assert record["generation"] == number
-        fittest = number + 1  # one evaluation of each generation is its fittest team's
-        others = record["team_evaluations"] - fittest
-        assert record["team_steps"] == (others * 2 + fittest * 3) * 12
+        assert record["type_c_evaluations"] == 4 * 3 * 2  # rounds, robots, elite genotypes
+        tried = 4 * 4 + record["type_c_evaluations"]
+        fittest = record["team_evaluations"] - evaluations - tried  # with its lesions
+        evaluations, lesions = record["team_evaluations"], lesions + fittest - 1
+        steps += (tried * 2 + fittest * 3) * 12
+        assert record["team_steps"] == steps
         assert sum(record["castes"].values()) == 3
         assert 0 <= record["specialization"] <= 1
         assert set(record["performance"]) == {"value", "area"}
         assert len(record["n_hidden"]) == 3
         assert record["best_fitness"] >= record["mean_fitness"]
+    assert lesions > 0
     assert run.provenance["stopped_by"] == "generations"
     homcne = evolve_tiny(tmp_path / "homcne", "homcne").generations()[0]
     assert (homcne["sst"], homcne["gst"], homcne["n_hidden"]) == (None, None, [2])

@@ -78,6 +78,7 @@ SCHEMA: dict[str, dict[str, str]] = {
         "sst": "DOUBLE",
         "gst": "DOUBLE",
         "recombinations": "INTEGER",
+        "type_c_evaluations": "INTEGER",
         "hidden": "DOUBLE",
     },
     "castes": {

@@ -198,6 +198,7 @@ def _generation_rows(name: str, record: Row) -> Iterator[tuple[str, Row]]:
             "sst": record["sst"],
             "gst": record["gst"],
             "recombinations": record["recombinations"],
+            "type_c_evaluations": record.get("type_c_evaluations"),  # since conevo 0.2
             "hidden": sum(record["n_hidden"]) / len(record["n_hidden"]),
         },
     )

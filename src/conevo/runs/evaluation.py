@@ -14,7 +14,7 @@ from conevo.specialization import individual
 from conevo.worlds.protocol import Outcome, World
 from conevo.worlds.rollout import Rollout
 
-__all__ = ["Evaluation", "Portrait", "describe", "join", "make_evaluator", "score"]
+__all__ = ["FITTEST", "Evaluation", "Portrait", "describe", "join", "make_evaluator", "score"]
 
 
 @dataclass(frozen=True)
@@ -43,6 +43,7 @@ class Evaluation:
 
 
 Evaluate = Callable[[Trials], Evaluation]
+FITTEST = ("fittest", "lesion")  # phases in which the fittest team plays
 
 
 def make_evaluator(
@@ -54,10 +55,11 @@ def make_evaluator(
     and epoch, so a score depends neither on the batch nor on when it is computed; if the trials
     have rounds, so many further ones in each. The fittest teams of all generations meet the same
     ``fittest_epochs`` scenarios.
+    Choice: so do their lesions, so that no neuron is removed by the luck of one scenario.
     """
 
     def keys(trials: Trials, part: int) -> list[int]:
-        if trials.phase == "fittest":
+        if trials.phase in FITTEST:
             return [fold(seed, "fittest", epoch) for epoch in range(fittest_epochs)]
         met = range(part * epochs, (part + 1) * epochs)
         return [fold(seed, "epoch", trials.generation, epoch) for epoch in met]

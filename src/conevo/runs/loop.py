@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections import Counter
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -12,7 +13,7 @@ import numpy as np
 from conevo.errors import UsageError
 from conevo.evolution.protocol import Method, Scores, State
 from conevo.runs.config import RunSettings
-from conevo.runs.evaluation import Evaluate, Portrait, describe
+from conevo.runs.evaluation import FITTEST, Evaluate, Portrait, describe
 from conevo.worlds.measures import Measure
 
 __all__ = ["check_budget", "evolve_generations", "price"]
@@ -57,9 +58,9 @@ def evolve_generations(
         finished = _run_generation(method, state, evaluate, castes, settings.budget_evaluations)
         if finished is None:
             return "budget"
-        began, (state, portrait) = state, finished
-        steps = _team_steps(state, settings, iterations)
-        last = _record(began, state, portrait, steps, time.perf_counter() - started)
+        began, (state, portrait, spent) = state, finished
+        steps = _team_steps(spent, settings, iterations) + (last["team_steps"] if last else 0)
+        last = _record(began, state, portrait, spent, steps, time.perf_counter() - started)
         on_generation(state, last)
 
 
@@ -90,45 +91,58 @@ def check_budget(method: Method, state: State, budget: int) -> None:
 
 def _run_generation(
     method: Method, state: State, evaluate: Evaluate, castes: tuple[str, ...], budget: int
-) -> tuple[State, Portrait] | None:
-    """Return the state after one generation and its fittest team's portrait, None if unpayable.
+) -> tuple[State, Portrait, Counter[str]] | None:
+    """Return what one generation leaves, None if it cannot be paid.
+
+    That is the state after it, its fittest team's portrait, and the team evaluations by phase.
 
     Choice: a phase that the budget cannot pay is not begun, and a generation that could not be
     finished does not count, so that a run never spends more than its budget.
     """
     generation = state.generation
     portrait: Portrait | None = None
+    spent: Counter[str] = Counter()
     while state.generation == generation:
         trials = method.ask(state)
         if budget and state.team_evaluations + len(trials.teams) > budget:
             return None
+        spent[trials.phase] += len(trials.teams)
         evaluation = evaluate(trials)
         if trials.phase == "fittest":
             portrait = describe(evaluation.outcome, castes)
         state = method.tell(state, trials, evaluation.scores)
     if portrait is None:
         raise RuntimeError(f"{method.name} finished a generation without its fittest team")
-    return state, portrait
+    return state, portrait, spent
 
 
-def _team_steps(state: State, settings: RunSettings, iterations: int) -> int:
-    """Return the team-steps so far; one evaluation of each generation is its fittest team's."""
-    others = int(state.team_evaluations) - state.generation
-    epochs = others * settings.epochs + state.generation * settings.fittest_epochs
+def _team_steps(spent: Mapping[str, int], settings: RunSettings, iterations: int) -> int:
+    """Return the team-steps of one generation, given its team evaluations by phase."""
+    epochs = sum(
+        n * (settings.fittest_epochs if phase in FITTEST else settings.epochs)
+        for phase, n in spent.items()
+    )
     return epochs * iterations
 
 
 def _record(
-    began: State, state: State, portrait: Portrait, team_steps: int, seconds: float
+    began: State,
+    state: State,
+    portrait: Portrait,
+    spent: Mapping[str, int],
+    team_steps: int,
+    seconds: float,
 ) -> Record:
     """Return what the run's log says about a generation, given the states before and after it.
 
+    Team evaluations and team-steps are the run's so far, those for type C the generation's own.
     Thresholds and sizes are those the generation was played and bred with, not the next one's.
     """
     return {
         "generation": began.generation,
         "team_evaluations": int(state.team_evaluations),
-        "team_steps": int(team_steps),
+        "type_c_evaluations": spent.get("elites", 0),
+        "team_steps": team_steps,
         "seconds": round(seconds, 4),
         "best_fitness": _finite(state.best_fitness),
         "mean_fitness": _finite(state.mean_fitness),

@@ -1,0 +1,35 @@
+"""Every method learns the shipped example world with the preset that users get."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import conevo
+from conevo.evolution.methods.registry import METHODS
+
+LIGHT = Path(__file__).parents[2] / "examples" / "light.py"
+ENOUGH = 0.85  # nearness; random teams have about 0.5, one that walks straight there 0.99
+
+
+def learned(method: str, seed: int, folder: Path) -> float:
+    """Return the nearness of the champion of a run with the preset desk, in 100 fresh scenarios."""
+    settings = {"run.n_tests": 100}
+    run = conevo.evolve(f"{LIGHT}:dark-1", method, "desk", seed, folder, overrides=settings)
+    assert run.test_result is not None
+    return float(run.test_result["champion"]["performance"]["nearness"]["mean"])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("method", METHODS)
+def test_every_method_learns_the_example(method: str, tmp_path: Path) -> None:
+    """The whole budget of the preset, 50,000 team evaluations: two seconds a run."""
+    assert learned(method, 1, tmp_path / "run") >= ENOUGH
+
+
+@pytest.mark.slow
+@pytest.mark.exhaustive
+@pytest.mark.parametrize("method", METHODS)
+def test_every_method_learns_the_example_with_other_seeds_too(method: str, tmp_path: Path) -> None:
+    assert min(learned(method, seed, tmp_path / f"{seed}") for seed in range(2, 6)) >= ENOUGH
