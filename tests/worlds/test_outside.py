@@ -299,7 +299,7 @@ BAD = {
     "lines": ("raise OSError('two\\nlines')\n", "line 1: OSError: two lines"),
     "exits": ("import sys\nsys.exit('used as a script')\n", "line 2: SystemExit: used as"),
     "imports": ("import conevo_no_such_module\n", "No module named 'conevo_no_such_module'"),
-    "kind": ("ENTRY = 'light-v1'\n", "must be a WorldEntry, not str"),
+    "entry": ("ENTRY = 'light-v1'\n", "must be a WorldEntry, not str"),
     "version": (TEXT.replace('"light-v1"', '"light"'), "must be lower case and end with a version"),
     "taken": (TEXT.replace('"light-v1"', '"rover-v1"'), "is that of a world of the package"),
     "other": (
@@ -308,8 +308,9 @@ BAD = {
     ),
     "environments": (TEXT.replace('("dark-1",)', '("dark-1")'), "must be a tuple of names"),
     "environment": (TEXT.replace('("dark-1",)', '("dark/1",)'), "must be a tuple of names"),
-    "params": (TEXT.replace('"LightParams"', '"Lights"'), "Lights must be a dataclass with"),
-    "world": (TEXT.replace('"LightWorld"', '"Lights"'), "has no class Lights"),
+    "params": (TEXT.replace('"LightParams"', '"Lights"'), "unknown class 'Lights' in its ENTRY"),
+    "kind": (TEXT.replace('"LightParams"', '"LightScenarios"'), "must be a dataclass with"),
+    "world": (TEXT.replace('"LightWorld"', '"Lights"'), "class 'Lights' in its ENTRY; did you"),
     "castes": (TEXT.replace("    castes:", "    cast:"), "LightWorld has no castes"),
 }  # fmt: skip
 

@@ -20,6 +20,7 @@ __all__ = ["cli", "main"]
 VERBS = {
     "run": "Evolve a team and test it.",
     "shape-prey": "Evolve prey for the pursuit world.",
+    "check": "Check a world, such as one of your own.",
     "resume": "Continue an interrupted run, to the bit.",
     "test": "Re-execute a run's fittest team in fresh scenarios.",
     "replay": "See a run's fittest team in the browser.",

@@ -23,7 +23,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from conevo.errors import EnvironmentFailure, UsageError
+from conevo.errors import EnvironmentFailure, UsageError, unknown_name
 from conevo.reading import read_bytes
 from conevo.worlds.registry import WORLDS, WorldEntry
 
@@ -180,12 +180,15 @@ def _problem(entry: Any, module: ModuleType) -> str:
     names: Any = entry.environments
     if not (isinstance(names, tuple) and names and all(_is_environment(one) for one in names)):
         return "its environments must be a tuple of names, as in ('dark-1',)"
-    params: Any = getattr(module, str(entry.params_name), None)
-    made: Any = getattr(module, str(entry.world_name), None)
+    own = ((n, one) for n, one in vars(module).items() if isinstance(one, type))
+    classes = [name for name, one in own if one.__module__.startswith(OWN)]
+    for wanted in (entry.params_name, entry.world_name):
+        if not isinstance(getattr(module, str(wanted), None), type):
+            return str(unknown_name("class", str(wanted), classes, "in its ENTRY"))
+    params: Any = getattr(module, entry.params_name)
+    made: Any = getattr(module, entry.world_name)
     if not (is_dataclass(params) and "iterations" in params.__dataclass_fields__):
         return f"{entry.params_name} must be a dataclass with a field iterations"
-    if not isinstance(made, type):
-        return f"it has no class {entry.world_name}"
     missing = [name for name in CLASS_NAMES if not hasattr(made, name)]
     if missing:
         return f"{entry.world_name} has no {', no '.join(missing)}"

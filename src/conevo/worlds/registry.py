@@ -117,13 +117,14 @@ WORLDS: dict[str, WorldEntry] = {
 }
 
 
-def resolve(path: str, digest: str = "") -> tuple[WorldEntry, str]:
+def resolve(path: str, digest: str = "", is_whole: bool = True) -> tuple[WorldEntry, str]:
     """Return the entry and environment of a path.
 
     Args:
         path: "rover/complex-1", "rover-v1/complex-1", or "FILE.py:ENVIRONMENT" for a world in a
             file outside the package.
         digest: of that file, checked if it is given.
+        is_whole: whether the path must have an environment; the world's first one if it need not.
 
     Raises:
         UsageError: no such world or environment, or no environment given; a file that holds no
@@ -145,8 +146,9 @@ def resolve(path: str, digest: str = "") -> tuple[WorldEntry, str]:
         example = f"{entry.short_name}/{entry.environments[0]}"
         if digest:
             raise UsageError(f"run.world_digest belongs to a world in a file, not to {path!r}")
-    if not environment:
+    if not environment and is_whole:
         raise UsageError(f"world {name!r} needs an environment, as in {example}")
+    environment = environment or entry.environments[0]
     if environment not in entry.environments:
         raise unknown_name("environment", environment, entry.environments, f"of world {name!r}")
     return entry, environment

@@ -16,6 +16,7 @@ from conevo.errors import EnvironmentFailure
 from conevo.kernels import engine
 from conevo.kernels.engine import barrier
 from conevo.kernels.network import WIDE, Shape, load, out_vector, think, wide_vector
+from conevo.worlds.contract import PHASES, refuse_faults, sizes_of
 from conevo.worlds.measures import measures_of
 from conevo.worlds.protocol import Outcome, Scenarios, Simulation, World
 
@@ -44,15 +45,11 @@ class Job:
 def episode_kernel(simulation: Simulation) -> Any:
     """Return the kernel that runs a world's iterations ``t_begin`` to ``t_end``."""
     f = simulation.functions
-    return _episode_kernel(
-        simulation.state,
-        simulation.scene,
-        simulation.params_type,
-        *(f[name] for name in _PHASES),
-    )
-
-
-_PHASES = ("reset", "sense", "act", "commit", "resolve", "outcome")
+    structs = (simulation.state, simulation.scene, simulation.params_type)
+    phases = [f[name] for name in PHASES]
+    if "settle" in f:
+        return _settling_kernel(*structs, *phases, f["settle"])
+    return _episode_kernel(*structs, *phases)
 
 
 @cache
@@ -102,13 +99,56 @@ def _episode_kernel(
     return episode
 
 
-def _sizes_of(world: World, simulation: Simulation) -> dict[str, int]:
-    """Return how many elements of each flat array of the state one team needs."""
-    arrays = {name for name, var in simulation.state.vars.items() if wp.types.is_array(var.type)}
-    known = {"counts": world.n_robots * len(world.castes), "performance": len(world.performance)}
-    if unknown := set(simulation.sizes) - arrays:
-        raise ValueError(f"sizes of what is no array of the state: {', '.join(sorted(unknown))}")
-    return dict.fromkeys(arrays, world.n_robots) | known | simulation.sizes
+# A text of its own, so that a world without the phase keeps its kernel and its kernel's hash.
+@cache
+def _settling_kernel(
+    State: Any,
+    Scene: Any,
+    Params: Any,
+    reset: Any,
+    sense: Any,
+    act: Any,
+    commit: Any,
+    resolve: Any,
+    outcome: Any,
+    settle: Any,
+) -> Any:
+    view_team, view_scene = engine.view_of(State), engine.view_of(Scene)
+
+    @wp.kernel(module="unique", module_options=engine.options, grid_stride=False)
+    def episode(batch: State, scenes: Scene, p: Params, job: Job, first: int) -> None:
+        index, lane = wp.tid()
+        b = first + index
+        lanes = wp.block_dim()
+        n = b // job.n_scenarios
+        team = view_team(batch, b, job.n_worlds)
+        scene = view_scene(scenes, b % job.n_scenarios, job.n_scenarios)
+        if job.t_begin == 0:
+            for i in range(lane, job.n_robots, lanes):
+                reset(team, scene, p, i)
+                load(team.nets, job.shape, i, job.genes, job.slots, n)
+                team.heuristic[i] = job.heuristic[n, i]
+            barrier()
+        for t in range(job.t_begin, job.t_end):
+            for i in range(lane, job.n_robots, lanes):
+                sense(team, scene, p, i, t)
+                if team.heuristic[i] < 0:
+                    think(team.nets, job.shape, i)
+                act(team, scene, p, i, t)
+            barrier()
+            for i in range(lane, job.n_robots, lanes):
+                commit(team, scene, p, i, t)
+            barrier()
+            if lane == 0:
+                settle(team, scene, p, t)
+            barrier()
+            for i in range(lane, job.n_robots, lanes):
+                resolve(team, scene, p, i, t)
+            barrier()
+        if lane == 0:
+            outcome(team, scene, p, job.t_end)
+
+    return episode
 
 
 def _check_device(device: str) -> None:
@@ -137,6 +177,7 @@ class Rollout:
         lanes: lanes of a CPU block (for tests of the CUDA form; needs Warp's CPU blocks).
 
     Raises:
+        UsageError: the world lacks what the engine needs of it.
         EnvironmentFailure: the device does not exist.
     """
 
@@ -152,8 +193,9 @@ class Rollout:
         _check_device(device)
         with engine.building:
             self._simulation = world.simulation()
+            refuse_faults(world, self._simulation)
             self._kernel = episode_kernel(self._simulation)
-        self._sizes = _sizes_of(world, self._simulation)
+        self._sizes = sizes_of(world, self._simulation)
         spec = world.controller
         shape = Shape()
         shape.n_sensors = spec.n_sensors

@@ -1,0 +1,38 @@
+"""``conevo check``: whether a world keeps what worlds promise."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+
+import click
+
+__all__ = ["check"]
+
+
+@click.command(short_help="Check a world, such as one of your own.")
+@click.argument("world", metavar="FILE.py[:ENVIRONMENT]")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON array.")
+def check(world: str, as_json: bool) -> int:
+    """Check the world in FILE.py, or one of the package, and print a line for each thing checked.
+
+    Parameters and their bounds, phases, fields, scenarios; array indices, in a process of its own;
+    sensors, outputs, counts; that robots visited in another order give the same bits; that record
+    equals evaluate; what random teams reach. Without an environment the first one is checked. The
+    exit code is 2 if there is a problem.
+
+    conevo check examples/light.py
+    """
+    from conevo.worlds.checking import check as findings
+
+    found = []
+    for finding in findings(world):
+        found.append(finding)
+        if not as_json:
+            click.echo(f"{finding.status:8} {finding.topic:13} {finding.text}")
+    problems = sum(finding.status == "problem" for finding in found)
+    if as_json:
+        click.echo(json.dumps([asdict(finding) for finding in found]))
+    else:
+        click.echo(f"{problems or 'no'} problem{'s' * (problems != 1)}")
+    return 2 if problems else 0

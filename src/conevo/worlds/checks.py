@@ -1,0 +1,221 @@
+"""What a world promises, tried out: one finding for each thing looked at.
+
+``findings`` yields them in turn. A fault of the world's memory may end the process, so
+``worlds.checking`` does this in a process of its own.
+"""
+
+from collections.abc import Iterator
+from dataclasses import MISSING, dataclass, fields, replace
+from pathlib import Path
+from typing import Any, Literal, get_type_hints
+
+import numpy as np
+import numpy.typing as npt
+from pydantic import TypeAdapter, ValidationError
+
+from conevo.errors import ConevoError
+from conevo.rng import fold, stream
+from conevo.worlds.contract import faults, scenario_faults
+from conevo.worlds.outside import line_of
+from conevo.worlds.protocol import World
+from conevo.worlds.registry import WorldEntry, resolve
+from conevo.worlds.rollout import Rollout
+from conevo.worlds.trial import Trial
+
+__all__ = ["Finding", "findings", "random_teams"]
+
+ITERATIONS = 100  # of the epochs that are run step by step
+NETWORKS = 4  # teams of random networks among those
+RANDOM_TEAMS = 100
+TEAM_STEPS = 200_000  # that all random teams together may take
+FEW = 0.02  # share of random teams with any fitness below which that is noted
+KEYS = [fold(1, "check", k) for k in range(3)]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that was looked at: "ok", a "note" to think about, or a "problem"."""
+
+    status: Literal["ok", "note", "problem"]
+    topic: str
+    text: str
+
+
+def findings(path: str) -> Iterator[Finding]:
+    """Yield what is found in a world; it ends where the rest depends on what is wrong.
+
+    Args:
+        path: "FILE.py:ENVIRONMENT" or "rover/complex-1".
+    """
+    try:
+        entry, environment = resolve(path)
+        yield from _all(entry, environment)
+    except ConevoError as error:
+        yield Finding("problem", "world", str(error))
+    except Exception as error:
+        line = line_of(error)
+        if not line:
+            raise
+        yield Finding("problem", "world", line)
+
+
+def _all(entry: WorldEntry, environment: str) -> Iterator[Finding]:
+    is_sound = True
+    for group in (_declared, _drawn, _stepped, _rolled_out):
+        for finding in group(entry, environment):
+            is_sound = is_sound and finding.status != "problem"
+            yield finding
+        if not is_sound:
+            if group is not _rolled_out:
+                yield Finding("note", "stopped", "the rest is checked once this is right")
+            return
+
+
+def _topic(topic: str, problems: Iterator[str], fine: str) -> Iterator[Finding]:
+    found = [Finding("problem", topic, text) for text in problems]
+    yield from found or [Finding("ok", topic, fine)]
+
+
+def _declared(entry: WorldEntry, environment: str) -> Iterator[Finding]:
+    """Check what the world's file states."""
+    names = [Path(file).name for file in entry.files] or [entry.module]
+    imports = f", which imports {', '.join(names[1:])}" if names[1:] else ""
+    yield Finding("ok", "file", names[0] + imports)
+    yield from _topic("parameters", _of_parameters(entry.params_class), "all with bounds")
+    for name in entry.environments:
+        built = entry.build(name, entry.params_class())
+        if name == environment:
+            fine = "names, controller, phases, state, scene"
+            yield from _topic("structure", faults(built, built.simulation()), fine)
+
+
+def _of_parameters(params_class: Any) -> Iterator[str]:
+    hints = get_type_hints(params_class, include_extras=True)
+    kind = params_class.__name__
+    if not params_class.__dataclass_params__.frozen:
+        yield f"{kind} must be frozen: @dataclass(frozen=True)"
+    for field in fields(params_class):
+        name, hint = f"{kind}.{field.name}", hints[field.name]
+        if hint in (int, float):
+            example = f"Annotated[{hint.__name__}, Ge(0), Le(9)]"
+            yield f"{name} has no bounds; declare them, as in {example}"
+        if field.default is MISSING:
+            yield f"{name} needs a default"
+            continue
+        try:
+            TypeAdapter(hint).validate_python(field.default, strict=True)
+        except ValidationError as error:
+            why = error.errors()[0]["msg"].replace("Input should be", "must be")
+            yield f"{name} = {field.default!r}: {why}"
+
+
+def _drawn(entry: WorldEntry, environment: str) -> Iterator[Finding]:
+    """Check how scenarios are drawn."""
+    a_world = entry.build(environment, entry.params_class())
+    fine = "the same for the same key, different for different keys"
+    yield from _topic("scenarios", _of_scenarios(a_world), fine)
+
+
+def _of_scenarios(a_world: World) -> Iterator[str]:
+    scene = a_world.simulation().scene
+    three, again = a_world.scenarios(KEYS), a_world.scenarios(KEYS)
+    wrong = list(scenario_faults(scene, three, len(KEYS)))
+    yield from wrong
+    if wrong:
+        return
+    last = a_world.scenarios(KEYS[-1:])
+    own = [name for name, var in scene.vars.items() if var.type.ndim == 1]
+    for name in scene.vars:
+        values = getattr(three, name)
+        if values.tobytes() != getattr(again, name).tobytes():
+            yield f"{name} changes from call to call: draw it from stream(key, NAME)"
+        elif name in own and values[-1:].tobytes() != getattr(last, name).tobytes():
+            yield f"{name} of a scenario changes with the other keys that are asked for"
+    rows = {b"".join(getattr(three, name)[k].tobytes() for name in own) for k in range(len(KEYS))}
+    places = [name for name in own if name != "seed"]
+    drawn = {tuple(getattr(three, name)[k].tobytes() for name in places) for k in range(len(KEYS))}
+    if len(rows) < len(KEYS) or (places and len(drawn) == 1):
+        names = ", ".join(places or own)
+        yield f"{names} are the same for all keys: draw them from stream(key, NAME)"
+
+
+def random_teams(a_world: World, n: int) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.int32]]:
+    """Return a pool of random neurons and ``n`` teams of networks made of it [N, R, U]."""
+    spec, r = a_world.controller, a_world.n_robots
+    pool = stream(1, "check", "pool").uniform(-1, 1, (n * r * spec.n_hidden, spec.n_genes))
+    teams = np.full((n, r, spec.max_hidden), -1, dtype=np.int32)
+    teams[:, :, : spec.n_hidden] = np.arange(len(pool)).reshape(n, r, -1)
+    return pool.astype(np.float32), teams
+
+
+def _shorter(entry: WorldEntry, environment: str) -> World:
+    params = entry.params_class()
+    return entry.build(environment, replace(params, iterations=min(ITERATIONS, params.iterations)))
+
+
+def _stepped(entry: WorldEntry, environment: str) -> Iterator[Finding]:
+    """Run some epochs step by step, in a process that ends where an array has no such index."""
+    a_world = _shorter(entry, environment)
+    trial = Trial(a_world, *_cast(a_world), a_world.scenarios(KEYS[:2]))
+    about = f"{trial.n_worlds} epochs of {a_world.params.iterations} iterations"
+    trial.run()
+    yield Finding("ok", "memory", f"{about}: every array has the indices that are used")
+    for topic, problems, fine in trial.seen():
+        yield from _topic(topic, iter(problems), fine)
+
+
+def _cast(
+    a_world: World,
+) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.int32], npt.NDArray[np.int32]]:
+    """Return teams of networks, a mixed one, and one of each heuristic controller."""
+    n_heuristics = len(a_world.heuristics)
+    pool, teams = random_teams(a_world, NETWORKS + 1 + n_heuristics)
+    heuristic = np.full(teams.shape[:2], -1, dtype=np.int32)
+    heuristic[NETWORKS, ::2] = np.arange(len(heuristic[NETWORKS, ::2])) % n_heuristics
+    heuristic[NETWORKS + 1 :] = np.arange(n_heuristics)[:, None]
+    return pool, teams, heuristic
+
+
+def _rolled_out(entry: WorldEntry, environment: str) -> Iterator[Finding]:
+    """Run the kernel that evolution runs."""
+    a_world = _shorter(entry, environment)
+    yield from _topic("record", _of_record(a_world), "equals evaluate, bit for bit")
+    yield from _of_random_teams(entry.build(environment, entry.params_class()))
+
+
+def _of_record(a_world: World) -> Iterator[str]:
+    pool, teams, heuristic = _cast(a_world)
+    mixed = slice(NETWORKS, NETWORKS + 1)
+    scenarios, rollout = a_world.scenarios(KEYS[:1]), Rollout(a_world)
+    out = rollout.evaluate(pool, teams[mixed], scenarios, heuristic[mixed])
+    seen = rollout.record(pool, teams[NETWORKS], scenarios, heuristic[NETWORKS])
+    ended = np.array([values[0, 0] for values in out.performance.values()])
+    if seen["fitness"][-1].tobytes() != out.fitness[0, 0].tobytes():
+        yield "fitness differs from that of evaluate: does outcome change more than performance?"
+    if seen["performance"][-1].tobytes() != ended.tobytes():
+        yield "performance differs from that of evaluate: outcome must begin anew each time"
+
+
+def _of_random_teams(a_world: World) -> Iterator[Finding]:
+    epochs = TEAM_STEPS // a_world.params.iterations // 2
+    n = int(min(RANDOM_TEAMS, max(10, epochs)))
+    out = Rollout(a_world).evaluate(*random_teams(a_world, n), a_world.scenarios(KEYS[:2]))
+    for name, values in (("fitness", out.fitness), *out.performance.items()):
+        if bad := int((~np.isfinite(values)).sum()):
+            share = f"{bad} of {values.size} values"
+            yield Finding("problem", "random teams", f"{name} is not finite: {share}")
+    main, values = next(iter(out.performance.items()))
+    if np.ptp(values) == 0:
+        text = f"{main} is {values.flat[0]:g} for all {n} in all scenarios"
+        yield Finding("note", "random teams", text)
+    fitness = out.fitness.reshape(n, -1)
+    some = int((fitness != 0).any(axis=1).sum())
+    kinds = len({row.tobytes() for row in fitness})
+    text = f"{some} of {n} have any fitness, {kinds} different"
+    if kinds == 1:
+        text = f"all {n} have the same fitness: there is nothing to select on"
+        yield Finding("problem", "random teams", text)
+    elif some < FEW * n:
+        yield Finding("note", "random teams", f"{text}: evolution may find nothing to begin with")
+    else:
+        yield Finding("ok", "random teams", text)

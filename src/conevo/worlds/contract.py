@@ -1,0 +1,203 @@
+"""What the engine needs of a world, looked at before its kernel is made: a line for each fault."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+from conevo.controllers import ControllerSpec
+from conevo.errors import UsageError, unknown_name
+from conevo.kernels.network import OUT, WIDE, Networks
+from conevo.worlds.measures import measures_of
+from conevo.worlds.protocol import Simulation, World
+
+__all__ = ["PHASES", "TEAM_PHASE", "faults", "refuse_faults", "scenario_faults", "sizes_of"]
+
+# The phases of an epoch, each with the numbers it gets after team, scene and p.
+PHASES = {
+    "reset": ("i",),
+    "sense": ("i", "t"),
+    "act": ("i", "t"),
+    "commit": ("i", "t"),
+    "resolve": ("i", "t"),
+    "outcome": ("t_end",),
+}
+TEAM_PHASE = {"settle": ("t",)}  # a world may have it too
+STATE = {
+    "action": int,
+    "heuristic": int,
+    "fitness": float,
+    "counts": int,
+    "switches": int,
+    "performance": float,
+}
+RECORDED = ("action", "fitness")
+
+
+def refuse_faults(world: World, simulation: Simulation) -> None:
+    """Refuse a world that the engine cannot run.
+
+    Raises:
+        UsageError: the first fault.
+    """
+    for fault in faults(world, simulation):
+        raise UsageError(f"world {world.name}: {fault}")
+
+
+def sizes_of(world: World, simulation: Simulation) -> dict[str, int]:
+    """Return how many elements of each flat array of the state one team needs."""
+    arrays = [name for name, var in simulation.state.vars.items() if wp.types.is_array(var.type)]
+    known = {"counts": world.n_robots * len(world.castes), "performance": len(world.performance)}
+    return dict.fromkeys(arrays, world.n_robots) | known | simulation.sizes
+
+
+def faults(world: World, simulation: Simulation) -> Iterator[str]:
+    """Yield what is wrong with a world's names, controller, phases and structs."""
+    yield from _of_names(world)
+    yield from _of_controller(world.controller)
+    yield from _of_phases(simulation)
+    if _is_struct(simulation.state):
+        yield from _of_state(world, simulation)
+    else:
+        yield "Simulation.state must be a wp.struct"
+    if _is_struct(simulation.scene):
+        yield from _of_scene(simulation.scene)
+    else:
+        yield "Simulation.scene must be a wp.struct"
+    made_of = getattr(simulation.params, "_cls", None)
+    if not _is_struct(simulation.params_type) or made_of is not simulation.params_type:
+        yield "Simulation.params must be made of Simulation.params_type, a wp.struct"
+
+
+def _is_struct(kind: Any) -> bool:
+    return isinstance(kind, type(Networks))
+
+
+def _of_names(world: World) -> Iterator[str]:
+    for what in ("actions", "castes", "heuristics"):
+        names: Any = getattr(world, what)
+        if not (isinstance(names, tuple) and names and all(isinstance(n, str) for n in names)):
+            yield f"{what} must be a tuple of names, as in ('rest',), not {names!r}"
+        elif twice := next((name for name in names if names.count(name) > 1), ""):
+            yield f"{what} has {twice!r} twice"
+    if len(world.castes) < len(world.actions):
+        yield f"castes has {len(world.castes)} names, fewer than the {len(world.actions)} actions"
+
+
+def _of_controller(spec: Any) -> Iterator[str]:
+    if not isinstance(spec, ControllerSpec):
+        yield f"controller must return a ControllerSpec, not {type(spec).__name__}"
+        return
+    for name, most in (("n_sensors", None), ("n_hidden", int(WIDE)), ("n_outputs", int(OUT))):
+        value = getattr(spec, name)
+        if not isinstance(value, int) or value < 1 or (most is not None and value > most):
+            allowed = f"1 to {most}" if most else "1 or more"
+            yield f"controller: {name} must be {allowed}, not {value!r}"
+
+
+def _of_phases(simulation: Simulation) -> Iterator[str]:
+    known = PHASES | TEAM_PHASE
+    for name in PHASES.keys() - simulation.functions.keys():
+        yield f"Simulation.functions has no phase {name!r}; a world has {', '.join(PHASES)}"
+    structs = (simulation.state, simulation.scene, simulation.params_type)
+    for name, function in simulation.functions.items():
+        if name not in known:
+            yield str(unknown_name("phase", name, known, "in Simulation.functions"))
+        elif not isinstance(function, wp.Function):
+            yield f"phase {name} must be a wp.func, not {type(function).__name__}"
+        else:
+            wanted = ["team", "scene", "p", *known[name]]
+            given = list(function.input_types.values())
+            types = [*structs, *[int] * len(known[name])]
+            if len(given) != len(wanted) or any(map(_differ, given, types)):
+                line = f"{name}({', '.join(wanted)})"
+                yield (
+                    f"{_place(function)}: phase {name} must be declared as {line}, of types Team, "
+                    f"Scene, Params{', int' * len(known[name])}"
+                )
+
+
+def _differ(given: Any, wanted: Any) -> bool:
+    if _is_struct(wanted):
+        return given is not wanted
+    return given not in (int, wp.int32)
+
+
+def _place(function: Any) -> str:
+    code = function.func.__code__
+    return f"{code.co_filename}:{code.co_firstlineno}"
+
+
+def _of_state(world: World, simulation: Simulation) -> Iterator[str]:
+    state = simulation.state
+    fields = {name: var.type for name, var in state.vars.items()}
+    if fields.get("nets") is not Networks:
+        yield f"{state.key} needs a field 'nets: Networks'"
+    for name, kind in STATE.items():
+        wanted = f"'{name}: wp.array[{kind.__name__}]'"
+        if name not in fields:
+            yield f"{state.key} needs a field {wanted}"
+        elif not _is_array_of(fields[name], kind):
+            yield f"{state.key}.{name} must be declared as {wanted}"
+    arrays = {name for name, kind in fields.items() if wp.types.is_array(kind)}
+    for name, kind in fields.items():
+        if name not in ("nets", *STATE) and not (name in arrays and kind.ndim == 1):
+            yield f"{state.key}.{name} must be a one-dimensional array: only those keep a value"
+    yield from _of_sizes(world, simulation, arrays)
+    for what in ("recorded", "recorded_at_end"):
+        names = getattr(simulation, what)
+        for name in names:
+            if name not in (*arrays, *STATE):
+                yield str(unknown_name("array", name, arrays, f"in Simulation.{what}"))
+    for name in RECORDED:
+        if name not in simulation.recorded:
+            yield f"Simulation.recorded must have {name!r}"
+
+
+def _of_sizes(world: World, simulation: Simulation, arrays: set[str]) -> Iterator[str]:
+    fixed = {"counts": (world.n_robots * len(world.castes), "robots times castes")}
+    fixed["performance"] = (len(measures_of(world)), "measures")
+    fixed |= {name: (world.n_robots, "robots") for name in STATE if name not in fixed}
+    for name, size in simulation.sizes.items():
+        if name not in arrays:
+            yield str(unknown_name("array", name, arrays, "in Simulation.sizes"))
+        elif size < 1:
+            yield f"Simulation.sizes[{name!r}] must be 1 or more, not {size!r}"
+        elif name in fixed and size != fixed[name][0]:
+            yield f"Simulation.sizes[{name!r}] must be {fixed[name][0]} ({fixed[name][1]})"
+
+
+def _is_array_of(kind: Any, dtype: Any) -> bool:
+    return wp.types.is_array(kind) and kind.ndim == 1 and wp.types.types_equal(kind.dtype, dtype)
+
+
+def _of_scene(scene: Any) -> Iterator[str]:
+    for name, var in scene.vars.items():
+        if not wp.types.is_array(var.type):
+            yield f"{scene.key}.{name} must be an array: it is one of every scenario"
+        elif not wp.types.type_is_scalar(var.type.dtype):
+            yield f"{scene.key}.{name} must be an array of numbers"
+    if "seed" in scene.vars and not _is_array_of(scene.vars["seed"].type, wp.uint64):
+        yield f"{scene.key}.seed must be declared as 'seed: wp.array[wp.uint64]'"
+
+
+def scenario_faults(scene: Any, scenarios: Any, n: int) -> Iterator[str]:
+    """Yield what is wrong with ``n`` scenarios: their arrays must be those of the scene."""
+    kind = type(scenarios).__name__
+    for name, var in scene.vars.items():
+        values = getattr(scenarios, name, None)
+        if not isinstance(values, np.ndarray):
+            yield f"{kind} needs an array {name}, as {scene.key} has one"
+            continue
+        wanted = wp.dtype_to_numpy(var.type.dtype)
+        if values.dtype != wanted:
+            yield f"{kind}.{name} must be {np.dtype(wanted)} as in {scene.key}, not {values.dtype}"
+        elif var.type.ndim > 1:
+            if values.ndim != var.type.ndim:
+                yield f"{kind}.{name} must have {var.type.ndim} dimensions, as in {scene.key}"
+        elif values.shape[:1] != (n,):
+            got = list(values.shape)
+            yield f"{kind}.{name} must have a row for each of {n} scenarios, got shape {got}"
+        elif values.dtype.kind == "f" and not np.isfinite(values).all():
+            yield f"{kind}.{name} has values that are not finite"

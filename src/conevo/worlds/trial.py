@@ -1,0 +1,264 @@
+"""Epochs of a world run step by step in several forms at once, and what that shows.
+
+The same teams play in the order of a rollout, with robots visited in reverse and in random order,
+with other numbers in output sums that the controller does not have, and in memory that another
+epoch has used. All of them must agree, bit for bit, after each step.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+import numpy.typing as npt
+
+from conevo.kernels.network import OUT
+from conevo.rng import stream
+from conevo.worlds.measures import measures_of
+from conevo.worlds.protocol import Scenarios, World
+from conevo.worlds.stepping import Arrays, Order, Stepper
+
+__all__ = ["Trial"]
+
+SENTINEL = np.full(1, -7.7712321e-19, np.float32)  # no result: what still holds it was not written
+UNUSED = 40.0  # in place of output sums that the controller does not have
+RESULTS = ("fitness", "counts", "switches", "performance")
+Seen = tuple[str, list[str], str]  # topic, problems, what is said if there are none
+
+
+class Trial:
+    """Runs epochs step by step and looks at them.
+
+    Args:
+        world: the world.
+        genes: pool of neuron genotypes [K, G].
+        teams: pool rows of the neurons [N, R, U]; of each heuristic controller one, at the end.
+        heuristic: [N, R].
+        scenarios: E scenarios.
+    """
+
+    def __init__(
+        self,
+        world: World,
+        genes: npt.NDArray[np.float32],
+        teams: npt.NDArray[np.int32],
+        heuristic: npt.NDArray[np.int32],
+        scenarios: Scenarios,
+    ) -> None:
+        self.world = world
+        self._task = (world, genes, teams, scenarios, heuristic)
+        self._n_teams, self._heuristic = len(teams), heuristic
+        self._plain = Stepper(*self._task)
+        self.n_worlds = self._plain.n_worlds
+        self._simulation = world.simulation()
+        self._order: list[str] = []
+        self._outputs: list[str] = []
+        self._sensors: list[str] = []
+        self._counts: list[str] = []
+        self._executed = np.zeros((self.n_worlds, world.n_robots, len(world.actions)), int)
+        self._switched = np.zeros((self.n_worlds, world.n_robots), int)
+        self._action = np.full((self.n_worlds, world.n_robots), -1, np.int32)
+
+    def run(self) -> None:
+        """Run the epochs, which ends the process where an array has no such index."""
+        plain, iterations = self._plain, self.world.params.iterations
+        robots = stream(1, "check", "order")
+        others = {"reverse": Stepper(*self._task), "random": Stepper(*self._task)}
+        if self.world.controller.n_outputs < int(OUT):
+            others["unused"] = Stepper(*self._task, unused=UNUSED)
+        for name in ("fitness", "performance"):
+            for stepper in (plain, *others.values()):
+                stepper.arrays()[name][:] = SENTINEL
+        for step, t in plain.epoch(iterations):
+            if step == "act" and t in (0, 1, iterations // 2):
+                self._look_at_sensors(t)
+            before = {name: values.copy() for name, values in plain.arrays().items()}
+            plain.step(step, plain.natural, t)
+            for kind, stepper in list(others.items()):
+                order = plain.natural
+                if kind == "reverse":
+                    order = order[:, ::-1]
+                elif kind == "random":
+                    order = robots.permuted(order, axis=1)
+                stepper.step(step, order, t)
+                if found := _differences(plain.arrays(), stepper.arrays()):
+                    del others[kind]
+                    if kind == "unused":
+                        self._explain_outputs(step, found)
+                    elif not self._order:
+                        self._explain_order(step, t, found, before)
+            if step == "resolve":
+                self._count(plain.arrays()["action"])
+
+    def _count(self, action: npt.NDArray[np.int32]) -> None:
+        """Add what has been executed in one iteration to what the world must have counted."""
+        n = len(self.world.actions)
+        if not self._counts and ((action < -1) | (action >= n)).any():
+            bad = action[(action < -1) | (action >= n)][0]
+            self._counts.append(f"action is {bad}; it must be -1 (none) or 0 to {n - 1}")
+        for a in range(n):
+            self._executed[:, :, a] += action == a
+        self._switched += (self._action >= 0) & (action >= 0) & (self._action != action)
+        self._action = action.copy()
+
+    def _look_at_sensors(self, t: int) -> None:
+        """Run "sense" alone, robot by robot, on inputs that hold what nobody writes."""
+        if self._sensors:
+            return
+        spec, arrays = self.world.controller, self._plain.arrays()
+        kept = {name: values.copy() for name, values in arrays.items()}
+        mark = SENTINEL.view(np.uint32)[0]
+        plays = np.repeat(self._heuristic < 0, self.n_worlds // self._n_teams, axis=0)
+        written = np.zeros((self.world.n_robots, spec.n_sensors), bool)
+        for i in range(self.world.n_robots):
+            arrays["inputs"][:] = SENTINEL
+            self._plain.step("sense", _only(self._plain.natural, i), t)
+            seen = (arrays["inputs"].view(np.uint32) != mark)[plays[:, i]]
+            written[i] = seen[:, i, : spec.n_sensors].any(axis=0)
+            seen[:, i, : spec.n_sensors] = False
+            if seen.any():
+                _, robot, k = (int(x[0]) for x in np.nonzero(seen))
+                which = f"input {k}" if robot == i else f"inputs of robot {robot}"
+                self._sensors.append(
+                    f"sense writes {which} for robot {i}; with n_sensors = {spec.n_sensors} a "
+                    f"robot's sensors are its inputs 0 to {spec.n_sensors - 1}"
+                )
+                break
+            for name, values in arrays.items():
+                values[:] = kept[name]
+        for name, values in arrays.items():
+            values[:] = kept[name]
+        if missing := [] if self._sensors else np.flatnonzero(~written.any(axis=0)).tolist():
+            names = ", ".join(map(str, missing))
+            self._sensors.append(
+                f"sense never writes sensor {names}, but n_sensors = {spec.n_sensors}"
+            )
+
+    def _explain_outputs(self, step: str, names: list[str]) -> None:
+        n = self.world.controller.n_outputs
+        self._outputs.append(
+            f"{step} uses outputs that the controller does not have ({', '.join(names)} change "
+            f"with them): with n_outputs = {n} they are 0 to {n - 1}"
+        )
+
+    def _explain_order(self, step: str, t: int, names: list[str], before: Arrays) -> None:
+        """Say which step depends on the order of robots, and who writes what is not its own."""
+        phase = "sense or act" if step == "act" else step
+        text = (
+            f"{phase} gives other results if robots are visited in another order "
+            f"({', '.join(f'`{name}`' for name in names)} differ in iteration {t})"
+        )
+        probe, r = Stepper(*self._task), self.world.n_robots
+        probe.step("reset", probe.natural)  # loads the networks
+        arrays = probe.arrays()
+        shared = set(self._simulation.sizes) - {"counts"} | {"performance"}
+        foreign: dict[str, tuple[int, int]] = {}
+        common: dict[str, set[int]] = {}
+        for i in range(r):
+            for name, values in arrays.items():
+                values[:] = before[name]
+            probe.step(step, _only(probe.natural, i), t)
+            for name in _differences(before, arrays):
+                is_other = before[name].view(np.uint8) != arrays[name].view(np.uint8)
+                if name in shared:
+                    common.setdefault(name, set()).add(i)
+                    continue
+                rows = is_other.reshape(self.n_worlds, r, -1).any(axis=(0, 2))
+                rows[i] = False
+                if rows.any():
+                    foreign.setdefault(name, (i, int(np.flatnonzero(rows)[0])))
+        if foreign:
+            name, (i, j) = next(iter(foreign.items()))
+            text += f": robot {i} writes `{name}` of robot {j}; a phase writes its own robot's data"
+        elif common:
+            name, who = next(iter(common.items()))
+            those = f"robot {min(who)} writes" if len(who) == 1 else f"{len(who)} robots write"
+            text += (
+                f": {those} `{name}`, which others read or write in the same phase; move it in "
+                f"settle(team, scene, p, t), which runs once for the team"
+            )
+        else:
+            text += ": a robot reads what another writes in the same phase"
+        self._order.append(text)
+
+    def seen(self) -> Iterator[Seen]:
+        """Yield topics with what is wrong, after the run."""
+        spec = self.world.controller
+        yield "sensors", self._sensors, f"all {spec.n_sensors} are written, and nothing else"
+        yield "outputs", self._outputs, f"none beyond the {spec.n_outputs} is used"
+        yield "values", list(self._of_values()), "fitness and performance are written and finite"
+        done = np.asarray(self._executed.any(axis=(0, 1)))
+        idle = ", ".join(name for a, name in enumerate(self.world.actions) if not done[a])
+        never = f"; never executed here: {idle}" if idle else ""
+        yield "counts", list(self._of_counts()), f"sum up to the executed actions{never}"
+        yield "order", self._order, "robots in reverse and in random order: the same bits"
+        yield "reset", list(self._of_reset()), "nothing of another epoch is left over"
+        yield "heuristics", list(self._of_heuristics()), f"{len(self.world.heuristics)} play"
+
+    def _of_values(self) -> Iterator[str]:
+        arrays = self._plain.arrays()
+        mark = SENTINEL.view(np.uint32)[0]
+        if (arrays["fitness"].view(np.uint32) == mark).any():
+            yield "fitness is never written: every robot gets one in reset or resolve"
+        elif bad := int((~np.isfinite(arrays["fitness"])).sum()):
+            yield f"fitness is not finite: {bad} of {arrays['fitness'].size} values"
+        for k, measure in enumerate(measures_of(self.world)):
+            values = arrays["performance"][:, k]
+            if (np.ascontiguousarray(values).view(np.uint32) == mark).any():
+                yield f"performance[{k}] ({measure.name}) is never written: outcome writes it"
+            elif bad := int((~np.isfinite(values)).sum()):
+                yield f"{measure.name} is not finite: {bad} of {values.size} epochs"
+
+    def _of_counts(self) -> Iterator[str]:
+        yield from self._counts
+        if self._counts:
+            return
+        world, arrays = self.world, self._plain.arrays()
+        counts = arrays["counts"].reshape(self.n_worlds, world.n_robots, len(world.castes))
+        if not np.array_equal(counts.sum(axis=2), self._executed.sum(axis=2)):
+            yield (
+                f"counts sum up to {int(counts.sum())}, but `action` shows "
+                f"{int(self._executed.sum())} executed actions; count each once, in one caste"
+            )
+        elif world.castes == world.actions and not np.array_equal(counts, self._executed):
+            a = int(np.flatnonzero((counts != self._executed).any(axis=(0, 1)))[0])
+            yield f"counts of {world.actions[a]!r} are not those of the action that was executed"
+        if not np.array_equal(arrays["switches"], self._switched):
+            yield "switches are not those of `action`; count_action counts them"
+        if not self._executed.any():
+            yield "no robot ever executes an action"
+
+    def _of_reset(self) -> Iterator[str]:
+        used, fresh = Stepper(*self._task), Stepper(*self._task)
+        for name, values in used.arrays().items():
+            values[:] = self._plain.arrays()[name][::-1]
+        for stepper in (used, fresh):
+            stepper.step("reset", stepper.natural)
+        left = _differences(used.arrays(), fresh.arrays())
+        for step, t in used.epoch(self.world.params.iterations):
+            used.step(step, used.natural, t)
+        ended, should = used.arrays(), self._plain.arrays()
+        if wrong := [n for n in RESULTS if ended[n].tobytes() != should[n].tobytes()]:
+            yield (
+                f"{', '.join(wrong)} depend on the epoch before, in the same memory; reset leaves "
+                f"{', '.join(f'`{name}`' for name in left)} as they were"
+            )
+
+    def _of_heuristics(self) -> Iterator[str]:
+        names = self.world.heuristics
+        counts = self._plain.arrays()["counts"].reshape(self._n_teams, -1)
+        first = self._n_teams - len(names)
+        played = {counts[0].tobytes(): "a team of networks"}
+        for name, row in zip(names, counts[first:], strict=True):
+            if other := played.get(row.tobytes()):
+                yield f"{name!r} does exactly what {other} does"
+            played[row.tobytes()] = repr(name)
+
+
+def _only(order: Order, i: int) -> Order:
+    """Return an order in which robot ``i`` alone is visited."""
+    return np.where(np.arange(order.shape[1]) == 0, i, -1).astype(np.int32) + np.zeros_like(order)
+
+
+def _differences(a: Arrays, b: Arrays) -> list[str]:
+    """Return the names of the arrays that differ, output sums left out."""
+    bits = ((n, a[n].view(np.uint8), b[n].view(np.uint8)) for n in a if n != "sums")
+    return [name for name, one, other in bits if not np.array_equal(one, other)]
