@@ -128,7 +128,9 @@ def test_scenarios_without_a_finite_value_are_counted_in_words(campaign, tmp_pat
     with Tables(copy / "tables") as tables:
         told = [champions(scope).text for scope in scopes(tables)]
     (sentence,) = [line for lines in told for line in lines]
-    assert sentence.startswith("Not finite: capture time of the champions of 1 of 12 runs, in 2 of")
+    assert sentence.startswith(
+        "Not finite: capture time in 2 of 240 values of the test of champions, of 1 of 12 runs."
+    )
 
 
 def test_what_failed_is_listed_and_escaped(report) -> None:

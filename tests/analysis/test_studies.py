@@ -301,7 +301,7 @@ def test_where_predators_do_not_fit_together_they_begin_anywhere(tmp_path, stage
 # --- what goes wrong ------------------------------------------------------------------------------
 
 
-def test_what_is_not_finite_is_left_out(runs, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_is_not_finite_keeps_its_place(runs, monkeypatch: pytest.MonkeyPatch) -> None:
     evaluate = Rollout.evaluate
 
     def spoiled(self: Rollout, *args: Any) -> Any:
@@ -317,10 +317,11 @@ def test_what_is_not_finite_is_left_out(runs, monkeypatch: pytest.MonkeyPatch) -
     for kind in ("lesion", "clones"):
         missing = {("whole", "value", 1), ("whole", "area", 0)}
         own = [row for row in found["scores"] if row["study"] == kind]
-        have = {(row["team"], row["measure"], row["scenario"]) for row in own}
+        values = {(row["team"], row["measure"], row["scenario"]): row["value"] for row in own}
         teams = {row["team"] for row in own}
         grid = {(t, m, k) for t in teams for m in ("value", "area") for k in range(N)}
-        assert grid - have == missing
+        assert values.keys() == grid
+        assert {place for place, value in values.items() if value is None} == missing
     assert [row["robot"] for row in found["robots"] if row["fitness"] is None] == [4]
 
 

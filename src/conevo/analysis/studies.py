@@ -164,14 +164,17 @@ def _fits_together(seen: Observation) -> bool:
 
 
 def _rows(study: str, compared: Compared) -> list[Row]:
-    """Return the finite values of each team and measure as rows."""
+    """Return the values of each team and measure as rows; one that is not finite is None."""
     return [
-        {"study": study, "team": team, "measure": measure, "scenario": k, "value": float(value)}
+        {"study": study, "team": team, "measure": measure, "scenario": k, "value": _finite(value)}
         for n, team in enumerate(compared.teams)
         for measure, values in compared.performance.items()
         for k, value in enumerate(values[n])
-        if np.isfinite(value)
     ]
+
+
+def _finite(value: Any) -> float | None:
+    return float(value) if np.isfinite(value) else None
 
 
 def _robots(team: Team, portrait: _Portrait) -> list[Row]:
@@ -182,7 +185,7 @@ def _robots(team: Team, portrait: _Portrait) -> list[Row]:
             "robot": robot,
             "caste": caste,
             "specialization": float(s),
-            "fitness": float(fitness) if np.isfinite(fitness) else None,
+            "fitness": _finite(fitness),
             "hidden": int(n_hidden),
         }
         for robot, (caste, s, fitness, n_hidden) in enumerate(zip(*columns, strict=True))

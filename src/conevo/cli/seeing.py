@@ -27,7 +27,7 @@ OPTIONS = (
     ),
     click.option(
         "--generation", type=click.IntRange(0), metavar="G",
-        help="Its fittest team (default: the champion, the fittest of all).",
+        help="Its fittest team (default: the champion).",
     ),
     click.option(
         "--beside-generation", type=click.IntRange(0), metavar="G",

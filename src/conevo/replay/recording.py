@@ -42,7 +42,7 @@ def record(
 
     Args:
         run: finished or not.
-        generation: whose fittest team; by default the champion, the fittest of all so far.
+        generation: whose fittest team; by default the champion.
         epoch: number of the scenario among those that the run's testing phase draws, from 0.
         threads: CPU threads, all by default; changes no result.
         like: another run's trajectory of the same task: its scenario is played instead.

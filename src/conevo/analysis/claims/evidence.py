@@ -19,7 +19,7 @@ PLAYED = """
     WITH played AS (
         SELECT s.run, s.team, avg(s.value) AS value
         FROM scores s JOIN runs r USING (run)
-        WHERE s.study = '{study}' AND s.measure = r.measure
+        WHERE s.study = '{study}' AND s.measure = r.measure AND s.value IS NOT NULL
         GROUP BY s.run, s.team
     )
 """

@@ -10,6 +10,14 @@ from conevo.analysis.sections.scope import Scope
 
 __all__ = ["champions"]
 
+NAMES = {
+    ("test", "champion"): "the test of champions",
+    ("test", "generation 0"): "the test of generation 0",
+    ("lesion", ""): "lesions of castes",
+    ("clones", ""): "teams of clones",
+}
+"""What a study, and where it matters its team, is called in a sentence."""
+
 
 def champions(scope: Scope) -> Section | None:
     """Return selection, validation and test of each cell's champions; None if no run has them."""
@@ -62,18 +70,18 @@ def _rows(scope: Scope, measure: str) -> list[dict[str, Any]]:
 
 
 def _not_finite(scope: Scope) -> list[str]:
-    """Return a sentence for each measure that lacks values in the test of champions."""
+    """Return a sentence for each study and measure that lacks values."""
     world, family, budget = (part.replace("'", "''") for part in scope.group)
     found = scope.tables.query(
-        "SELECT s.measure, count(DISTINCT run) FILTER (s.value IS NULL), count(DISTINCT run),"
+        "SELECT s.measure, s.study, if(s.study = 'test', s.team, '') AS team,"
+        " count(DISTINCT run) FILTER (s.value IS NULL), count(DISTINCT run),"
         " count(*) FILTER (s.value IS NULL), count(*) FROM scores s JOIN runs r USING (run)"
         f" JOIN budgets b USING (run) WHERE r.world = '{world}' AND r.family = '{family}'"
-        f" AND b.budget = '{budget}' AND s.study = 'test' AND s.team = 'champion'"
-        " GROUP BY ALL HAVING count(*) > count(s.value) ORDER BY ALL"
+        f" AND b.budget = '{budget}' GROUP BY ALL HAVING count(*) > count(s.value) ORDER BY ALL"
     )[1]
     return [
-        f"Not finite: {measure.replace('_', ' ')} of the champions of {runs} of {of_runs} runs, in "
-        f"{values} of {of_values} scenarios. A run's mean is that of its other scenarios; a run "
-        "without any is left out of tables and figures."
-        for measure, runs, of_runs, values, of_values in found
+        f"Not finite: {measure.replace('_', ' ')} in {values} of {of_values} values of "
+        f"{NAMES.get((study, team), study)}, of {runs} of {of_runs} runs. Means are those of the "
+        "other scenarios; a run without any is left out of tables and figures."
+        for measure, study, team, runs, of_runs, values, of_values in found
     ]

@@ -87,7 +87,8 @@ def _teams(scope: Scope, study: str) -> tuple[dict[Cell, list[_Team]], int]:
     found = scope.tables.query(
         f"""
         SELECT s.run, s.team, avg(s.value) FROM scores s JOIN runs r USING (run)
-        WHERE s.study = '{study}' AND s.measure = r.measure GROUP BY ALL ORDER BY ALL
+        WHERE s.study = '{study}' AND s.measure = r.measure AND s.value IS NOT NULL
+        GROUP BY ALL ORDER BY ALL
         """
     )[1]
     values: dict[str, dict[str, float]] = defaultdict(dict)
