@@ -35,7 +35,14 @@ def test_a_session_from_run_to_the_commands_it_recommends(say, tmp_path: Path) -
     assert "Testing phase, 3 fresh scenarios" in said.out
     assert "5 of 5 generations" in said.out
     recommended = re.findall(r"^  (conevo .*)$", said.out, flags=re.MULTILINE)
-    assert [line.split()[1] for line in recommended] == ["show", "replay", "test", "run", "run"]
+    assert [line.split()[1] for line in recommended] == [
+        "show",
+        "replay",
+        "test",
+        "resume",
+        "run",
+        "run",
+    ]
     for line in recommended:
         again = say(*shlex.split(line)[1:])
         assert again.code == 0, again.err
@@ -45,7 +52,7 @@ def test_a_session_from_run_to_the_commands_it_recommends(say, tmp_path: Path) -
         ("cone", "1"), ("cone", "2"), ("mesp", "1"),
     ]  # fmt: skip
     assert {row["status"] for row in listed} == {"finished"}
-    assert {row["generations"] for row in listed} == {"5/5"}
+    assert [row["generations"] for row in listed] == ["10/10", "10/10", "5/5"]  # continued
 
 
 def test_the_other_method_is_run_with_the_same_run_and_world_settings(say) -> None:

@@ -140,7 +140,7 @@ def test_a_foreign_checkpoint_is_refused(tmp_path: Path) -> None:
     (source,) = other.path.glob("checkpoint-?.npz")
     for file in run.path.glob("checkpoint-?.npz"):
         shutil.copy(source, file)
-    with pytest.raises(UsageError, match="is foreign: run_id is"):
+    with pytest.raises(UsageError, match="is foreign: stem_id is"):
         run.resume(threads=1)
 
 

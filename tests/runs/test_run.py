@@ -225,8 +225,10 @@ def test_a_team_as_a_trial_uses_exactly_its_active_slots() -> None:
 
 def test_generations_worth_keeping_are_few_and_begin_with_the_first() -> None:
     assert sampled_generations(3) == {0, 1, 2}
-    assert sampled_generations(100) == set(range(0, 100, 10))
-    assert len(sampled_generations(250)) == 10
+    assert sampled_generations(100) == set(range(0, 100, 8))
+    for n in range(17, 300):
+        assert 9 <= len(sampled_generations(n)) <= 16
+        assert sampled_generations(n) & set(range(n - 1)) <= sampled_generations(n - 1)
 
 
 def test_the_testing_phase_is_the_team_in_the_addressed_scenarios(tmp_path: Path) -> None:

@@ -13,8 +13,9 @@ from conevo.errors import EnvironmentFailure, UsageError
 if TYPE_CHECKING:
     from conevo.runs.run import Run
     from conevo.runs.shaping import Shaping
+    from conevo.runs.time_limit import TimeLimit
 
-__all__ = ["accept_option", "carry_on", "output_options", "style_of"]
+__all__ = ["accept_option", "carry_on", "output_options", "style_of", "time_limit_option"]
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -48,10 +49,38 @@ def style_of(as_json: bool, quiet: bool, verbose: bool) -> str:
     return "live" if sys.stdout.isatty() else "plain"
 
 
+def time_limit_option(function: Function) -> Function:
+    """Add --time-limit to a command; its value is a ``TimeLimit`` that has begun."""
+
+    def begin(ctx: click.Context, parameter: click.Parameter, text: str | None) -> TimeLimit:
+        from conevo.runs.time_limit import TimeLimit, parse_seconds
+
+        return TimeLimit(None if text is None else parse_seconds(text))
+
+    return click.option(
+        "--time-limit", "limit", metavar="TIME", callback=begin,
+        help="Stop after 90s, 10m, 1.5h or 2d, so that resume goes on; ends with 0.",
+    )(function)  # fmt: skip
+
+
 def carry_on(
-    found: Run | Shaping, threads: int | None, style: str, accept_other_code: bool = False
+    found: Run | Shaping,
+    threads: int | None,
+    style: str,
+    limit: TimeLimit,
+    length: dict[str, Any] | None = None,
+    accept_other_code: bool = False,
 ) -> None:
-    """Carry a run or a shaping on to its end, then print a summary and what can be done next."""
+    """Carry a run or a shaping on to its end, then print a summary and what can be done next.
+
+    Args:
+        found: what to carry on.
+        threads: CPU threads, all by default.
+        style: how to report.
+        limit: the time that is left.
+        length: of a run, where it is to end instead: arguments of ``Run.extend``.
+        accept_other_code: go on although another conevo made it so far.
+    """
     from conevo.cli.progress import watching
     from conevo.cli.stages import print_shaping_end
     from conevo.cli.summary import print_end
@@ -64,15 +93,24 @@ def carry_on(
         of = before = 0
         if not isinstance(found, Run):
             of, before = len(found.outlines), len(found.generations()) - len(run.generations())
+        if length:
+            run.extend(**length, threads=threads, accept_other_code=accept_other_code)
         with watching(run, style, stage, of, before) as watch:
             run.resume(
+                time_limit=limit,
                 threads=threads,
                 watch=watch,
                 remark=remark,
                 accept_other_code=accept_other_code,
             )
 
-    found.refuse_finished()
+    if not length:
+        found.refuse_finished()
+    elif not isinstance(found, Run):
+        raise UsageError(
+            f"{found.path} is a shaping, whose stages keep their length; begin a run with the "
+            f"populations of its last stage: conevo run WORLD/ENVIRONMENT --from {found.path}"
+        )
     if not accept_other_code:
         found.refuse_other_code()
     advice = f"conevo resume {found.path}"
@@ -82,13 +120,21 @@ def carry_on(
         else:
             found.carry_on(carry, threads, accept_other_code)
     except KeyboardInterrupt:
-        runs = [found] if isinstance(found, Run) else found.stages
-        count = sum(len(run.generations()) for run in runs)
-        click.echo(f"interrupted after {count} generations; continue with: {advice}", err=True)
+        click.echo(f"interrupted after {_done(found)}; continue with: {advice}", err=True)
         sys.exit(130)
     except EnvironmentFailure as error:
         raise EnvironmentFailure(f"{error}; when that is mended: {advice}") from error
+    if found.status != "finished":
+        click.echo(f"time is over after {_done(found)}; continue with: {advice}", err=True)
     if isinstance(found, Run):
         print_end(found, style)
     else:
         print_shaping_end(found, style)
+
+
+def _done(found: Run | Shaping) -> str:
+    """Return how many generations are done."""
+    from conevo.cli.text import generations
+
+    runs = found.stages if hasattr(found, "stages") else [found]
+    return generations(sum(len(run.generations()) for run in runs))

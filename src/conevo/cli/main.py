@@ -21,7 +21,7 @@ VERBS = {
     "run": "Evolve a team and test it.",
     "shape-prey": "Evolve prey for the pursuit world.",
     "check": "Check a world, such as one of your own.",
-    "resume": "Continue an interrupted run, to the bit.",
+    "resume": "Continue an interrupted run, or a finished one.",
     "test": "Re-execute a run's fittest team in fresh scenarios.",
     "replay": "See a run's fittest team in the browser.",
     "film": "Make a film of a run's fittest team (GIF, MP4).",

@@ -11,11 +11,12 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from conevo.cli.carry import carry_on, style_of
+from conevo.cli.carry import carry_on, style_of, time_limit_option
 from conevo.errors import UsageError
 
 if TYPE_CHECKING:
     from conevo.runs.config import RunConfig
+    from conevo.runs.time_limit import TimeLimit
 
 __all__ = ["Order", "setting_options"]
 
@@ -44,6 +45,7 @@ OPTIONS = (
     ),
     click.option("--device", default="cpu", show_default=True, help="cpu or cuda."),
     click.option("--out", metavar="DIR", help="Its directory (default: a new one in runs/)."),
+    time_limit_option,
 )  # fmt: skip
 
 
@@ -71,6 +73,7 @@ class Order:
     threads: int | None
     device: str
     out: str | None
+    limit: TimeLimit
     as_json: bool
     quiet: bool
     verbose: bool
@@ -152,7 +155,7 @@ class Order:
         begun = start(
             config, self.out, threads=self.threads, device=self.device, command=self.command
         )
-        carry_on(begun, self.threads, self.style)
+        carry_on(begun, self.threads, self.style, self.limit)
 
     def shape(self, tasks: Sequence[str]) -> None:
         """Start a shaping and carry it on to its end."""
@@ -171,4 +174,4 @@ class Order:
             command=self.command,
             place=PLACE,
         )
-        carry_on(begun, self.threads, self.style)
+        carry_on(begun, self.threads, self.style, self.limit)

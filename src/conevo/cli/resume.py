@@ -1,16 +1,37 @@
-"""``conevo resume``: continue an interrupted run."""
+"""``conevo resume``: continue an interrupted run, or a finished one beyond its end."""
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
 import click
 
-from conevo.cli.carry import accept_option, carry_on, output_options, style_of
+from conevo.cli.carry import (
+    accept_option,
+    carry_on,
+    output_options,
+    style_of,
+    time_limit_option,
+)
+from conevo.errors import UsageError
+
+if TYPE_CHECKING:
+    from conevo.runs.time_limit import TimeLimit
 
 __all__ = ["resume"]
 
 
-@click.command(short_help="Continue an interrupted run, to the bit.")
+@click.command(short_help="Continue an interrupted run, or a finished one.")
 @click.argument("run")
+@click.option(
+    "--generations", type=click.IntRange(1), help="Where it is to end instead: all generations."
+)
+@click.option(
+    "--budget-evaluations", type=click.IntRange(0),
+    help="All team evaluations that it may now spend; 0: no limit.",
+)  # fmt: skip
+@click.option("--target", metavar="VALUE|none", help="Task performance at which it is to end now.")
+@time_limit_option
 @click.option(
     "--threads", type=click.IntRange(1), help="CPU threads (default all); changes no result."
 )
@@ -18,6 +39,10 @@ __all__ = ["resume"]
 @output_options
 def resume(
     run: str,
+    generations: int | None,
+    budget_evaluations: int | None,
+    target: str | None,
+    limit: TimeLimit,
     threads: int | None,
     accept_other_code: bool,
     as_json: bool,
@@ -26,8 +51,26 @@ def resume(
 ) -> None:
     """Continue RUN (a directory, or the beginning of its name in runs/) from its last checkpoint.
 
-    The result is the same, to the bit, as that of a run that was never interrupted.
+    The result is the same, bit for bit, as that of a run that was never interrupted. With
+    --generations or --budget-evaluations a finished run goes on, too: the result is that of a run
+    which was planned that long, for example conevo resume runs/first --generations 100
     """
     from conevo.cli.find import find
 
-    carry_on(find(run), threads, style_of(as_json, quiet, verbose), accept_other_code)
+    length: dict[str, Any] = {
+        "generations": generations,
+        "budget_evaluations": budget_evaluations,
+        "target": None if target is None else _target(target),
+    }
+    length = {name: value for name, value in length.items() if value is not None}
+    style = style_of(as_json, quiet, verbose)
+    carry_on(find(run), threads, style, limit, length, accept_other_code)
+
+
+def _target(text: str) -> float | str:
+    if text == "none":
+        return text
+    try:
+        return float(text)
+    except ValueError as error:
+        raise UsageError(f"--target {text!r}: expected a number, or none") from error

@@ -8,7 +8,18 @@ from typing import Any
 
 import click
 
-from conevo.cli.text import castes, count, duration, mean, n_finite, neurons, number, spread, table
+from conevo.cli.text import (
+    castes,
+    count,
+    duration,
+    generations,
+    mean,
+    n_finite,
+    neurons,
+    number,
+    spread,
+    table,
+)
 from conevo.evolution.methods.registry import METHODS
 from conevo.runs.code import changes_text, sessions_of
 from conevo.runs.outline import Outline
@@ -41,6 +52,8 @@ def print_end(run: Run, style: str) -> None:
     elif style == "json":
         end = {"run": str(run.path), "status": run.status, "test": run.test_result}
         click.echo(json.dumps(end))
+    elif run.status != "finished":
+        click.echo(f"\n{_state(run)}")
     else:
         result = run.test_result or {}
         commands = "\n".join(f"  {command}" for command in next_commands(run))
@@ -58,6 +71,8 @@ def run_text(run: Run, n_rows: int) -> str:
         parts += ["", generations_table(spaced(records, n_rows))]
     if run.test_result:
         parts += ["", test_text(run.test_result)]
+    if lines := _former_ends(run):
+        parts += ["", *lines]
     if run.status == "interrupted":
         parts += ["", f"Continue it with: conevo resume {run.path}"]
     return "\n".join(parts)
@@ -168,10 +183,35 @@ def next_commands(run: Run) -> list[str]:
         f"conevo show {run.path}": "its generations",
         f"conevo replay {run.path}": "see its team in the browser",
         f"conevo test {run.path} --scenarios 100": "test its team longer",
+        f"conevo resume {run.path} --{_twice_as_long(run)}": "evolve it longer",
         again: "the same with another seed",
         repeat + "".join(changes): "the same with another method",
     }
     return [line for command, what in commands.items() for line in (f"# {what}", command)]
+
+
+def _twice_as_long(run: Run) -> str:
+    """Return the option that continues a finished run for as long as it has been evolved."""
+    settings, stopped_by = run.config.run, run.provenance.get("stopped_by")
+    if stopped_by == "budget":
+        return f"budget-evaluations {2 * settings.budget_evaluations}"
+    if stopped_by == "target":
+        return "target none"
+    return f"generations {2 * settings.generations}"
+
+
+def _former_ends(run: Run) -> list[str]:
+    """Return a line for each time the run was given another length."""
+    return [
+        f"Given another length {former['at']}: it had {generations(former['generations'])}, "
+        + (
+            f"finished {former['finished']} (stopped by: {former['stopped_by']})"
+            if former["finished"]
+            else "not finished"
+        )
+        + f", as run {former['run_id']}"
+        for former in run.provenance.get("extended", [])
+    ]
 
 
 def _state(run: Run) -> str:

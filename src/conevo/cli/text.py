@@ -12,6 +12,7 @@ __all__ = [
     "castes",
     "count",
     "duration",
+    "generations",
     "neurons",
     "mean",
     "n_finite",
@@ -60,6 +61,11 @@ def n_finite(found: Mapping[str, Any]) -> int:
 def count(value: int) -> str:
     """Return a whole number with separated thousands."""
     return f"{value:,}"
+
+
+def generations(number: int) -> str:
+    """Return so many generations in words: "1 generation", "5 generations"."""
+    return f"{count(number)} generation{'' if number == 1 else 's'}"
 
 
 def duration(seconds: float) -> str:

@@ -124,6 +124,13 @@ def fittest_team(state: State, generation: int) -> Team:
     )
 
 
-def sampled_generations(n_generations: int, n_samples: int = 10) -> set[int]:
-    """Return about ``n_samples`` evenly spaced generations, the first always among them."""
-    return set(range(0, n_generations, max(1, n_generations // n_samples)))
+def sampled_generations(n_generations: int) -> set[int]:
+    """Return evenly spaced generations of ``n_generations``: all up to 16, then 9 to 16 of them.
+
+    The distance is a power of two, so that the generations kept of a long run are among those kept
+    of each of its beginnings: a run that is continued keeps what one planned that long keeps.
+    """
+    distance = 1
+    while -(-n_generations // distance) > 16:
+        distance *= 2
+    return set(range(0, n_generations, distance))

@@ -35,6 +35,7 @@ DECIDING = (
     "runs/evaluation.py",
     "runs/lab.py",
     "runs/loop.py",
+    "runs/session.py",
     "runs/testing.py",
 )
 """Files and folders of the package. A world in a file of its own has a digest of its own."""

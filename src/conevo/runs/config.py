@@ -49,7 +49,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from conevo.errors import UsageError, shown, unknown_name
 from conevo.reading import DamagedFile, parse_toml, read_toml
-from conevo.runs.outline import Outline, identify, outline_of
+from conevo.runs.outline import LENGTH, Outline, identify, outline_of
 
 if TYPE_CHECKING:
     from conevo.worlds.protocol import World
@@ -160,10 +160,30 @@ class RunConfig:
         """
         return identify(self.tables(), self.task)
 
+    @functools.cached_property
+    def stem_id(self) -> str:
+        """As ``run_id``, but for the length: runs that share it are alike while both go on."""
+        return identify(self.tables(), self.task, without=("preset", *LENGTH))
+
     @property
     def outline(self) -> Outline:
         """What names the run."""
         return outline_of(self.tables(), self.task)
+
+    def of_length(self, length: Mapping[str, Any]) -> RunConfig:
+        """Return the configuration of a run that is the same but for values of ``LENGTH``.
+
+        Raises:
+            UsageError: a value that is not allowed; None is allowed for a target.
+        """
+        values = {k: v for k, v in (_set_fields(self.run) | dict(length)).items() if v is not None}
+        layer = _as_layer({"run": values}, "as the run's length")
+        run = _build("run", RunSettings, [layer])
+        built = {"run": run, "world": self.world_params, "method": self.method_config}
+        parts = {name: type(part) for name, part in built.items()}
+        base = _read_preset(self.preset, self.world, self.method)
+        changed = tuple(_changed(parts, built, base))
+        return dataclasses.replace(self, run=run, changed=changed)
 
     @property
     def label(self) -> str:

@@ -167,9 +167,20 @@ class Directory:
         """Close the directory: write the digests of all files."""
         replace_file(self.path / SEAL, as_json({"files": self._digests()}))
 
+    def unseal(self) -> None:
+        """Open a finished directory again."""
+        with writing(self.path / SEAL):
+            (self.path / SEAL).unlink(missing_ok=True)
+            sync_directory(self.path)
+
+    def read_seal(self) -> dict[str, str]:
+        """Return the digests of all files when the directory was sealed, by name."""
+        files: dict[str, str] = read_json(self.path / SEAL)["files"]
+        return files
+
     def check_seal(self) -> list[str]:
         """Return the names of files that are not as they were when the directory was sealed."""
-        sealed: Mapping[str, str] = read_json(self.path / SEAL)["files"]
+        sealed = self.read_seal()
         found = self._digests()
         return sorted(name for name in sealed if found.get(name) != sealed[name])
 

@@ -16,7 +16,7 @@ from conevo.runs.config import RunSettings
 from conevo.runs.evaluation import FITTEST, Evaluate, Portrait, describe
 from conevo.worlds.measures import Measure
 
-__all__ = ["check_budget", "evolve_generations", "price"]
+__all__ = ["check_budget", "evolve_generations", "has_reached", "price"]
 
 Record = dict[str, Any]
 
@@ -32,6 +32,7 @@ def evolve_generations(
     iterations: int,
     last: Record | None = None,
     on_generation: Callable[[State, Record], None],
+    has_time: Callable[[], bool] = lambda: True,
 ) -> str:
     """Carry a population forward, one whole generation after another, and say why it stopped.
 
@@ -45,15 +46,18 @@ def evolve_generations(
         iterations: of one epoch of the world.
         last: record of the generation before, if there was one.
         on_generation: called with the state after a generation and the generation's record.
+        has_time: asked before each generation whether it may begin.
 
     Returns:
-        "generations", "target" or "budget".
+        "generations", "target" or "budget": the end. "time": not yet, but there is no time left.
     """
     while True:
-        if last is not None and _has_reached(settings.target, main, last["performance"]):
+        if last is not None and has_reached(settings.target, main, last["performance"]):
             return "target"
         if state.generation >= settings.generations:
             return "generations"
+        if not has_time():
+            return "time"
         started = time.perf_counter()
         finished = _run_generation(method, state, evaluate, castes, settings.budget_evaluations)
         if finished is None:
@@ -163,7 +167,7 @@ def _finite(value: Any) -> float | None:
     return float(value) if math.isfinite(value) else None
 
 
-def _has_reached(
+def has_reached(
     target: float | None, main: Measure, performance: Mapping[str, float | None]
 ) -> bool:
     """Whether the main measure is as good as the target."""

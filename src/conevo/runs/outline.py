@@ -15,10 +15,11 @@ from typing import Any
 from conevo.errors import UsageError
 from conevo.reading import DamagedFile, parse_toml
 
-__all__ = ["Outline", "digest_of", "identify", "outline_of", "read_outline"]
+__all__ = ["LENGTH", "Outline", "digest_of", "identify", "outline_of", "read_outline"]
 
 Tables = Mapping[str, Mapping[str, Any]]
 NAMES = ("world", "method", "preset")
+LENGTH = ("generations", "budget_evaluations", "target")  # the keys of [run] that end a run
 NUMBERS = {"seed": 0, "generations": 1, "budget_evaluations": 0}  # name -> smallest
 
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from conevo.errors import UsageError
 from conevo.runs import provenance
@@ -14,6 +15,7 @@ from conevo.runs.code import last_code, refuse_other_code
 from conevo.runs.directory import refuse_existing
 from conevo.runs.outline import Outline
 from conevo.runs.store import Store, create
+from conevo.runs.time_limit import TimeLimit
 
 # A run is looked at more often than it is carried on: what simulates it is loaded where it is used.
 if TYPE_CHECKING:
@@ -101,6 +103,7 @@ def start(
     first = lab.first_state(ancestor)
     about = {
         "run_id": config.run_id,
+        "stem_id": config.stem_id,
         "preset": config.preset,
         "changed": list(config.changed),
         "command": command,
@@ -270,6 +273,10 @@ class Run:
     def resume(
         self,
         *,
+        generations: int | None = None,
+        budget_evaluations: int | None = None,
+        target: float | Literal["none"] | None = None,
+        time_limit: float | TimeLimit | None = None,
         threads: int | None = None,
         watch: Watch | None = None,
         remark: Callable[[str], None] | None = None,
@@ -277,29 +284,118 @@ class Run:
     ) -> Run:
         """Carry the run on from its last checkpoint to its end: the same bits as without a break.
 
+        With another length (see ``extend``) a finished run is continued, too.
+
         Args:
+            generations, budget_evaluations, target: another length, if any of them is given.
+            time_limit: seconds after which it stops at a checkpoint; its status is then
+                "interrupted", and resuming it again carries it on.
             threads: CPU threads, all by default.
             watch: called with the run and the record of each finished generation.
             remark: told about a checkpoint that could not be used.
             accept_other_code: go on although another conevo made the run so far; it is recorded.
 
         Raises:
-            UsageError: finished, in use, made by other code or with other kernels, or no usable
-                checkpoint.
+            UsageError: finished (without another length), in use, made by other code or with other
+                kernels, no usable checkpoint, or a length that is less than what is done.
             EnvironmentFailure: the machine refused; the run can be resumed when it no longer does.
         """
+        from conevo.runs.session import evolve_on, finish
+
+        limit = time_limit if isinstance(time_limit, TimeLimit) else TimeLimit(time_limit)
+        if any(given is not None for given in (generations, budget_evaluations, target)):
+            self.extend(
+                generations,
+                budget_evaluations,
+                target,
+                threads=threads,
+                accept_other_code=accept_other_code,
+            )
         self.refuse_finished()
         if not accept_other_code:
             self.refuse_other_code()
-        with self._store.locked():
+        with self._open():
             self.refuse_finished()
             lab = self._equip(threads)
-            stopped_by = self._evolve(lab, watch, remark)
-            self._conclude(lab)
-            about = self.provenance | {"finished": provenance.now(), "stopped_by": stopped_by}
-            self._store.write_provenance(about)
-            self._store.seal()
+            stopped_by = evolve_on(
+                self._store,
+                lab,
+                limit,
+                watch=lambda record: watch(self, record) if watch is not None else None,
+                remark=remark,
+            )
+            if stopped_by != "time":
+                finish(self._store, lab, stopped_by)
         return self
+
+    def extend(
+        self,
+        generations: int | None = None,
+        budget_evaluations: int | None = None,
+        target: float | Literal["none"] | None = None,
+        *,
+        threads: int | None = None,
+        accept_other_code: bool = False,
+    ) -> Run:
+        """Give the run another length, finished or not; ``resume`` then carries it on.
+
+        The result equals, bit for bit, that of a run which was planned that long, ``config.toml``
+        and the run's id included. The former end is kept in the provenance.
+
+        Args:
+            generations: the run now ends after this many.
+            budget_evaluations: it now spends at most so many team evaluations; 0 is no limit.
+            target: it now ends at this main task performance; "none" takes the target away.
+            threads: CPU threads, all by default.
+            accept_other_code: as for ``resume``.
+
+        Raises:
+            UsageError: less than what is done; of a finished run no more than it has, or it was
+                changed since; part of a shaping or campaign, in use, or made by other code.
+            EnvironmentFailure: the machine refused.
+        """
+        from conevo.runs.length import length_of, refuse_parts
+
+        length = length_of(generations, budget_evaluations, target)
+        refuse_parts(self.path, length)
+        if not accept_other_code:
+            self.refuse_other_code()
+        with self._open():
+            self._extend(self.config.of_length(length), threads, is_later=True)
+        return self
+
+    def extend_as(self, config: RunConfig, *, threads: int | None = None) -> Run:
+        """Give the run the length that another configuration has; ``resume`` carries it on.
+
+        It may be one at which the run ends where it has ended.
+
+        Args:
+            config: the run's own but for its length.
+            threads: CPU threads, all by default.
+
+        Raises:
+            UsageError: as ``extend``, or the configuration is of another run.
+            EnvironmentFailure: the machine refused.
+        """
+        self.refuse_other_code()
+        with self._open():
+            self._extend(config, threads)
+        return self
+
+    def _extend(self, config: RunConfig, threads: int | None, is_later: bool = False) -> None:
+        """Give the run the length that a configuration has; see ``give_length``."""
+        from conevo.runs.length import give_length
+
+        lab = give_length(self._store, config, lambda: self._equip(threads), is_later)
+        self.outline, self.config, self._lab = config.outline, config, lab
+
+    @contextmanager
+    def _open(self) -> Iterator[None]:
+        """Keep other processes out, and read again what they may have changed."""
+        with self._store.locked():
+            self._store.settle()
+            self.outline, self.config = self._store.read_outline(), self._store.read_config()
+            yield
 
     def test(
         self,
@@ -345,38 +441,13 @@ class Run:
             seed=self.config.run.seed if seed is None else seed,
         )
 
-    def _conclude(self, lab: Lab) -> None:
-        """Choose the champion among the finalists, and test it."""
-        from conevo.runs.testing import validate
-
-        store, settings = self._store, self.config.run
-        champion, validation = validate(
-            lab.rollout,
-            lab.world,
-            self._best_so_far(),
-            n_scenarios=settings.n_validations,
-            seed=settings.seed,
-            credit=settings.credit,
-            selected={one["generation"]: one["performance"] for one in store.read_generations()},
-        )
-        store.save_champion(champion)
-        tested = {"champion": champion, "generation_0": store.load_team(0) or champion}
-        result = {name: self._test(lab, team) for name, team in tested.items()}
-        store.write_test(result | {"validation": validation})
-
-    def _best_so_far(self) -> list[Team]:
-        """Return the finalists of a run that has at least one generation."""
-        teams = self._store.load_finalists()
-        if not teams:
-            raise UsageError(f"{self.path} has lost its finalists.npz: it cannot be resumed")
-        return teams
-
     def refuse_finished(self) -> None:
         """Raise UsageError if there is nothing left to do."""
         if self._store.is_finished:
             raise UsageError(
-                f"{self.path} is finished; see it with 'conevo show {self.path}', or start another "
-                f"run with another --seed or --out"
+                f"{self.path} is finished; continue it with 'conevo resume {self.path} "
+                f"--generations N', N above {self.n_generations}, or see it with "
+                f"'conevo show {self.path}'"
             )
 
     def refuse_other_code(self) -> None:
@@ -398,66 +469,6 @@ class Run:
                 f"{about['warp']}, or start another run with --config {self.path}/config.toml"
             )
         return lab
-
-    def _evolve(self, lab: Lab, watch: Watch | None, remark: Callable[[str], None] | None) -> str:
-        from conevo.runs.champions import finalists, fittest_team, sampled_generations
-        from conevo.runs.loop import evolve_generations
-        from conevo.worlds.measures import measures_of
-
-        store, settings, method = self._store, self.config.run, self.config.method
-        state, problem = store.load_checkpoint(method)
-        if state is None:
-            state = store.load_origin(method) or lab.first_state()
-        if problem and remark is not None:
-            remark(f"{problem}; going on from generation {state.generation} instead")
-        records = store.cut_generations(state.generation)
-        champion, best = self.champion, self._best_so_far() if records else []
-        best = [team for team in best if team.generation < state.generation]  # others come again
-        kept = sampled_generations(settings.generations)
-        newest = saved = state
-        about = self.provenance
-        session = {
-            "started": provenance.now(),
-            "from_generation": state.generation,
-            "threads": lab.rollout.n_threads,
-            **provenance.describe_machine(about["device"]),
-        }
-        store.write_provenance(about | {"sessions": [*about["sessions"], session]})
-
-        def keep(state: State, record: Record) -> None:
-            nonlocal champion, best, newest, saved
-            team = fittest_team(state, record["generation"])
-            best = finalists(best, team, settings.n_finalists)
-            if any(one is team for one in best):
-                store.save_finalists(best)
-            if champion is None or champion.generation != best[0].generation:
-                champion = best[0]
-                store.save_champion(champion)
-            if team.generation in kept:
-                store.save_team(team)
-            store.append(record)
-            newest = state
-            if state.generation % settings.checkpoint_every == 0:
-                store.save_checkpoint(state, method)
-                saved = state
-            if watch is not None:
-                watch(self, record)
-
-        try:
-            return evolve_generations(
-                lab.method,
-                state,
-                lab.evaluate,
-                settings=settings,
-                main=measures_of(lab.world)[0],
-                castes=lab.world.castes,
-                iterations=lab.world.params.iterations,
-                last=records[-1] if records else None,
-                on_generation=keep,
-            )
-        finally:
-            if newest is not saved:
-                store.save_checkpoint(newest, method)
 
 
 def _print_line(run: Run, record: Record) -> None:

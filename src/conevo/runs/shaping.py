@@ -32,6 +32,7 @@ from conevo.runs.durable import replace_file
 from conevo.runs.evolved_prey import PREY, PREY_TASKS, save_prey
 from conevo.runs.outline import Outline, identify, outline_of
 from conevo.runs.run import RUNS, Record, Run, Watch, start
+from conevo.runs.time_limit import TimeLimit
 
 if TYPE_CHECKING:
     from conevo.evolution.protocol import State
@@ -263,6 +264,7 @@ class Shaping:
     def resume(
         self,
         *,
+        time_limit: float | TimeLimit | None = None,
         threads: int | None = None,
         watch: Watch | None = None,
         remark: Callable[[str], None] | None = None,
@@ -270,7 +272,12 @@ class Shaping:
     ) -> Shaping:
         """Carry the shaping on to the end of its last stage: the same bits as without a break.
 
+        Choice: stages keep their length. A shaping that was planned longer has longer first
+        stages, so that all that follows would be another; what a last stage may go on with is a
+        run of its own that begins with its populations.
+
         Args:
+            time_limit: seconds after which it stops at a checkpoint, as ``Run.resume``.
             threads: CPU threads, all by default.
             watch: called with the stage and the record of each finished generation.
             remark: told about a checkpoint that could not be used.
@@ -280,9 +287,11 @@ class Shaping:
             UsageError: finished, in use, made by other code, or a stage cannot be resumed.
             EnvironmentFailure: the machine refused; resume when it no longer does.
         """
+        limit = time_limit if isinstance(time_limit, TimeLimit) else TimeLimit(time_limit)
 
         def carry(run: Run, _: int) -> None:
             run.resume(
+                time_limit=limit,
                 threads=threads,
                 watch=watch,
                 remark=remark,
@@ -300,7 +309,8 @@ class Shaping:
         """Begin one stage after the other; ``carry`` resumes each to its end.
 
         Args:
-            carry: called with a stage that is not finished and its number, from 1.
+            carry: called with a stage that is not finished and its number, from 1. If the stage is
+                not finished after that, the shaping stops there.
             threads: CPU threads, all by default.
             accept_other_code: begin a stage although another conevo made those before.
 
@@ -316,6 +326,8 @@ class Shaping:
                 run = self._stage(number, threads)
                 if run.status != "finished":
                     carry(run, number)
+                if run.status != "finished":
+                    return self
                 self._write_generations()
             if tuple(self.tasks) == PREY_TASKS:
                 save_prey(self.stages, self.path / PREY)

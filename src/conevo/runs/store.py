@@ -2,7 +2,7 @@
 
 ::
 
-    config.toml                 the resolved configuration; never changes
+    config.toml                 the resolved configuration; changes only with the run's length
     inputs/                     copies of the files that it names: a world's, and its prey
     provenance.json             versions, kernel hash, machine, sessions; replaced whole
     origin.npz                  the first state, if the run begins with the populations of another
@@ -13,18 +13,23 @@
     checkpoint-a.npz, -b.npz    the method's state, written in turn
     test.json                   the testing phase
     DONE                        the seal of a finished run: digests of all files
+    extension.json              only while a run is given another length: what is to change
     lock                        held (flock) by the process that is at work here
 
 Within a generation teams are written first, then the log line, then the checkpoint. What is newer
 than the checkpoint is written again, to the bit, when the run is resumed. A directory appears under
 its name only when the files down to ``generations.jsonl`` are in it.
+
+A run is given another length in one step: ``extension.json`` is written, and where there is a
+``DONE`` it counts from the moment that is removed. What it says is then written into
+``config.toml`` and ``provenance.json``, by the same process or by the next one that has the lock.
 """
 
 from __future__ import annotations
 
 import json
 import os
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -42,7 +47,7 @@ from conevo.reading import (
 from conevo.runs import checkpoint
 from conevo.runs.directory import CONFIG, Directory, appearing, as_json
 from conevo.runs.durable import append_line, replace_file, writing
-from conevo.runs.outline import Outline, digest_of, read_outline
+from conevo.runs.outline import LENGTH, Outline, digest_of, read_outline
 
 if TYPE_CHECKING:
     from conevo.evolution.protocol import State
@@ -54,6 +59,7 @@ __all__ = ["Store", "create"]
 Record = dict[str, Any]
 PROVENANCE, GENERATIONS, TEST = "provenance.json", "generations.jsonl", "test.json"
 CHAMPION, FINALISTS, ORIGIN = "champion.npz", "finalists.npz", "origin.npz"
+EXTENSION = "extension.json"
 CHECKPOINTS = ("checkpoint-a.npz", "checkpoint-b.npz")
 
 
@@ -106,8 +112,10 @@ class Store(Directory):
         Raises:
             UsageError: the configuration is not the one the run was started with.
         """
-        path = self.path / CONFIG
-        return read_outline(read_bytes(path, MOST_TOML), self.read_provenance(), str(path))
+        content = read_bytes(self.path / CONFIG, MOST_TOML)
+        if extension := self._read_extension():
+            content = extension["config"].encode()
+        return read_outline(content, self.read_provenance(), str(self.path / CONFIG))
 
     def read_tables(self) -> dict[str, Any]:
         """Return the tables of the configuration as they are written."""
@@ -122,15 +130,60 @@ class Store(Directory):
         from conevo.runs.config import resolve
 
         self.read_outline()
-        return resolve(file=self.path / CONFIG)
+        config, extension = resolve(file=self.path / CONFIG), self._read_extension()
+        return config.of_length(extension["length"]) if extension else config
 
     def read_provenance(self) -> Record:
         """Return versions, machine and sessions."""
-        return read_json(self.path / PROVENANCE)
+        about, extension = read_json(self.path / PROVENANCE), self._read_extension()
+        if extension is None or about.get("run_id") == extension["run_id"]:
+            return about
+        kept = {k: v for k, v in about.items() if k not in ("finished", "stopped_by")}
+        return kept | {
+            "run_id": extension["run_id"],
+            "changed": extension["changed"],
+            "config_digest": digest_of(extension["config"].encode()),
+            "extended": [*about.get("extended", []), extension["former"]],
+        }
 
     def write_provenance(self, provenance: Record) -> None:
         """Replace the provenance."""
         replace_file(self.path / PROVENANCE, as_json(provenance))
+
+    # --- another length ---------------------------------------------------------------------------
+
+    def extend(self, config: RunConfig, former: Record, at: str) -> None:
+        """Give the run another length; a finished one is unsealed.
+
+        Args:
+            config: the run's own but for its length.
+            former: the end that it had.
+            at: the time.
+        """
+        extension = {
+            "run_id": config.run_id,
+            "length": {name: getattr(config.run, name) for name in LENGTH},
+            "config": config.to_toml(self.path),
+            "changed": list(config.changed),
+            "former": {"at": at} | former,
+        }
+        replace_file(self.path / EXTENSION, as_json(extension))
+        self.unseal()
+        self.settle()
+
+    def settle(self) -> None:
+        """Carry out what an interrupted ``extend`` left to do, or remove what it never began."""
+        if extension := self._read_extension():
+            about = self.read_provenance()
+            replace_file(self.path / CONFIG, extension["config"].encode())
+            self.write_provenance(about)
+        with writing(self.path / EXTENSION):
+            (self.path / EXTENSION).unlink(missing_ok=True)
+
+    def _read_extension(self) -> Record | None:
+        """Return the extension that counts but is not in all files yet, None if there is none."""
+        path = self.path / EXTENSION
+        return read_json(path) if path.is_file() and not self.is_finished else None
 
     # --- generations ------------------------------------------------------------------------------
 
@@ -212,6 +265,13 @@ class Store(Directory):
         with writing(path):
             path.parent.mkdir(exist_ok=True)
         checkpoint.save(path, team, self._identity())
+
+    def thin_teams(self, generations: Collection[int]) -> None:
+        """Remove the kept teams of all but these generations."""
+        kept = {self._team_path(generation) for generation in generations}
+        for path in set((self.path / "teams").glob("generation-*.npz")) - kept:
+            with writing(path):
+                path.unlink()
 
     def load_champion(self) -> Team | None:
         """Return the run's champion, None before the first generation's end."""
@@ -315,7 +375,9 @@ class Store(Directory):
 
 def _identity(provenance: Record) -> dict[str, str]:
     """Return what a run's files say they belong to."""
-    identity = {"run_id": provenance["run_id"]}
+    # Runs that differ in length alone share their files; conevo 0.1.0 did not know that.
+    key = "stem_id" if "stem_id" in provenance else "run_id"
+    identity = {key: provenance[key]}
     if "origin" in provenance:  # the same settings on other populations are another run
         identity["origin"] = provenance["origin"]["checkpoint"]
     return identity

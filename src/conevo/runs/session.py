@@ -1,0 +1,135 @@
+"""A session of a run: from its last checkpoint on, as far as its end or the time allows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from conevo.errors import UsageError
+from conevo.evolution.protocol import State
+from conevo.runs import provenance
+from conevo.runs.champions import Team, finalists, fittest_team, sampled_generations
+from conevo.runs.lab import Lab
+from conevo.runs.loop import evolve_generations
+from conevo.runs.store import Store
+from conevo.runs.testing import test_team, validate
+from conevo.runs.time_limit import TimeLimit
+from conevo.worlds.measures import measures_of
+
+__all__ = ["evolve_on", "finish"]
+
+Record = dict[str, Any]
+
+
+def evolve_on(
+    store: Store,
+    lab: Lab,
+    limit: TimeLimit,
+    *,
+    watch: Callable[[Record], object],
+    remark: Callable[[str], None] | None,
+) -> str:
+    """Evolve one generation after another, keep each, and return why it stopped.
+
+    Args:
+        store: of the run, which this process has locked.
+        lab: the run's.
+        limit: the time that is left.
+        watch: called with the record of each finished generation.
+        remark: told about a checkpoint that could not be used.
+
+    Returns:
+        "generations", "target" or "budget": the end. "time": not yet, but there is no time left.
+
+    Raises:
+        UsageError: a file that is needed is lost or damaged.
+        EnvironmentFailure: the machine refused.
+    """
+    settings, method = lab.config.run, lab.config.method
+    state, problem = store.load_checkpoint(method)
+    if state is None:
+        state = store.load_origin(method) or lab.first_state()
+    if problem and remark is not None:
+        remark(f"{problem}; going on from generation {state.generation} instead")
+    records = store.cut_generations(state.generation)
+    champion, best = store.load_champion(), _best_so_far(store) if records else []
+    best = [team for team in best if team.generation < state.generation]  # others come again
+    newest = saved = state
+    seconds: list[float] = []  # of the generations of this session
+    about = store.read_provenance()
+    session = {
+        "started": provenance.now(),
+        "from_generation": state.generation,
+        "threads": lab.rollout.n_threads,
+        **provenance.describe_machine(about["device"]),
+    }
+    store.write_provenance(about | {"sessions": [*about["sessions"], session]})
+
+    def keep(state: State, record: Record) -> None:
+        nonlocal champion, best, newest, saved
+        team = fittest_team(state, record["generation"])
+        best = finalists(best, team, settings.n_finalists)
+        if any(one is team for one in best):
+            store.save_finalists(best)
+        if champion is None or champion.generation != best[0].generation:
+            champion = best[0]
+            store.save_champion(champion)
+        if team.generation in sampled_generations(state.generation):
+            store.save_team(team)
+        store.append(record)
+        newest = state
+        seconds.append(record["seconds"])
+        if state.generation % settings.checkpoint_every == 0:
+            store.save_checkpoint(state, method)
+            saved = state
+        watch(record)
+
+    try:
+        return evolve_generations(
+            lab.method,
+            state,
+            lab.evaluate,
+            settings=settings,
+            main=measures_of(lab.world)[0],
+            castes=lab.world.castes,
+            iterations=lab.world.params.iterations,
+            last=records[-1] if records else None,
+            on_generation=keep,
+            has_time=lambda: not seconds or limit.has_time(max(seconds)),
+        )
+    finally:
+        if newest is not saved:
+            store.save_checkpoint(newest, method)
+
+
+def finish(store: Store, lab: Lab, stopped_by: str) -> None:
+    """Choose the champion among the finalists, test it, and seal the run."""
+    settings, records = lab.config.run, store.read_generations()
+    champion, validation = validate(
+        lab.rollout,
+        lab.world,
+        _best_so_far(store),
+        n_scenarios=settings.n_validations,
+        seed=settings.seed,
+        credit=settings.credit,
+        selected={one["generation"]: one["performance"] for one in records},
+    )
+    store.save_champion(champion)
+    tested = {"champion": champion, "generation_0": store.load_team(0) or champion}
+    scenarios = {"n_scenarios": settings.n_tests, "seed": settings.seed}
+    result = {
+        name: test_team(lab.rollout, lab.world, team, **scenarios) for name, team in tested.items()
+    }
+    store.write_test(result | {"validation": validation})
+    store.thin_teams(sampled_generations(len(records)))
+    about = store.read_provenance() | {"finished": provenance.now(), "stopped_by": stopped_by}
+    store.write_provenance(about)
+    store.seal()
+
+
+def _best_so_far(store: Store) -> list[Team]:
+    """Return the finalists of a run that has at least one generation."""
+    teams = store.load_finalists()
+    if not teams:
+        raise UsageError(f"{store.path} has lost its finalists.npz: it cannot be resumed")
+    return teams
