@@ -1,7 +1,9 @@
+import json
 import time
 
 import pytest
 
+from conevo.campaigns.campaign import Campaign
 from conevo.replay.live.watched import Watched
 from conevo.replay.stages import rover
 from replay.followed import append, at_work, record, write_campaign, write_run
@@ -105,15 +107,18 @@ def test_methods_are_compared_by_medians_over_team_evaluations(tmp_path):
     curves = panel["over"]["evaluations"]
     assert (curves["x"][0], curves["x"][-1], len(curves["x"])) == (0.0, 400.0, 300)
     assert [line["label"] for line in curves["lines"]] == ["a", "b", "c", "d"]  # none of "e"
-    median = {one["series"]: one["performance"] for one in curves["medians"]}["mesp"]
+    mesp = {one["series"]: one for one in curves["medians"]}["mesp"]
+    median, of = mesp["performance"], mesp["performance_runs"]
     at = {x: next(k for k, g in enumerate(curves["x"]) if g >= x) for x in (100, 200, 300)}
     assert curves["lines"][0]["performance"][at[300]] == 9.0
     assert curves["lines"][1]["performance"][at[200] : at[200] + 2] == [6.0, None]
     assert median[at[100] - 1] is None  # nothing has ended there
     assert [median[at[x]] for x in (100, 200)] == [3.0, 6.0]
-    # b has not got that far; c is finished and keeps its last value: the median of 7 and 9
-    assert median[at[300]] == 8.0
-    assert median[-1] is None  # of three runs only one is still there
+    # b has not got that far and c has ended, and is not drawn as if it had gone on
+    assert curves["lines"][2]["performance"][at[300]] is None
+    assert median[at[300]] is None
+    assert [of[at[x]] for x in (100, 200, 300)] == [3, 3, 1]
+    assert median[-1] is None
     row = next(row for row in panel["rows"] if row["series"] == "mesp")
     assert (row["of"], row["status"]) == (4, {"interrupted": 2, "finished": 1, "unreadable": 1})
     assert (row["performance"], row["lowest"], row["highest"]) == (7.0, 6.0, 9.0)
@@ -147,3 +152,59 @@ def test_colours_of_methods_and_castes_do_not_depend_on_what_is_there(tmp_path):
         state["methods"]["cone"]
         == Watched([write_run(tmp_path / "b")]).snapshot()["methods"]["cone"]
     )
+
+
+DAMAGE = {
+    "nested": b"[" * 100_000 + b"\n",
+    "nested toml": b"a = " + b"[" * 100_000 + b"\n",
+    "nested deeper": b'{"a":' * 100_000 + b"\n",
+    "null": b"null\n",
+    "list": b"[1, 2]\n",
+    "wrong keys": b'{"labl": 3}\n',
+    "utf-16": "{}\n".encode("utf-16"),
+    "random": bytes(range(256)) * 50,
+    "empty": b"",
+    "huge number": b'{"generation": ' + b"9" * 5000 + b"}\n",
+}
+
+
+@pytest.mark.parametrize("content", DAMAGE.values(), ids=DAMAGE)
+@pytest.mark.parametrize("name", ["runs.jsonl", "plan.toml", "ledger.sqlite"])
+def test_a_damaged_campaign_is_named_and_all_others_are_shown(campaign, name, content):
+    folder = campaign.path.parent
+    write_run(folder / "run")
+    write_campaign(folder / "other")
+    (campaign.path / name).write_bytes(content)
+    state = Watched(folders=[folder]).snapshot()
+    json.dumps(state, allow_nan=False)
+    problems = {group["name"]: group["problem"] for group in state["groups"]}
+    assert problems.pop(campaign.path.name) or (name, content) == ("ledger.sqlite", b"")
+    assert set(problems.values()) == {""}
+    labels = {run["label"] for run in state["runs"]}
+    assert {"run", "other/rover-v1-complex-1-mesp-s2"} <= labels
+
+
+@pytest.mark.parametrize("content", DAMAGE.values(), ids=DAMAGE)
+@pytest.mark.parametrize("name", ["config.toml", "generations.jsonl"])
+def test_a_damaged_run_is_named_and_all_others_are_shown(tmp_path, name, content):
+    write_run(tmp_path / "good")
+    write_run(tmp_path / "bad")
+    (tmp_path / "bad" / name).write_bytes(content)
+    state = Watched(folders=[tmp_path]).snapshot()
+    json.dumps(state, allow_nan=False)
+    problems = {run["label"]: run["problem"] for run in state["runs"]}
+    assert problems["good"] == ""
+    assert problems["bad"] or (name, content) == ("generations.jsonl", b"")
+
+
+def test_whatever_goes_wrong_in_one_place_all_others_are_shown(campaign, monkeypatch):
+    write_run(campaign.path.parent / "run")
+    watched = Watched([campaign.path, campaign.path.parent / "run"])
+    monkeypatch.setattr(Campaign, "standings", lambda self: 1 / 0)
+    state = watched.snapshot()
+    problems = {group["kind"]: group["problem"] for group in state["groups"]}
+    assert problems == {"runs": "", "campaign": "is damaged: ZeroDivisionError('division by zero')"}
+    monkeypatch.setattr("conevo.replay.live.groups.panels_of", lambda *_: 1 / 0)
+    watched = Watched([campaign.path, campaign.path.parent / "run"])
+    for group in watched.snapshot()["groups"]:
+        assert group["problem"].startswith("cannot be shown: ZeroDivisionError")

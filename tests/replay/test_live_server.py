@@ -1,3 +1,4 @@
+import contextlib
 import hashlib
 import http.client
 import json
@@ -264,6 +265,73 @@ def test_clients_that_go_or_wait_do_not_stop_others(server, capfd):
     assert time.monotonic() - began < 2
     slow.close()
     time.sleep(0.1)
+    assert capfd.readouterr() == ("", "")
+
+
+def threads_of(server):
+    return [t for t in threading.enumerate() if "process_request_thread" in t.name]
+
+
+def test_a_client_that_asks_letter_by_letter_is_not_waited_for(server, monkeypatch, capfd):
+    monkeypatch.setattr("conevo.replay.live.server.ASKING", 0.3)
+    before = len(threads_of(server))
+    began = time.monotonic()
+    with (
+        socket.create_connection(("127.0.0.1", server.port), timeout=10) as slow,
+        contextlib.suppress(OSError),
+    ):
+        for letter in b"GET /state.json HTTP/1.1\r\nX: " + b"x" * 1000:
+            slow.sendall(bytes([letter]))
+            time.sleep(0.02)
+    assert 0.25 < time.monotonic() - began < 5
+    until = time.monotonic() + 5
+    while len(threads_of(server)) > before:
+        assert time.monotonic() < until
+        time.sleep(0.01)
+    assert server._deadlines == {}
+    assert ask(server, "/state.json")[0] == 200
+    assert capfd.readouterr() == ("", "")
+
+
+def test_a_client_that_does_not_take_its_answer_is_not_waited_for(folder, monkeypatch, capfd):
+    monkeypatch.setattr("conevo.replay.live.server.SENDING", 0.2)
+    monkeypatch.setattr("conevo.replay.live.server.SLOWEST", 1e9)
+    with serving(folder, lambda label: "x" * 50_000_000) as server:
+        before = len(threads_of(server))
+        with socket.create_connection(("127.0.0.1", server.port), timeout=10) as slow:
+            host = f"Host: 127.0.0.1:{server.port}\r\n\r\n"
+            slow.sendall(f"GET /replay/run HTTP/1.1\r\n{host}".encode())
+            time.sleep(0.1)
+            assert len(server._deadlines) == 1
+            until = time.monotonic() + 5
+            while server._deadlines or len(threads_of(server)) > before:
+                assert time.monotonic() < until
+                time.sleep(0.01)
+        assert ask(server, "/state.json")[0] == 200
+    assert capfd.readouterr() == ("", "")
+
+
+def test_making_a_replay_may_take_longer_than_asking_for_it(folder, monkeypatch):
+    monkeypatch.setattr("conevo.replay.live.server.ASKING", 0.1)
+    monkeypatch.setattr("conevo.replay.live.server.SENDING", 0.1)
+    with serving(folder, lambda label: time.sleep(0.5) or label) as server:
+        assert ask(server, "/replay/run")[::2] == (200, "run")
+
+
+def test_there_are_only_so_many_connections(server, monkeypatch, capfd):
+    monkeypatch.setattr("conevo.replay.live.server.MOST", 3)
+    held = [socket.create_connection(("127.0.0.1", server.port), timeout=10) for _ in range(3)]
+    until = time.monotonic() + 5
+    while len(server._deadlines) < 3:
+        assert time.monotonic() < until
+    with socket.create_connection(("127.0.0.1", server.port), timeout=10) as one_more:
+        assert one_more.recv(10) == b""
+    for connection in held:
+        connection.close()
+    until = time.monotonic() + 5
+    while server._deadlines:
+        assert time.monotonic() < until
+    assert ask(server, "/state.json")[0] == 200
     assert capfd.readouterr() == ("", "")
 
 

@@ -126,7 +126,7 @@ function groupLine(group: Group, n: number): HTMLElement {
     bar.append(part);
   }
   const eta = group.ends_at === null ? "" : `, ${left(group.ends_at)}`;
-  const working = group.kind === "campaign" && !group.running ? " (no coordinator at work)" : "";
+  const working = group.kind === "campaign" && !group.running ? " (no coordinator is running)" : "";
   const unfinished = (group.counts.finished ?? 0) < size ? working : "";
   const line = make("div", { class: "group" });
   if (n > 1 || group.title !== group.name) line.append(make("b", { title: group.path }, group.title));
@@ -158,7 +158,11 @@ function makeChoices(): void {
     ["generation", "over generations"],
   ]);
   page.choices.append(
-    make("span", { class: "faint" }, "Thick: median of a method's runs. Thin: each run; point at one for its name, click for its details."),
+    make(
+      "span",
+      { class: "faint" },
+      "Thick: median of the runs with the same method and settings, as far as at least half of those that have begun have got. Thin: each run; point at one for its name, click for its details.",
+    ),
   );
 }
 
@@ -169,7 +173,7 @@ async function follow(): Promise<void> {
     page.problem.hidden = true;
   } catch (error) {
     const text = error instanceof Error ? error.message : String(error);
-    say(page.problem, `The server cannot be reached (${text}). Is conevo watch still at work? Trying again.`);
+    say(page.problem, `The server cannot be reached (${text}). Is conevo watch still running? Trying again.`);
     page.problem.hidden = false;
   }
   if (state) document.body.dataset.ready = "yes";

@@ -22,6 +22,7 @@ export class PanelView {
   private readonly head = make("tr");
   private labels: string[] = []; // of the runs behind the chart's lines
   private names: string[] = []; // of all lines
+  private of: number[][] = []; // of how many runs the medians are, behind the lines of the runs
   private focus = -1;
 
   constructor(show: (label: string) => void) {
@@ -80,6 +81,7 @@ export class PanelView {
     this.labels = curves.lines.map((line) => line.label);
     const title = (series: string): string => (panel.by === "method" ? methodTitle(state, series) : series);
     this.names = [...this.labels, ...medians.map((one) => `median of ${title(one.series)}`)];
+    this.of = medians.map((one) => one[`${quantity}_runs`]);
     const colours = [...curves.lines, ...medians].map((one) => colourOf(state, panel, one.series));
     const isThin = (k: number): boolean => k < curves.lines.length && medians.length > 0;
     const many = Math.sqrt(Math.min(1, 30 / curves.lines.length)); // the more lines, the fainter
@@ -126,6 +128,8 @@ export class PanelView {
     }
     const value = plot.data[this.focus]?.[index];
     const x = plot.data[0][index] ?? 0;
-    say(this.hint, `${name}: ${number(value)} at ${count(x)} ${xLabel}`);
+    const of = this.of[this.focus - 1 - this.labels.length]?.[index];
+    const runs = of === undefined ? "" : ` (of ${of} ${of === 1 ? "run" : "runs"})`;
+    say(this.hint, `${name}${runs}: ${number(value)} at ${count(x)} ${xLabel}`);
   }
 }

@@ -62,7 +62,13 @@ export type Quantity = "performance" | "fitness";
 export interface Curves {
   x: number[];
   lines: { label: string; series: string; performance: Values; fitness: Values }[];
-  medians: { series: string; performance: Values; fitness: Values }[];
+  medians: {
+    series: string;
+    performance: Values;
+    fitness: Values;
+    performance_runs: number[]; // of how many runs each median is
+    fitness_runs: number[];
+  }[];
 }
 
 export interface Panel {

@@ -62,6 +62,7 @@ class Group:
             "name": readable(name),
         }
         self._about["title"] = self._about["name"]
+        self._failure = ""
         self.subjects: list[Subject] = []
         self.panels: list[Panel] = []
         self._places: Hashable = ()
@@ -70,7 +71,17 @@ class Group:
     def about(self) -> dict[str, Any]:
         """What is said of the group."""
         counts = Counter(one.summary["status"] for one in self.subjects)
-        return self._about | {"counts": dict(counts)} | self._prospects(counts)
+        found = self._about | {"counts": dict(counts)} | self._prospects(counts)
+        return found | {"problem": self._failure or found["problem"]}
+
+    def look_safely(self, go_on: GoOn) -> None:
+        """Read what has changed; whatever goes wrong is this group's, and others are shown."""
+        try:
+            self.look(go_on)
+            self._failure = ""
+        except Exception as error:
+            line = " ".join(str(error).split())[:200]
+            self._failure = readable(f"cannot be shown: {type(error).__name__}: {line}")
 
     def look(self, go_on: GoOn) -> None:
         """Read what has changed."""
@@ -82,7 +93,7 @@ class Group:
     def _arrange(self) -> None:
         """Make the panels anew if there are other runs, or more is known of them."""
         places = tuple(
-            (one.label, *(one.summary[name] for name in PLACES)) for one in self.subjects
+            (one.label, one.apart, *(one.summary[name] for name in PLACES)) for one in self.subjects
         )
         if places != self._places:
             self._places = places
@@ -147,6 +158,8 @@ class Experiment(Group):
             self._problem = ""
         except ConevoError as error:
             self._problem = readable(str(error))
+        except Exception as error:  # whatever the files hold: all others are shown
+            self._problem = readable(f"is damaged: {' '.join(repr(error).split())[:200]}")
         for label, one in self._by_label.items():
             entry = self._entries.get(label)
             one.look(Standing(entry.state, entry.reason) if entry else Standing("pending"), go_on)

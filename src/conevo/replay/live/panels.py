@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from conevo.replay.live.runs import Subject
+from conevo.replay.live.settings import comparisons, differences
 
 __all__ = ["Panel", "panels_of"]
 
@@ -97,33 +98,25 @@ class Panel:
             for k, one in enumerate(runs)
             if len(curves["fitness"][k][0])
         ]
-        found["medians"] = [
-            {"series": name}
-            | {
-                q: _plain(
-                    _median(
-                        [
-                            lines[q][k]
-                            if one.summary["status"] == "finished"
-                            else _until_end(lines[q][k], curves[q][k][0], grid)
-                            for k, one in enumerate(runs)
-                            if self._series[one] == name and len(curves[q][k][0])
-                        ],
-                        len(grid),
-                    )
-                )
-                for q in QUANTITIES
-            }
-            for name in dict.fromkeys(self._series.values())
-        ]
+        found["medians"] = []
+        for name in dict.fromkeys(self._series.values()):
+            found["medians"].append({"series": name})
+            for q in QUANTITIES:
+                mine = [
+                    _until_end(lines[q][k], curves[q][k][0], grid)
+                    for k, one in enumerate(runs)
+                    if self._series[one] == name and len(curves[q][k][0])
+                ]
+                values, n = _median(mine, len(grid))
+                found["medians"][-1] |= {q: _plain(values), f"{q}_runs": n.tolist()}
         return found
 
 
 def panels_of(subjects: Sequence[Subject], group: str) -> list[Panel]:
     """Return the panels of runs that belong together, an environment each.
 
-    Methods are compared, within a variant of the plan; the variants, where there is one method.
-    Runs of different presets are never compared.
+    Methods are compared where their settings are the same; the settings, where there is one
+    method. Runs of different presets are never compared.
     """
     by_task: dict[tuple[str, str], list[Subject]] = {}
     for one in subjects:
@@ -133,18 +126,19 @@ def panels_of(subjects: Sequence[Subject], group: str) -> list[Panel]:
     found = []
     for (task, preset), members in by_task.items():
         title = {"group": group, "task": task, "preset": preset}
-        if len({one.summary["method"] for one in members}) > 1:
-            by_variant: dict[str, dict[Subject, str]] = {}
-            for one in members:
-                about = one.summary
-                by_variant.setdefault(about["variant"], {})[one] = about["method"]
+        methods = [one.summary["method"] for one in members]
+        compared = comparisons(differences(methods, [one.apart for one in members]))
+        if len(set(methods)) > 1:
             found += [
-                Panel(title | {"variant": variant, "by": "method"}, series)
-                for variant, series in by_variant.items()
+                Panel(
+                    title | {"variant": variant, "by": "method"},
+                    {members[k]: methods[k] for k in some},
+                )
+                for variant, some in compared
             ]
         else:
-            series = {one: one.summary["variant"] or one.summary["method"] for one in members}
-            by = "variant" if any(one.summary["variant"] for one in members) else "method"
+            series = {members[k]: variant or methods[k] for variant, some in compared for k in some}
+            by = "variant" if any(variant for variant, _ in compared) else "method"
             found.append(Panel(title | {"variant": "", "by": by}, series))
     return found
 
@@ -162,20 +156,20 @@ def _until_end(values: Array, x: Array, grid: Array) -> Array:
     return np.where(np.arange(len(grid)) <= last, values, np.nan)
 
 
-def _median(rows: Sequence[Array], size: int) -> Array:
-    """Return the median of rows [n, G], where at least half of them have a value.
+def _median(rows: Sequence[Array], size: int) -> tuple[Array, npt.NDArray[np.int64]]:
+    """Return the median of rows [n, G] and of how many it is.
 
-    Choice: a finished run keeps its last value, so that runs that end by their budget at slightly
-    different evaluations do not drop out one by one.
+    It is that of the runs that have got so far, and there is none where these are fewer than half
+    of those that have begun: a run that has ended is not carried on as if it had not changed.
     """
     if not rows:
-        return np.full(size, np.nan)
+        return np.full(size, np.nan), np.zeros(size, np.int64)
     ordered = np.sort(np.stack(rows), axis=0)  # NaN last
     n = np.isfinite(ordered).sum(axis=0)
     columns = np.arange(size)
     low, high = np.maximum(n - 1, 0) // 2, n // 2
     middle = (ordered[low, columns] + ordered[np.minimum(high, len(rows) - 1), columns]) / 2
-    return np.where(2 * n >= len(rows), np.where(n > 0, middle, np.nan), np.nan)
+    return np.where((2 * n >= len(rows)) & (n > 0), middle, np.nan), n
 
 
 def _plain(values: Array) -> list[float | None]:

@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from conevo.errors import ConevoError, UsageError
 from conevo.replay.live.files import Log, Whole, is_locked, readable, stamp
+from conevo.replay.live.settings import Choices, choices_of, factors
 from conevo.runs.directory import CONFIG, LOCK, SEAL, SHAPING, kind_of
 
 __all__ = ["Settings", "Standing", "Subject", "plain"]
@@ -38,6 +39,7 @@ class Settings:
     seed: int
     generations: int
     budget: int
+    choices: Choices = ()
 
     @staticmethod
     def of(tables: Mapping[str, Any]) -> Settings:
@@ -56,10 +58,13 @@ class Settings:
         if not numbers[1]:
             raise TypeError("[run] a run has one generation at least")
         return Settings(
-            texts[0].rpartition("/")[2] if ".py:" in texts[0] else texts[0],
-            texts[1],
-            texts[2],
-            *numbers,
+            task=texts[0].rpartition("/")[2] if ".py:" in texts[0] else texts[0],
+            method=texts[1],
+            preset=texts[2],
+            seed=numbers[0],
+            generations=numbers[1],
+            budget=numbers[2],
+            choices=choices_of(tables),
         )
 
 
@@ -117,6 +122,8 @@ class Subject:
             self._problem = readable(str(error))
         except OSError as error:
             self._problem = f"cannot be read: {error.strerror}"
+        except Exception as error:  # whatever the files hold: all others are shown
+            self._problem = readable(f"is damaged: {' '.join(repr(error).split())[:200]}")
         self._problem = next((log.problem for log in self._logs if log.problem), self._problem)
         self.is_behind = any(log.is_behind for log in self._logs)
         self._status, self._reason = self._stand(standing)
@@ -244,6 +251,20 @@ class Subject:
             "share": round(self._share(), 4),
             "ends_at": ends_at,
         }
+
+    @property
+    def apart(self) -> Choices:
+        """The settings that set it apart from runs of the same names; of a plan only its factors.
+
+        A shaping has those of every stage.
+        """
+        if self._is_planned:
+            return tuple((f"plan.{k}", v) for k, v in factors(str(self._about["variant"])).items())
+        if self._kind == "run":
+            return self._settings[0].choices if self._settings else ()
+        stages = enumerate(self._settings, start=1)
+        found = [(f"stage-{n}.{key}", value) for n, one in stages for key, value in one.choices]
+        return (("shaping.stages", str(len(self._settings))), *found)
 
     @property
     def _n_generations(self) -> int:

@@ -10,10 +10,14 @@ from __future__ import annotations
 
 import errno
 import json
+import math
 import secrets
+import socket
 import sys
 import threading
+import time
 from collections.abc import Callable
+from contextlib import suppress
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from importlib import resources
@@ -27,7 +31,10 @@ __all__ = ["LiveServer", "serve"]
 
 HOST = "127.0.0.1"
 PATIENCE = 1.0  # seconds that a request for the state may take to read what is new
-IDLE = 60.0  # seconds after which a connection on which nothing comes or goes is closed
+ASKING = 60.0  # seconds from one answer to the end of the next request
+SENDING = 60.0  # seconds for an answer, and as many more as it takes at
+SLOWEST = 20_000  # bytes per second
+MOST = 100  # connections at once
 POLICY = (
     "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
     "connect-src 'self'; img-src data: blob:; "
@@ -94,6 +101,8 @@ class LiveServer(ThreadingHTTPServer):
         self.page = resources.files("conevo.replay").joinpath("pages/live.html").read_bytes()
         self.at_replay = threading.Lock()
         watched.snapshot(PATIENCE)  # so that labels are known
+        self._deadlines: dict[socket.socket, float] = {}
+        self._waiting = threading.Lock()
         self._session = secrets.token_hex(4)  # versions of another server mean something else
         self._encoding = threading.Lock()
         self._encoded: tuple[int, bytes] = (0, b"")
@@ -107,6 +116,36 @@ class LiveServer(ThreadingHTTPServer):
                 self._encoded = version, _as_json(state)
             return f'"{self._session}-{version}"', self._encoded[1]
 
+    # --- clients that take their time -------------------------------------------------------------
+
+    def expect(self, connection: socket.socket, seconds: float) -> None:
+        """End a connection unless it has come further after so many seconds."""
+        with self._waiting:
+            self._deadlines[connection] = time.monotonic() + seconds
+
+    def verify_request(self, request: Any, client_address: Any) -> bool:
+        """Refuse a connection where there are too many."""
+        with self._waiting:
+            is_welcome = len(self._deadlines) < MOST
+        if is_welcome:
+            self.expect(request, ASKING)
+        return is_welcome
+
+    def service_actions(self) -> None:
+        """End connections whose time is up; called several times a second."""
+        now = time.monotonic()
+        with self._waiting:
+            late = [one for one, deadline in self._deadlines.items() if deadline < now]
+        for connection in late:
+            with suppress(OSError):
+                connection.shutdown(socket.SHUT_RDWR)  # its thread reads the end, and leaves
+
+    def shutdown_request(self, request: Any) -> None:
+        """Close a connection."""
+        with self._waiting:
+            self._deadlines.pop(request, None)
+        super().shutdown_request(request)
+
     def handle_error(self, request: Any, client_address: Any) -> None:
         """Let a client go that has gone; tell of anything else as Python does."""
         if not isinstance(sys.exception(), OSError):
@@ -119,10 +158,15 @@ class Handler(BaseHTTPRequestHandler):
     server: LiveServer
     protocol_version = "HTTP/1.1"
     server_version, sys_version = "conevo", ""
-    timeout = IDLE
+
+    def handle_one_request(self) -> None:
+        """Read a request within some time, whatever comes piece by piece, and answer it."""
+        self.server.expect(self.connection, ASKING)
+        super().handle_one_request()
 
     def do_GET(self) -> None:
         """Answer a request."""
+        self.server.expect(self.connection, math.inf)  # making a replay takes its time
         if (refusal := self._refusal()) is not None:
             self.send_error(HTTPStatus.FORBIDDEN, refusal)
             return
@@ -186,6 +230,7 @@ class Handler(BaseHTTPRequestHandler):
     def _send(
         self, kind: str, body: bytes, status: HTTPStatus = HTTPStatus.OK, tag: str = ""
     ) -> None:
+        self.server.expect(self.connection, SENDING + len(body) / SLOWEST)
         self.send_response(status)
         for name, value in HEADERS.items():
             self.send_header(name, value)

@@ -112,7 +112,7 @@ class Watched:
         for folder in self._folders:
             self._list(folder)
         for group in self._groups.values():
-            group.look(go_on)
+            group.look_safely(go_on)
         groups = [group for group in self._groups.values() if group.subjects or group.is_named]
         subjects = [subject for group in groups for subject in group.subjects]
         self._by_label = {subject.label: subject for subject in subjects}

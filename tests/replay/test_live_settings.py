@@ -1,0 +1,83 @@
+"""Runs with other settings have curves, medians and names of their own."""
+
+import tomllib
+
+import tomli_w
+
+from conevo.replay.live.settings import comparisons, factors
+from conevo.replay.live.watched import Watched
+from replay.followed import write_run, write_shaping
+
+
+def with_settings(path, method="cone", seed=1, **settings):
+    """Write a run of two generations with settings: method__gst=0.2."""
+    write_run(path, 2, method=method, seed=seed)
+    found = tomllib.loads((path / "config.toml").read_text())
+    for key, value in settings.items():
+        part, _, name = key.partition("__")
+        found.setdefault(part, {})[name] = value
+    (path / "config.toml").write_text(tomli_w.dumps(found))
+
+
+def panels_in(folder):
+    """Return the panels of a folder: by, variant, and series -> labels of its lines."""
+    found = []
+    for panel in Watched(folders=[folder]).snapshot()["panels"]:
+        series = {}
+        for line in panel["over"]["generation"]["lines"]:
+            series.setdefault(line["series"], []).append(line["label"])
+        found.append((panel["by"], panel["variant"], series))
+        assert [row["series"] for row in panel["rows"]] == list(series)
+    return found
+
+
+def test_runs_with_other_settings_have_a_median_of_their_own_that_names_them(tmp_path):
+    with_settings(tmp_path / "a", seed=1, method__gst=0.1, world__n_robots=5)
+    with_settings(tmp_path / "b", seed=2, method__gst=0.1, world__n_robots=5)
+    with_settings(tmp_path / "c", seed=1, method__gst=0.2, world__n_robots=5)
+    assert panels_in(tmp_path) == [("variant", "", {"gst=0.1": ["a", "b"], "gst=0.2": ["c"]})]
+
+
+def test_a_setting_of_one_method_is_compared_with_the_others_at_each_value(tmp_path):
+    with_settings(tmp_path / "a", method__gst=0.1)
+    with_settings(tmp_path / "b", method__gst=0.2)
+    with_settings(tmp_path / "c", "homcne", method__genotypes=9)
+    assert panels_in(tmp_path) == [
+        ("method", "gst=0.1", {"cone": ["a"], "homcne": ["c"]}),
+        ("method", "gst=0.2", {"cone": ["b"], "homcne": ["c"]}),
+    ]
+
+
+def test_methods_in_worlds_with_other_settings_are_not_compared(tmp_path):
+    with_settings(tmp_path / "a", world__n_robots=5)
+    with_settings(tmp_path / "b", "homcne", world__n_robots=5)
+    with_settings(tmp_path / "c", "homcne", world__n_robots=6, run__extra="x")
+    assert panels_in(tmp_path) == [
+        ("method", "no extra, n_robots=5", {"cone": ["a"], "homcne": ["b"]}),
+        ("method", "extra=x, n_robots=6", {"homcne": ["c"]}),
+    ]
+
+
+def test_runs_that_differ_in_very_much_are_still_told_apart(tmp_path):
+    for k in range(3):
+        names = {f"world__n_{n}": k if n > 5 else 0 for n in range(9)} | {"method__z": k}
+        with_settings(tmp_path / f"r{k}", **names)
+    ((by, _, series),) = panels_in(tmp_path)
+    assert by == "variant"
+    assert len(series) == 3
+    assert all(len(name) < 150 for name in series)
+
+
+def test_a_shaping_is_not_a_run_of_its_last_stage(tmp_path):
+    write_shaping(tmp_path / "shaped", [(3, 3), (3, 3)])
+    write_run(tmp_path / "run", 3, world="rover-v1/complex-2", generations=3)
+    ((by, _, series),) = panels_in(tmp_path)
+    assert (by, sorted(map(len, series.values()))) == ("variant", [1, 1])
+
+
+def test_factors_of_some_runs_of_a_plan_are_compared_with_the_others():
+    parts = [factors(v) for v in ("", "gst=0.1", "gst=0.2", "gst=0.1", "")]
+    assert comparisons(parts) == [("gst=0.1", [0, 1, 3, 4]), ("gst=0.2", [0, 2, 4])]
+    parts = [factors(v) for v in ("n=1", "n=2", "n=1, gst=0.1", "n=2, gst=0.1")]
+    assert [members for _, members in comparisons(parts)] == [[0, 2], [1, 3]]
+    assert comparisons([{}, {}]) == [("", [0, 1])]
