@@ -3,7 +3,9 @@
 ::
 
     plan.toml             the plan, resolved: scale, seeds and all settings
+    inputs/               copies of the files that it names: of worlds and prey
     runs.jsonl            every run of the plan, written before anything starts
+    code.json             which code may carry it on
     ledger.sqlite         how every run stands; written by the coordinator only
     runs/LABEL/           the runs, each as any other; or shapings
     studies/LABEL.json    what the fittest team of a finished run does
@@ -22,11 +24,14 @@ import dataclasses
 import json
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
+from typing import Any
 
+from conevo.campaigns.admission import admit_code
 from conevo.campaigns.ended import read_ended
 from conevo.campaigns.executors import Ending, Executor, Job
+from conevo.campaigns.inputs import keep_files, renamed
 from conevo.campaigns.ledger import Entry, Ledger
 from conevo.campaigns.places import Places
 from conevo.campaigns.plan import Plan, PlannedRun
@@ -53,28 +58,45 @@ class Stopped(Exception):
 Watch = Callable[["Campaign", "Ending | None"], None]
 
 
-def create(plan: Plan, path: Path) -> Campaign:
+def create(plan: Plan, path: Path, accept_other_code: bool = False) -> Campaign:
     """Write a campaign out; nothing is started.
 
     A campaign that is there already is extended if the plan has all its runs and more.
 
+    Args:
+        plan: what to run.
+        path: its directory.
+        accept_other_code: extend a campaign although other code has begun it.
+
     Raises:
-        UsageError: a run that cannot be, or ``path`` holds something else; nothing was written.
+        UsageError: a run that cannot be, ``path`` holds something else, or other code has begun
+            the campaign there; nothing was written.
         EnvironmentFailure: it cannot be written.
     """
     runs = plan.write_out()
-    lines = "".join(f"{json.dumps(dataclasses.asdict(run))}\n" for run in runs).encode()
     if Places(path).plan.is_file():
         campaign = Campaign(path)
         _refuse_other(campaign, {run.label: run for run in runs})
         with campaign.locked():
-            replace_file(campaign.places.runs, lines)
-            replace_file(campaign.places.plan, plan.to_toml().encode())
+            campaign.admit_code(accept_other_code)
+            _write(plan, runs, path)
         return Campaign(path)
     with appearing(path) as draft:
-        replace_file(Places(draft).plan, plan.to_toml().encode())
-        replace_file(Places(draft).runs, lines)
+        _write(plan, runs, draft)
     return Campaign(path)
+
+
+def _write(plan: Plan, runs: Iterable[PlannedRun], directory: Path) -> None:
+    """Write a plan and its runs, with copies of the files that they name."""
+    root = directory.resolve()
+    names = keep_files([*plan.values, *(value for run in runs for value in run.values)], root)
+
+    def rename(value: Any) -> Any:
+        return renamed(value, names)
+
+    rows = [dataclasses.asdict(run.mapped(rename)) for run in runs]
+    replace_file(Places(root).runs, "".join(f"{json.dumps(row)}\n" for row in rows).encode())
+    replace_file(Places(root).plan, plan.mapped(rename).to_toml().encode())
 
 
 def _refuse_other(campaign: Campaign, runs: dict[str, PlannedRun]) -> None:
@@ -158,6 +180,14 @@ class Campaign:
             return entry
         return dataclasses.replace(entry, state="failed", reason=ended["message"])
 
+    def admit_code(self, accept: bool = False) -> None:
+        """Let this conevo carry the campaign on; see ``admission``.
+
+        Raises:
+            UsageError: other code has begun it, and this one is not accepted.
+        """
+        admit_code(self.places, self.planned, accept)
+
     def stop(self) -> None:
         """Ask the coordinator to stop: its workers write their checkpoints and leave.
 
@@ -198,10 +228,11 @@ class Campaign:
             watch: called with the campaign and each ending; with None while there is none.
 
         Raises:
-            UsageError: a coordinator is at work already.
+            UsageError: a coordinator is at work already, or other code has begun the campaign.
             Stopped: by ``stop``; the campaign can be carried on.
         """
         with self.locked():
+            self.admit_code()
             self.places.stop.unlink(missing_ok=True)
             self._reconcile()
             try:

@@ -18,6 +18,7 @@ from conevo.campaigns.work import planned_runs
 from conevo.errors import EnvironmentFailure, UsageError
 from conevo.runs.directory import appearing, kind_of
 from conevo.runs.durable import replace_file
+from conevo.runs.inputs import INPUTS
 
 __all__ = ["ObjectStore"]
 
@@ -45,12 +46,21 @@ class ObjectStore:
         self.uri, self._base = uri.rstrip("/"), base.rstrip("/")
 
     def put_plan(self, root: Path) -> None:
-        """Store the list of a campaign's runs: all of the plan that a worker reads."""
-        self._put(root, Places(root).runs, Places(root).runs.read_bytes())
+        """Store what a worker reads of a plan: its runs, its inputs, and who may carry it on."""
+        places = Places(root)
+        inputs = sorted((root / INPUTS).glob("*"))
+        for path in (places.runs, places.code, *inputs):
+            if path.is_file():
+                self._put(root, path, path.read_bytes())
 
     def get_plan(self, root: Path) -> None:
-        """Write that list into a directory."""
-        self._get(root, Places(root).runs)
+        """Write that into a directory."""
+        places = Places(root)
+        self._get(root, places.runs)
+        for name in self._names(INPUTS):
+            self._get(root, root / INPUTS / name)
+        if self._files.get_file_info(f"{self._base}/{places.code.name}").is_file:
+            self._get(root, places.code)
 
     def put_run(self, root: Path, label: str) -> None:
         """Store a run as it stands, at work or not, its studies and how it ended."""

@@ -27,6 +27,11 @@ class Places:
         return self.root / "runs.jsonl"
 
     @property
+    def code(self) -> Path:
+        """Which code may carry the campaign on."""
+        return self.root / "code.json"
+
+    @property
     def ledger(self) -> Path:
         """What the coordinator knows of every run."""
         return self.root / "ledger.sqlite"

@@ -9,12 +9,14 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import tomli_w
 
+from conevo.campaigns.inputs import located, shown_as
 from conevo.errors import UsageError, unknown_name
 from conevo.runs.config import PRESETS, RunConfig, resolve
 from conevo.runs.shaping import tasks_up_to
@@ -47,6 +49,16 @@ class PlannedRun:
     shape: bool
     studies: tuple[str, ...]
     run_ids: tuple[str, ...]
+
+    @property
+    def values(self) -> list[Any]:
+        """Its world and its settings."""
+        return [self.world, *self.overrides.values()]
+
+    def mapped(self, change: Callable[[Any], Any]) -> PlannedRun:
+        """Return the run with its world and its settings changed."""
+        overrides = {key: change(value) for key, value in self.overrides.items()}
+        return dataclasses.replace(self, world=change(self.world), overrides=overrides)
 
     @property
     def names(self) -> list[str]:
@@ -152,7 +164,8 @@ class Plan:
             raise unknown_name("preset", preset, PRESETS)
         if seeds is not None and seeds < 1:
             raise UsageError(f"--seeds {seeds}: a campaign needs at least 1 seed")
-        forced = () if not settings else (Where({}, dict(settings)),)
+        given = {key: located(value, Path.cwd()) for key, value in (settings or {}).items()}
+        forced = () if not given else (Where({}, given),)
         return dataclasses.replace(
             self,
             preset=preset or self.preset,
@@ -206,7 +219,7 @@ class Plan:
         configs = [
             resolve(t, method, self.preset, overrides=overrides, place=self.place) for t in tasks
         ]
-        variant = ", ".join(f"{k.rpartition('.')[2]}={v}" for k, v in further.items())
+        variant = ", ".join(f"{k.rpartition('.')[2]}={shown_as(v)}" for k, v in further.items())
         address = configs[-1].address
         return [
             PlannedRun(
@@ -223,6 +236,37 @@ class Plan:
             )
             for seed in self.seeds
         ]
+
+    @property
+    def values(self) -> list[Any]:
+        """All levels, settings and worlds that conditions name."""
+        tables = [self.factors, *(one.factors for one in self.where)]
+        found = [level for table in tables for levels in table.values() for level in levels]
+        found += [name for one in self.where for name in one.conditions.get("world", ())]
+        for table in (self.settings, *(one.settings for one in self.where)):
+            found += table.values()
+        return found
+
+    def mapped(self, change: Callable[[Any], Any]) -> Plan:
+        """Return the plan with all levels, settings and worlds of conditions changed."""
+
+        def of(table: Mapping[str, Any]) -> dict[str, Any]:
+            return {key: change(value) for key, value in table.items()}
+
+        def each(table: Mapping[str, tuple[Any, ...]]) -> dict[str, tuple[Any, ...]]:
+            return {key: tuple(map(change, values)) for key, values in table.items()}
+
+        where = tuple(
+            dataclasses.replace(
+                one,
+                conditions=each(one.conditions),
+                settings=of(one.settings),
+                factors=each(one.factors),
+            )
+            for one in self.where
+        )
+        factors, settings = each(self.factors), of(self.settings)
+        return dataclasses.replace(self, factors=factors, settings=settings, where=where)
 
     def to_toml(self) -> str:
         """Return the text that ``read_plan`` turns back into this plan."""

@@ -38,6 +38,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+from conevo.campaigns.inputs import located
 from conevo.campaigns.plan import Plan, Where
 from conevo.errors import UsageError, shown, unknown_name
 from conevo.reading import parse_toml, read_toml
@@ -77,11 +78,14 @@ def read_preset(name: str) -> Plan:
 def read_plan(path: Path) -> Plan:
     """Return the plan in a file; its name is the file's unless it says another.
 
+    Files that it names, of worlds and prey, are taken from its folder.
+
     Raises:
         UsageError: it is no plan; the message names the key and what is allowed.
         EnvironmentFailure: it cannot be read.
     """
-    return _parse(read_toml(path), f"in {path}", path.stem)
+    plan = _parse(read_toml(path), f"in {path}", path.stem)
+    return plan.mapped(lambda value: located(value, path.parent))
 
 
 def _parse(tables: Mapping[str, Any], place: str, name: str) -> Plan:

@@ -16,12 +16,14 @@ from conevo.analysis.frames import SCHEMA
 from conevo.campaigns.places import Places
 from conevo.campaigns.plan import PlannedRun
 from conevo.reading import read_json, read_json_lines
-from conevo.runs.config import RunConfig
+from conevo.runs.code import changes_text, sessions_of
 from conevo.runs.directory import as_json
 from conevo.runs.drafts import draft_of
 from conevo.runs.durable import replace_file, sync_directory, writing
+from conevo.runs.outline import Outline
+from conevo.runs.provenance import describe_world
+from conevo.runs.run import Run
 from conevo.runs.shrinkage import shrinkage
-from conevo.worlds.measures import Measure, measures_of
 
 __all__ = ["is_sealed", "seal_tables"]
 
@@ -56,10 +58,9 @@ def seal_tables(places: Places, finished: Sequence[PlannedRun], spent: Mapping[s
     with writing(places.tables), draft_of(places.tables) as draft:
         draft.mkdir()
         files = {name: (draft / f"{name}.jsonl").open("w", encoding="utf-8") for name in SCHEMA}
-        cells: dict[str, list[RunConfig]] = {}
         for planned in finished:
             cost = max(spent.get(planned.label, 0.0), _last_cost(places, planned.label))
-            for table, row in _rows(places, planned, _configs(planned, cells), cost):
+            for table, row in _rows(places, planned, cost):
                 files[table].write(json.dumps(row, allow_nan=False) + "\n")
         for file in files.values():
             file.close()
@@ -84,46 +85,38 @@ def _quoted(path: Path) -> str:
     return "'" + str(path).replace("'", "''") + "'"
 
 
-def _configs(planned: PlannedRun, cells: dict[str, list[RunConfig]]) -> list[RunConfig]:
-    """Return the configurations of a run of the same cell: all but the seed is the run's own."""
-    cell = json.dumps([planned.tasks, planned.method, planned.preset, planned.overrides])
-    if cell not in cells:
-        cells[cell] = planned.configs()
-    return cells[cell]
-
-
 def _last_cost(places: Places, label: str) -> float:
     """Return the core seconds of a run's last worker, which may have known no coordinator."""
     ended = places.ended(label)
     return float(read_json(ended)["core_seconds"]) if ended.is_file() else 0.0
 
 
-def _rows(
-    places: Places, planned: PlannedRun, configs: Sequence[RunConfig], cost: float
-) -> Iterator[tuple[str, Row]]:
+def _rows(places: Places, planned: PlannedRun, cost: float) -> Iterator[tuple[str, Row]]:
     """Yield every row that a finished run has in any table."""
     names = planned.names
-    for name, config in zip(names, configs, strict=True):
+    for name in names:
         path = places.run(name)
-        provenance = read_json(path / "provenance.json")
+        run = Run(path)
+        provenance = run.provenance
+        world = provenance.get("world") or describe_world(run.config.build_world())  # 0.1.0: none
         records = read_json_lines(path / "generations.jsonl", is_log=True)
         test = read_json(path / "test.json")
-        measures = _measures(provenance, config)
+        measures = world["measures"]
         yield (
             "runs",
-            _run_row(planned, config, provenance, records)
+            _run_row(planned, run.outline, world["name"], provenance, records)
             | {
                 "run": name,
-                "measure": measures[0].name,
-                "optimum": getattr(config.build_world(), "optimum", None),
-                "n_robots": len(test["champion"]["labels"]),
+                "measure": measures[0]["name"],
+                "optimum": world["optimum"],
+                "n_robots": world["n_robots"],
                 "core_seconds": cost / len(names),
                 **_exchange(records),
             },
         )
         for one in measures:
-            about = {"unit": one.unit, "larger_is_better": one.larger_is_better}
-            yield "measures", {"run": name, "measure": one.name} | about
+            about = {"unit": one["unit"], "larger_is_better": one["larger_is_better"]}
+            yield "measures", {"run": name, "measure": one["name"]} | about
         for team, title in (("champion", "champion"), ("generation_0", "generation 0")):
             for measure, values in test[team]["performance"].items():
                 about = {"run": name, "study": "test", "team": title, "measure": measure}
@@ -138,19 +131,21 @@ def _rows(
 
 
 def _run_row(
-    planned: PlannedRun, config: RunConfig, provenance: Row, records: Sequence[Row]
+    planned: PlannedRun, run: Outline, world: str, provenance: Row, records: Sequence[Row]
 ) -> Row:
-    family, _, number = config.environment.rpartition("-")
+    environment = run.environment
+    family, _, number = environment.rpartition("-")
+    sessions = sessions_of(provenance)
     is_numbered = bool(family) and number.isdecimal()
     return {
-        "task": config.task,
-        "world": config.world,
-        "environment": config.environment,
-        "family": family if is_numbered else config.environment,
+        "task": f"{world}/{environment}",
+        "world": world,
+        "environment": environment,
+        "family": family if is_numbered else environment,
         "number": int(number) if is_numbered else 0,
-        "method": config.method,
-        "preset": config.preset,
-        "seed": planned.seed,
+        "method": run.method,
+        "preset": run.preset,
+        "seed": run.seed,
         "variant": planned.variant,
         "generations": len(records),
         "evaluations": records[-1]["team_evaluations"],
@@ -159,15 +154,12 @@ def _run_row(
         "stopped_by": provenance["stopped_by"],
         "run_id": provenance["run_id"],
         "conevo": provenance["conevo"],
+        "code": ", ".join(dict.fromkeys(one.get("code", "") for one in sessions)),
+        "changes": "; ".join(changes_text(sessions)),
+        "numpy": provenance["numpy"],
         "warp": provenance["warp"],
         "kernel_hash": provenance["kernel_hash"],
     }
-
-
-def _measures(provenance: Row, config: RunConfig) -> tuple[Measure, ...]:
-    """Return the measures of a run's world: of its provenance, or else of the world."""
-    declared = provenance.get("world", {}).get("measures", ())
-    return tuple(Measure(**one) for one in declared) or measures_of(config.build_world())
 
 
 def _exchange(records: Sequence[Row]) -> Row:

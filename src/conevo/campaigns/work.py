@@ -19,6 +19,8 @@ import traceback
 from pathlib import Path
 from typing import Any
 
+from conevo.campaigns.admission import admit_code
+from conevo.campaigns.inputs import located
 from conevo.campaigns.places import Places
 from conevo.campaigns.plan import PlannedRun
 from conevo.errors import ConevoError, EnvironmentFailure, UsageError
@@ -54,7 +56,7 @@ def planned_runs(root: Path) -> dict[str, PlannedRun]:
         raise UsageError(f"{path} is damaged: {error}") from error
     if not runs:
         raise UsageError(f"{path} is damaged: it lists no run")
-    return {run.label: run for run in runs}
+    return {run.label: run.mapped(lambda value: located(value, root)) for run in runs}
 
 
 def carry_out(root: Path, label: str, threads: int, *, spent_before: float = 0.0) -> bool:
@@ -76,6 +78,7 @@ def carry_out(root: Path, label: str, threads: int, *, spent_before: float = 0.0
         planned = planned_runs(root)
         if label not in planned:
             raise UsageError(f"{root} plans no run {label!r}")
+        admit_code(places, planned)
         found = _evolve(places, planned[label], threads)
         if planned[label].studies:
             _study(places, planned[label], found, threads)
@@ -114,8 +117,8 @@ def _describe(error: Exception) -> dict[str, str]:
 def _evolve(places: Places, planned: PlannedRun, threads: int) -> Run | Shaping:
     """Return the run, finished by now."""
     path = places.run(planned.label)
-    configs = planned.configs()
     if not kind_of(path):
+        configs = planned.configs()
         command = f"conevo campaign start, run {planned.label}"
         if planned.shape:
             start_shaping(
@@ -131,8 +134,7 @@ def _evolve(places: Places, planned: PlannedRun, threads: int) -> Run | Shaping:
         else:
             start(configs[0], path, threads=threads, command=command)
     found = Shaping(path) if kind_of(path) == "shaping" else Run(path)
-    made = found.configs if isinstance(found, Shaping) else [found.config]
-    if tuple(config.run_id for config in made) != planned.run_ids:
+    if found.run_ids != planned.run_ids:
         raise UsageError(f"{path} is not the run that was planned; move it away and retry")
     deadline = time.monotonic() + PATIENCE
     while found.status == "running" and time.monotonic() < deadline:
@@ -140,7 +142,7 @@ def _evolve(places: Places, planned: PlannedRun, threads: int) -> Run | Shaping:
     if found.status == "running":
         raise _InUse
     if found.status != "finished":
-        found.resume(threads=threads)
+        found.resume(threads=threads, accept_other_code=True)  # it is admitted to the campaign
     return found
 
 

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from conevo.cli.carry import accept_option
+
 if TYPE_CHECKING:
     from conevo.campaigns.campaign import Campaign
 
@@ -83,6 +85,7 @@ def list_(as_json: bool) -> None:
 @campaign.command(short_help="Start a campaign, or finish what is missing.")
 @plan_options
 @click.option("--dry-run", is_flag=True, help="Print the runs; write and start nothing.")
+@accept_option
 @execution_options
 def start(
     name: str,
@@ -91,6 +94,7 @@ def start(
     settings: tuple[str, ...],
     out: str | None,
     dry_run: bool,
+    accept_other_code: bool,
     **execution: Any,
 ) -> int:
     """Carry out NAME (see: conevo campaign list), a plan in a TOML FILE, or go on in DIR.
@@ -106,7 +110,9 @@ def start(
     if dry_run:
         print_plan(found.planned.values() if found else plan.write_out(), execution["as_json"])
         return 0
-    return carry_on(found or _create(plan, name, out), execute)
+    found = found or _create(plan, name, out, accept_other_code)
+    found.admit_code(accept_other_code)
+    return carry_on(found, execute)
 
 
 @campaign.command(short_help="Write a campaign's runs as a SLURM job array.")
@@ -128,6 +134,7 @@ def start(
     "--sbatch", "others", metavar="OPTION", multiple=True,
     help="Another option of sbatch, for example --sbatch=--constraint=avx512.",
 )  # fmt: skip
+@accept_option
 def slurm(
     name: str,
     preset: str | None,
@@ -138,6 +145,7 @@ def slurm(
     hours: float,
     at_once: int | None,
     others: tuple[str, ...],
+    accept_other_code: bool,
     **named: str | None,
 ) -> None:
     """Write a script that carries out all runs that are not finished; submit it with sbatch.
@@ -151,7 +159,8 @@ def slurm(
     options += others
     check_request(hours, options)
     found, plan = _planned(name, preset, seeds, settings, out)
-    found = found or _create(plan, name, out)
+    found = found or _create(plan, name, out, accept_other_code)
+    found.admit_code(accept_other_code)
     left = [label for label in found.planned if not found.is_finished(label)]
     path = write_array(
         found.path, left, threads=threads, hours=hours, at_once=at_once, options=options
@@ -187,14 +196,16 @@ def stop(name: str) -> None:
 
 @campaign.command(short_help="Try the failed runs again.")
 @click.argument("name", metavar="NAME")
+@accept_option
 @execution_options
-def retry(name: str, **execution: Any) -> int:
+def retry(name: str, accept_other_code: bool, **execution: Any) -> int:
     """Try the failed runs of a campaign again, and finish what is missing."""
     from conevo.cli.campaign_run import carry_on, ready
     from conevo.cli.find import find_campaign
 
     execute = ready(**execution)
     found = find_campaign(name)
+    found.admit_code(accept_other_code)
     found.retry()
     return carry_on(found, execute)
 
@@ -222,7 +233,7 @@ def _planned(
     return None, plan.at(preset, seeds, parse_assignments(settings))
 
 
-def _create(plan: Any, name: str, out: str | None) -> Campaign:
+def _create(plan: Any, name: str, out: str | None, accept_other_code: bool) -> Campaign:
     """Write the campaign out where it belongs."""
     from pathlib import Path
 
@@ -230,4 +241,5 @@ def _create(plan: Any, name: str, out: str | None) -> Campaign:
     from conevo.cli.find import campaign_at
 
     there = campaign_at(name) if out is None else None
-    return create(plan, Path(out) if out else there.path if there else CAMPAIGNS / plan.name)
+    path = Path(out) if out else there.path if there else CAMPAIGNS / plan.name
+    return create(plan, path, accept_other_code)

@@ -9,13 +9,16 @@ from __future__ import annotations
 
 import dataclasses
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from conevo.errors import UsageError
 from conevo.reading import read_bytes
-from conevo.runs.config import RunConfig
 from conevo.runs.durable import replace_file, writing
 
-__all__ = ["INPUTS", "keep_inputs"]
+if TYPE_CHECKING:
+    from conevo.runs.config import RunConfig
+
+__all__ = ["INPUTS", "copy_input", "keep_inputs"]
 
 INPUTS = "inputs"  # folder of a run, shaping or campaign
 
@@ -37,17 +40,22 @@ def keep_inputs(config: RunConfig, directory: Path) -> RunConfig:
     if entry.file:
         from conevo.worlds.outside import load
 
-        file, *_ = [_copy(Path(one), folder) for one in entry.files]
+        file, *_ = [copy_input(Path(one), folder) for one in entry.files]
         entry = load(file, entry.digest)
     for field in dataclasses.fields(params):
         if getattr(params, f"{field.name}_digest", ""):
-            kept = _copy(Path(getattr(params, field.name)), folder)
+            kept = copy_input(Path(getattr(params, field.name)), folder)
             params = dataclasses.replace(params, **{field.name: str(kept)})
     return dataclasses.replace(config, entry=entry, world_params=params)
 
 
-def _copy(file: Path, folder: Path) -> Path:
-    """Return the copy of a file."""
+def copy_input(file: Path, folder: Path) -> Path:
+    """Return the copy of a file in a folder, made by now.
+
+    Raises:
+        UsageError: another file of its name is there.
+        EnvironmentFailure: it cannot be read or written.
+    """
     content, copy = read_bytes(file), folder / file.name
     if copy.is_file():
         if read_bytes(copy) != content:

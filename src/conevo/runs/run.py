@@ -181,6 +181,11 @@ class Run:
         return self._store.check_seal() if self._store.is_finished else []
 
     @property
+    def run_ids(self) -> tuple[str, ...]:
+        """Its id, alone; a shaping has one for every stage."""
+        return (self.provenance["run_id"],)
+
+    @property
     def n_generations(self) -> int:
         """Number of finished generations."""
         return self._store.count_generations()

@@ -134,7 +134,7 @@ class Shaping:
         about = _read(self.path / SHAPING)
         self._command, self._device = str(about["command"]), str(about["device"])
         self._settings: list[Record] = about["settings"]
-        self._run_ids: list[str] = about["run_ids"]
+        self.run_ids: tuple[str, ...] = tuple(about["run_ids"])
         self.outlines: list[Outline] = about["outlines"]
 
     @cached_property
@@ -172,7 +172,7 @@ class Shaping:
             UsageError: a stage is not the one that was planned.
         """
         begun: list[Run] = []
-        for number, run_id in enumerate(self._run_ids, start=1):
+        for number, run_id in enumerate(self.run_ids, start=1):
             if not (self._stage_path(number) / CONFIG).is_file():
                 break
             run = Run(self._stage_path(number))

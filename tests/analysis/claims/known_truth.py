@@ -221,6 +221,9 @@ def _about(
         "exchange_share": cell.exchange_share if method in EXCHANGING else None,
         "run_id": run,
         "conevo": "0.1.0",
+        "code": "0",
+        "changes": "",
+        "numpy": "2.4.6",
         "warp": "1.19.0",
         "kernel_hash": "0",
     }

@@ -40,6 +40,9 @@ RUN = {
     "exchange_share": None,
     "run_id": "a",
     "conevo": "",
+    "code": "",
+    "changes": "",
+    "numpy": "",
     "warp": "",
     "kernel_hash": "",
 }

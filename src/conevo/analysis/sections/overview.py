@@ -68,10 +68,32 @@ def overview(tables: Tables, campaign: Campaign) -> Section:
         f"{len(waiting):,} have not ended. Only finished runs count below. Runs of different "
         "presets or budgets never stand in one table or figure."
     )
+    text += _warnings(tables)
     exhibits = [_cost(tables), _versions(tables)]
     if failed:
         exhibits.insert(1, _failures(failed, campaign))
     return Section("What was run", text, exhibits)
+
+
+def _warnings(tables: Tables) -> list[str]:
+    """Return what makes runs of one comparison less comparable: the code that made them."""
+    text = []
+    mixed = tables.query(
+        "SELECT task FROM runs JOIN budgets USING (run) GROUP BY task, budget"
+        " HAVING count(DISTINCT code) > 1 ORDER BY task"
+    )[1]
+    if tasks := list(dict.fromkeys(task for (task,) in mixed)):
+        more = f" and {len(tasks) - 3} more" if len(tasks) > 3 else ""
+        text.append(
+            f"Warning: runs of {', '.join(tasks[:3])}{more} that are compared here were made by "
+            "different code (see Versions), so a difference between them may be one of the code."
+        )
+    changed = tables.query("SELECT run, changes FROM runs WHERE changes <> '' ORDER BY run")[1]
+    for run, changes in changed[:3]:
+        text.append(f"Warning: run {run} was {changes}.")
+    if len(changed) > 3:
+        text.append(f"Warning: so were {len(changed) - 3} more; the table of runs has them all.")
+    return text
 
 
 def repetition(tables: Tables, campaign: Campaign) -> Section:
@@ -154,16 +176,21 @@ def _failures(failed: dict[str, dict[str, Any]], campaign: Campaign) -> Table:
 
 def _versions(tables: Tables) -> Table:
     columns, found = tables.query(
-        "SELECT conevo, warp, world, kernel_hash, count(*) AS runs FROM runs"
+        "SELECT conevo, code, numpy, warp, world, kernel_hash, count(*) AS runs FROM runs"
         " GROUP BY ALL ORDER BY ALL"
     )
     shown = [
         Column("conevo", "conevo", plain),
+        Column("code", "code", plain),
+        Column("numpy", "numpy", plain),
         Column("warp", "Warp", plain),
         Column("world", "world", plain),
         Column("kernel_hash", "kernels", plain),
         Column("runs", "runs"),
     ]
-    note = "Kernels: digest of the simulation's program; runs with the same one are comparable."
+    note = (
+        "Code: digest of all text of conevo that decides results, several if others continued the "
+        "run. Kernels: digest of the simulation's program. Runs with the same ones are comparable."
+    )
     rows = [dict(zip(columns, row, strict=True)) for row in found]
     return Table("versions", "Versions", note, shown, rows)

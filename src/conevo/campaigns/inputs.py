@@ -1,0 +1,74 @@
+"""The files that a plan names: worlds and prey, copied into the campaign so that it can be moved.
+
+On disk they are named from the folder of the plan, in memory by their whole paths.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from conevo.runs.inputs import INPUTS, copy_input
+
+__all__ = ["keep_files", "located", "renamed", "shown_as"]
+
+Rename = Callable[[Any], Any]
+
+
+def located(value: Any, folder: Path) -> Any:
+    """Return a level or setting; if it names a file of a folder, by its whole path.
+
+    A world in a file always does, "FILE.py:ENVIRONMENT"; another text if there is such a file.
+    """
+    if not isinstance(value, str):
+        return value
+    if ".py:" in value:
+        return str(folder.resolve() / value)
+    is_name = bool(Path(value).suffix) or "/" in value
+    return str(folder.resolve() / value) if is_name and (folder / value).is_file() else value
+
+
+def shown_as(value: Any) -> str:
+    """Return a level as labels show it: a file without its folder."""
+    text = str(value)
+    return Path(text).name if Path(text).is_absolute() else text
+
+
+def renamed(value: Any, names: Mapping[str, str]) -> Any:
+    """Return a level or setting with the file in it named otherwise."""
+    if not isinstance(value, str):
+        return value
+    file, colon, environment = value.rpartition(":")
+    if colon and file in names:
+        return f"{names[file]}:{environment}"
+    return names.get(value, value)
+
+
+def keep_files(values: Iterable[Any], directory: Path) -> dict[str, str]:
+    """Copy the files that are named into ``inputs/`` of a campaign.
+
+    Args:
+        values: levels and settings; files by their whole paths.
+        directory: the campaign's.
+
+    Returns:
+        The name of each file from that directory, by its whole path.
+
+    Raises:
+        UsageError: two files of one name.
+        EnvironmentFailure: a file cannot be read or written.
+    """
+    names: dict[str, str] = {}
+    for value in dict.fromkeys(value for value in values if isinstance(value, str)):
+        file = Path(value.rpartition(":")[0] if ".py:" in value else value)
+        if str(file) in names or not (file.is_absolute() and file.is_file()):
+            continue
+        files = [file]
+        if ".py:" in value:
+            from conevo.worlds.outside import load
+
+            files = [Path(one) for one in load(file).files]
+        kept = [copy_input(one, directory / INPUTS) for one in files]
+        names[str(file)] = kept[0].relative_to(directory).as_posix()
+    return names
