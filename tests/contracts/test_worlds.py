@@ -6,13 +6,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from conevo.rng import fold, stream
+from conevo.rng import fold
+from conevo.worlds.checks import mixed_teams, random_teams
 from conevo.worlds.measures import measures_of
 from conevo.worlds.registry import WORLDS, resolve, world
 from conevo.worlds.rollout import Rollout
+from conevo.worlds.trial import Trial
 
-EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "light.py"
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+OUTSIDE = [f"{EXAMPLES}/light.py:dark-1", f"{EXAMPLES}/ball.py:far-1"]
 ITERATIONS = 25
+TOPICS = ("sensors", "outputs", "values", "counts", "order", "reset", "heuristics")
 CASES = [
     f"{entry.name}/{environment}"
     for entry in WORLDS.values()
@@ -24,7 +28,9 @@ def keys(n, root=7):
     return [fold(root, "epoch", 0, e) for e in range(n)]
 
 
-@pytest.fixture(params=[*CASES, f"{EXAMPLE}:dark-1"], ids=[*CASES, "outside"], scope="module")
+@pytest.fixture(
+    params=[*CASES, *OUTSIDE], ids=[*CASES, "outside-light", "outside-ball"], scope="module"
+)
 def path(request):
     return request.param
 
@@ -32,14 +38,6 @@ def path(request):
 @pytest.fixture(scope="module")
 def some_world(path):
     return world(path, iterations=ITERATIONS)
-
-
-def random_teams(some_world, n, seed=0):
-    spec, r = some_world.controller, some_world.n_robots
-    pool = stream(seed, "pool").uniform(-1, 1, (n * r * spec.n_hidden, spec.n_genes))
-    teams = np.full((n, r, spec.max_hidden), -1, dtype=np.int32)
-    teams[:, :, : spec.n_hidden] = np.arange(len(pool)).reshape(n, r, -1)
-    return pool.astype(np.float32), teams
 
 
 def outcome_arrays(outcome):
@@ -137,6 +135,19 @@ def test_record_equals_evaluate_bit_for_bit(some_world):
         if some_world.castes == some_world.actions:
             for a in range(len(some_world.actions)):
                 assert np.array_equal((action == a).sum(axis=0), counts[:, a])
+
+
+def test_robots_visited_in_any_order_within_a_phase_give_the_same_bits(some_world):
+    genes, teams, heuristic = mixed_teams(some_world)
+    scenarios = some_world.scenarios(keys(2))
+    trial = Trial(some_world, genes, teams, heuristic, scenarios)
+    trial.run()
+    seen = {topic: problems for topic, problems, _ in trial.seen()}
+    assert seen == {topic: [] for topic in TOPICS}
+    out = Rollout(some_world).evaluate(genes, teams, scenarios, heuristic)
+    stepped = trial.plain.arrays()
+    for name in ("fitness", "counts", "switches"):
+        assert stepped[name].tobytes() == getattr(out, name).tobytes(), name
 
 
 def test_every_heuristic_controller_plays(some_world):

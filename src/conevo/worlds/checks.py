@@ -22,7 +22,7 @@ from conevo.worlds.registry import WorldEntry, resolve
 from conevo.worlds.rollout import Rollout
 from conevo.worlds.trial import Trial
 
-__all__ = ["Finding", "findings", "random_teams"]
+__all__ = ["Finding", "findings", "mixed_teams", "random_teams"]
 
 ITERATIONS = 100  # of the epochs that are run step by step
 NETWORKS = 4  # teams of random networks among those
@@ -81,7 +81,10 @@ def _declared(entry: WorldEntry, environment: str) -> Iterator[Finding]:
     names = [Path(file).name for file in entry.files] or [entry.module]
     imports = f", which imports {', '.join(names[1:])}" if names[1:] else ""
     yield Finding("ok", "file", names[0] + imports)
-    yield from _topic("parameters", _of_parameters(entry.params_class), "all with bounds")
+    wrong = list(_of_parameters(entry.params_class))
+    yield from _topic("parameters", iter(wrong), "all with bounds")
+    if wrong:
+        return
     for name in entry.environments:
         built = entry.build(name, entry.params_class())
         if name == environment:
@@ -156,7 +159,7 @@ def _shorter(entry: WorldEntry, environment: str) -> World:
 def _stepped(entry: WorldEntry, environment: str) -> Iterator[Finding]:
     """Run some epochs step by step, in a process that ends where an array has no such index."""
     a_world = _shorter(entry, environment)
-    trial = Trial(a_world, *_cast(a_world), a_world.scenarios(KEYS[:2]))
+    trial = Trial(a_world, *mixed_teams(a_world), a_world.scenarios(KEYS[:2]))
     about = f"{trial.n_worlds} epochs of {a_world.params.iterations} iterations"
     trial.run()
     yield Finding("ok", "memory", f"{about}: every array has the indices that are used")
@@ -164,7 +167,7 @@ def _stepped(entry: WorldEntry, environment: str) -> Iterator[Finding]:
         yield from _topic(topic, iter(problems), fine)
 
 
-def _cast(
+def mixed_teams(
     a_world: World,
 ) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.int32], npt.NDArray[np.int32]]:
     """Return teams of networks, a mixed one, and one of each heuristic controller."""
@@ -184,7 +187,7 @@ def _rolled_out(entry: WorldEntry, environment: str) -> Iterator[Finding]:
 
 
 def _of_record(a_world: World) -> Iterator[str]:
-    pool, teams, heuristic = _cast(a_world)
+    pool, teams, heuristic = mixed_teams(a_world)
     mixed = slice(NETWORKS, NETWORKS + 1)
     scenarios, rollout = a_world.scenarios(KEYS[:1]), Rollout(a_world)
     out = rollout.evaluate(pool, teams[mixed], scenarios, heuristic[mixed])

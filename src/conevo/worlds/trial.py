@@ -33,6 +33,9 @@ class Trial:
         teams: pool rows of the neurons [N, R, U]; of each heuristic controller one, at the end.
         heuristic: [N, R].
         scenarios: E scenarios.
+
+    Attributes:
+        plain: the epochs in the order of a rollout.
     """
 
     def __init__(
@@ -46,8 +49,8 @@ class Trial:
         self.world = world
         self._task = (world, genes, teams, scenarios, heuristic)
         self._n_teams, self._heuristic = len(teams), heuristic
-        self._plain = Stepper(*self._task)
-        self.n_worlds = self._plain.n_worlds
+        self.plain = Stepper(*self._task)
+        self.n_worlds = self.plain.n_worlds
         self._simulation = world.simulation()
         self._order: list[str] = []
         self._outputs: list[str] = []
@@ -59,7 +62,7 @@ class Trial:
 
     def run(self) -> None:
         """Run the epochs, which ends the process where an array has no such index."""
-        plain, iterations = self._plain, self.world.params.iterations
+        plain, iterations = self.plain, self.world.params.iterations
         robots = stream(1, "check", "order")
         others = {"reverse": Stepper(*self._task), "random": Stepper(*self._task)}
         if self.world.controller.n_outputs < int(OUT):
@@ -103,14 +106,14 @@ class Trial:
         """Run "sense" alone, robot by robot, on inputs that hold what nobody writes."""
         if self._sensors:
             return
-        spec, arrays = self.world.controller, self._plain.arrays()
+        spec, arrays = self.world.controller, self.plain.arrays()
         kept = {name: values.copy() for name, values in arrays.items()}
         mark = SENTINEL.view(np.uint32)[0]
         plays = np.repeat(self._heuristic < 0, self.n_worlds // self._n_teams, axis=0)
         written = np.zeros((self.world.n_robots, spec.n_sensors), bool)
         for i in range(self.world.n_robots):
             arrays["inputs"][:] = SENTINEL
-            self._plain.step("sense", _only(self._plain.natural, i), t)
+            self.plain.step("sense", _only(self.plain.natural, i), t)
             seen = (arrays["inputs"].view(np.uint32) != mark)[plays[:, i]]
             written[i] = seen[:, i, : spec.n_sensors].any(axis=0)
             seen[:, i, : spec.n_sensors] = False
@@ -194,7 +197,7 @@ class Trial:
         yield "heuristics", list(self._of_heuristics()), f"{len(self.world.heuristics)} play"
 
     def _of_values(self) -> Iterator[str]:
-        arrays = self._plain.arrays()
+        arrays = self.plain.arrays()
         mark = SENTINEL.view(np.uint32)[0]
         if (arrays["fitness"].view(np.uint32) == mark).any():
             yield "fitness is never written: every robot gets one in reset or resolve"
@@ -211,7 +214,7 @@ class Trial:
         yield from self._counts
         if self._counts:
             return
-        world, arrays = self.world, self._plain.arrays()
+        world, arrays = self.world, self.plain.arrays()
         counts = arrays["counts"].reshape(self.n_worlds, world.n_robots, len(world.castes))
         if not np.array_equal(counts.sum(axis=2), self._executed.sum(axis=2)):
             yield (
@@ -229,13 +232,13 @@ class Trial:
     def _of_reset(self) -> Iterator[str]:
         used, fresh = Stepper(*self._task), Stepper(*self._task)
         for name, values in used.arrays().items():
-            values[:] = self._plain.arrays()[name][::-1]
+            values[:] = self.plain.arrays()[name][::-1]
         for stepper in (used, fresh):
             stepper.step("reset", stepper.natural)
         left = _differences(used.arrays(), fresh.arrays())
         for step, t in used.epoch(self.world.params.iterations):
             used.step(step, used.natural, t)
-        ended, should = used.arrays(), self._plain.arrays()
+        ended, should = used.arrays(), self.plain.arrays()
         if wrong := [n for n in RESULTS if ended[n].tobytes() != should[n].tobytes()]:
             yield (
                 f"{', '.join(wrong)} depend on the epoch before, in the same memory; reset leaves "
@@ -244,7 +247,7 @@ class Trial:
 
     def _of_heuristics(self) -> Iterator[str]:
         names = self.world.heuristics
-        counts = self._plain.arrays()["counts"].reshape(self._n_teams, -1)
+        counts = self.plain.arrays()["counts"].reshape(self._n_teams, -1)
         first = self._n_teams - len(names)
         played = {counts[0].tobytes(): "a team of networks"}
         for name, row in zip(names, counts[first:], strict=True):

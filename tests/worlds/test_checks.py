@@ -1,0 +1,214 @@
+"""Each mistake in a world's file is one clear line of ``conevo check``."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+from conevo.cli.main import main
+from conevo.worlds import checking
+from conevo.worlds.checks import findings
+from worlds.test_outside import TEXT, written
+
+# One line changed, and the topic and words of the one problem that must be found.
+DECLARED = {
+    "phase": ("(reset, sense, act,", "(reset, sense,", "structure", "has no phase 'act'; a world"),
+    "arguments": (
+        "def act(team: Team, scene: Scene, p: Params, i: int, t: int)",
+        "def act(team: Team, scene: Scene, p: Params, i: int)",
+        "structure", "bad.py:104: phase act must be declared as act(team, scene, p, i, t)",
+    ),
+    "types": (
+        "def act(team: Team, scene: Scene,", "def act(scene: Scene, team: Team,",
+        "structure", "phase act must be declared as act(team, scene, p, i, t), of types Team",
+    ),
+    "nets": ("    nets: Networks\n", "", "structure", "Team needs a field 'nets: Networks'"),
+    "field": ("    fitness: wp.array[float]\n", "", "structure", "Team needs a field 'fitness: "),
+    "dtype": ("    action: wp.array[int]", "    action: wp.array[float]", "structure",
+              "Team.action must be declared as 'action: wp.array[int]'"),
+    "number": ("    chosen: wp.array[int]", "    chosen: int", "structure",
+               "Team.chosen must be a one-dimensional array"),
+    "scene": ("    places: wp.array[float]", "    places: float", "structure",
+              "Scene.places must be an array"),
+    "outputs": ("n_outputs=4", "n_outputs=9", "structure", "n_outputs must be 1 to 8, not 9"),
+    "sensors": ("n_sensors=2", "n_sensors='2'", "structure", "n_sensors must be 1 or more"),
+    "castes": ("] = actions", "] = ('rest')", "structure", "castes must be a tuple of names"),
+    "fewer": ("] = actions", "] = ('rest',)", "structure", "fewer than the 2 actions"),
+    "twice": ('("idler",)', '("idler", "idler")', "structure", "heuristics has 'idler' twice"),
+    "recorded": ('"action", "fitness")', '"acton", "action", "fitness")', "structure",
+                 "unknown array 'acton' in Simulation.recorded; did you mean 'action'?"),
+    "must be": ('"action", "fitness")', '"action")', "structure", "recorded must have 'fitness'"),
+    "sizes": ("recorded=(", "sizes={'lights': 2}, recorded=(", "structure",
+              "unknown array 'lights' in Simulation.sizes"),
+    "size": ("recorded=(", "sizes={'fitness': 2}, recorded=(", "structure",
+             "Simulation.sizes['fitness'] must be 3 (robots)"),
+    "made of": ("params=params", "params=self.params", "structure", "must be made of"),
+    "bounds": ("step: Annotated[float, Gt(0), Le(0.1)]", "step: float", "parameters",
+               "LightParams.step has no bounds; declare them, as in Annotated[float"),
+    "default": ("Le(0.1)] = 0.01", "Le(0.1)] = 0.2", "parameters",
+                "LightParams.step = 0.2: must be less than or equal to 0.1"),
+    "no default": ("Le(64)] = 3", "Le(64)]", "parameters", "LightParams.n_robots needs a default"),
+    "frozen": ("@dataclass(frozen=True)\nclass LightParams", "@dataclass\nclass LightParams",
+               "parameters", "LightParams must be frozen"),
+    "key": ("stream(key,", "stream(1,", "scenarios", "places are the same for all keys"),
+    "call": ("stream(key, self.name)", "np.random.default_rng()", "scenarios",
+             "places changes from call to call"),
+    "company": ("stream(key, self.name)", "stream(keys[0] + key % 99, self.name)", "scenarios",
+                "places of a scenario changes with the other keys"),
+    "float64": ("(shape, np.float32)", "(shape)", "scenarios",
+                "LightScenarios.places must be float32 as in Scene, not float64"),
+    "too few": ("for key in keys])\n        return", "for key in keys[:1]])\n        return",
+                "scenarios", "must have a row for each of 3 scenarios, got shape [1, 4, 2]"),
+    "infinite": ("np.float32) for key", "np.float32) * np.float32('inf') for key", "scenarios",
+                 "places has values that are not finite"),
+    "missing": ("places=places, ", "", "world", "bad.py:174: TypeError: LightSc"),
+    "name": ("1.0 - wp.length", "one - wp.length", "world",
+             "bad.py:127: Referencing undefined symbol: one (in resolve: team.fitness[i] = one -"),
+    "class": ('"LightWorld"', '"LightWord"', "world",
+              "unknown class 'LightWord' in its ENTRY; did you mean 'LightWorld'?"),
+}  # fmt: skip
+
+# One kernel with all of these mistakes; the parameter ``fault`` chooses one.
+PLAYED = {
+    "fitness": ("resolve", "team.fitness[i] = wp.sqrt(-1.0)", "values", "fitness is not finite"),
+    "measure": ("outcome", "team.performance[0] = 1.0 / p.zero", "values", "nearness is not"),
+    "others": ("commit", "team.x[(i + 1) % 3] = 0.01 * float(i)", "order",
+               "commit gives other results if robots are visited in another order (`x` differ in "
+               "iteration 0): robot 0 writes `x` of robot 1; a phase writes its own robot's data"),
+    "early": ("act", "team.x[i] = team.x[(i + 1) % 3]", "order",
+              "sense or act gives other results if robots are visited in another order (`x`"),
+    "shared": ("commit", "move_light(team, i)", "order",
+               "robot 0 writes `moved`, which others read or write in the same phase; move it in "
+               "settle(team, scene, p, t), which runs once for the team"),
+    "sum": ("resolve", "team.moved[0] = team.moved[0] + team.x[i]", "order",
+            "3 robots write `moved`"),
+    "sensor": ("sense", "team.nets.inputs[first_input(team.nets, i) + 2] = 1.0", "sensors",
+               "sense writes input 2 for robot 0; with n_sensors = 2 a robot's sensors are its"),
+    "neighbour": ("sense", "team.nets.inputs[first_input(team.nets, 2 - i)] = 1.0", "sensors",
+                  "sense writes inputs of robot 2 for robot 0"),
+    "output": ("act", "team.x[i] = 0.1 * team.nets.sums[i][4]", "outputs",
+               "act uses outputs that the controller does not have (x change with them)"),
+    "action": ("commit", "team.action[i] = 2", "counts", "action is 2; it must be -1 (none) or"),
+    "column": ("commit", "team.counts[2 * i] = team.counts[2 * i] + 1", "counts", "counts sum"),
+    "switches": ("commit", "team.switches[i] = 0", "counts", "switches are not those of `action`"),
+    "left": ("resolve", "team.left[i] = team.left[i] + 1.0; team.fitness[i] = team.left[i]",
+             "reset", "depend on the epoch before, in the same memory; reset leaves"),
+    "constant": ("resolve", "team.fitness[i] = 0.5", "random teams",
+                 "all 100 have the same fitness: there is nothing to select on"),
+    "again": ("outcome", "team.kept[0] = team.kept[0] + 1.0; team.performance[0] = team.kept[0]",
+              "record", "performance differs from that of evaluate"),
+}  # fmt: skip
+MOVE_LIGHT = """
+@wp.func
+def move_light(team: Team, i: int) -> None:
+    if i == 0:
+        team.moved[0] = 0.25
+    team.x[i] = team.moved[0]
+
+
+"""
+RESET = "@wp.func\ndef reset("
+FIELDS = ["moved", "left", "kept"]
+
+
+def problems(file: Path) -> list[tuple[str, str]]:
+    """Return topics and texts of all problems."""
+    found = list(findings(f"{file}:dark-1"))
+    return [(one.topic, one.text) for one in found if one.status == "problem"]
+
+
+@pytest.mark.parametrize("name", DECLARED)
+def test_a_mistake_in_what_is_declared_is_one_line(name: str, tmp_path: Path) -> None:
+    old, new, topic, words = DECLARED[name]
+    found = problems(written(tmp_path / "bad.py", (old, new)))
+    assert [one for one, _ in found] == [topic]
+    assert words in found[0][1]
+
+
+def faulty(path: Path, name: str) -> Path:
+    """Write the example with a kernel that has all mistakes and a parameter that chooses one."""
+    number = [*PLAYED].index(name) + 1 if name else 0
+    state, given = "    y: wp.array[float]\n", "        params.step = self.params.step\n"
+    begin = "    team.x[i] = scene.places[2 * i]\n"
+    text = TEXT
+    for old, new in (
+        ("class LightParams:", f"{{}}\n    fault: Annotated[int, Ge(0), Le(99)] = {number}\n"),
+        ("    step: float\n", "{}    fault: int\n    zero: float\n"),
+        (given, "{}        params.fault = self.params.fault\n"),
+        (state, "{}" + "".join(f"    {name}: wp.array[float]\n" for name in FIELDS)),
+        (RESET, MOVE_LIGHT + "{}"),
+        (begin, "{}    if i == 0:\n        team.kept[0] = 0.0\n        team.moved[0] = 0.0\n"),
+        ("recorded=(", "sizes=dict(moved=1, kept=1), {}"),
+    ):
+        assert text.count(old) == 1, old
+        text = text.replace(old, new.replace("{}", old))
+    for k, (phase, line, *_) in enumerate(PLAYED.values(), 1):
+        head = re.search(rf"def {phase}\(.*\n", text)
+        assert head is not None
+        after = text.index("\n\n\n", head.end())
+        text = f"{text[:after]}\n    if p.fault == {k}:\n        {line}{text[after:]}"
+    path.write_text(text)
+    return path
+
+
+@pytest.mark.parametrize("name", ["", *PLAYED])
+def test_a_mistake_in_what_is_played_is_one_line(name: str, tmp_path: Path) -> None:
+    found = problems(faulty(tmp_path / "bad.py", name))
+    if not name:
+        assert found == []
+        return
+    _, _, topic, words = PLAYED[name]
+    assert any(one == topic and words in text for one, text in found), found
+    assert len(found) <= 2
+
+
+def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str]:
+    with pytest.raises(SystemExit) as caught:
+        main(["check", *arguments])
+    out, err = capsys.readouterr()
+    assert err == ""
+    return int(caught.value.code or 0), out
+
+
+def test_an_index_outside_an_array_is_found_with_its_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    change = ("i, a, a)", "i, a, a + 1)")
+    imports = ("from conevo.rng", "from beside import NOTHING\nfrom conevo.rng")
+    (tmp_path / "beside.py").write_text("NOTHING = 0\n")
+    file = written(tmp_path / "bad.py", change, imports)
+    code, out = run(capsys, str(file))
+    assert code == 2
+    assert "ok       file          bad.py, which imports beside.py" in out
+    line = "count_action(team.action, team.switches, team.counts, i, a, a + 1)"
+    assert f"problem  memory        {file}:122: in `{line}` an index lies outside its" in out
+    assert out.endswith("1 problem\n")
+
+
+def test_a_check_that_does_not_go_on_is_ended(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(checking, "MOST_SECONDS", 0.1)
+    code, out = run(capsys, str(written(tmp_path / "light.py")), "--json")
+    assert code == 2
+    assert json.loads(out)[-1]["text"] == "nothing ends any more: a loop may run for ever"
+
+
+def test_a_sound_world_has_no_problem_and_a_wrong_name_is_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    code, out = run(capsys, str(written(tmp_path / "light.py")))
+    assert (code, out.splitlines()[-1]) == (0, "no problems")
+    topics = [line.split()[1] for line in out.splitlines()[:-1]]
+    assert topics[:5] == ["file", "parameters", "structure", "scenarios", "memory"]
+    assert topics[5:] == [*("sensors", "outputs", "values", "counts", "order", "reset"),
+                          *("heuristics", "record", "random")]  # fmt: skip
+    for name, words in (("rovr", "did you mean 'rover'"), (f"{tmp_path}/no.py", "cannot read")):
+        with pytest.raises(SystemExit) as caught:
+            main(["check", name])
+        out, err = capsys.readouterr()
+        assert (caught.value.code, out, err.count("\n")) == (2, "", 1)
+        assert words in err
