@@ -12,6 +12,8 @@ import zlib
 from collections.abc import Iterable
 from typing import NamedTuple
 
+from conevo.terms import NON_SPECIALIZED
+
 __all__ = [
     "ACTIONS",
     "BLUE",
@@ -25,7 +27,6 @@ __all__ = [
     "OBJECTS",
     "ORANGE",
     "PURPLE",
-    "REST",
     "SKY",
     "VERMILION",
     "YELLOW",
@@ -40,7 +41,6 @@ ORANGE, SKY, GREEN, YELLOW = "#e69f00", "#56b4e9", "#009e73", "#f0e442"
 BLUE, VERMILION, PURPLE = "#0072b2", "#d55e00", "#cc79a7"
 INK, FAINT, GROUND = "#1c1c22", "#9a9aa5", "#fbfaf7"  # text, what hardly matters, the world's floor
 MOVE = "#4a4a52"  # Choice: what robots do between what they are there for is dark grey
-REST = "non-specialized"  # a caste of its own
 
 _ORDER = (BLUE, ORANGE, GREEN, PURPLE, SKY, VERMILION, YELLOW, INK)
 
@@ -152,6 +152,6 @@ def caste_colours(world: str, names: Iterable[str]) -> dict[str, str]:
         names: castes that were seen.
     """
     known = CASTES.get(world.rpartition("-v")[0] or world, {})
-    others = sorted(set(names) - known.keys() - {REST})
+    others = sorted(set(names) - known.keys() - {NON_SPECIALIZED})
     free = [c for c in several(len(others) + len(known)) if c not in known.values()]
-    return {**known, **dict(zip(others, free, strict=False)), REST: FAINT}
+    return {**known, **dict(zip(others, free, strict=False)), NON_SPECIALIZED: FAINT}

@@ -44,7 +44,7 @@ def test_a_shaping_from_run_to_the_commands_it_recommends(say, tmp_path: Path) -
     (row,) = json.loads(say("list", "runs", "--json").out)
     assert row == {
         "run": f"runs/{path.name}", "world": "rover-v1/complex-1 to complex-3", "method": "cone",
-        "preset": "smoke", "seed": "1", "generations": "15/15", "status": "finished",
+        "preset": "smoke", "seed": "1", "generations": "15 of 15 generations", "status": "finished",
     }  # fmt: skip
     stages = json.loads(say("list", "runs", f"runs/{path.name}", "--json").out)
     assert [row["world"] for row in stages] == [f"rover-v1/complex-{k}" for k in (1, 2, 3)]
@@ -60,8 +60,9 @@ def test_show_prints_the_stages_with_what_their_champions_achieved(say, tmp_path
         assert run.test_result is not None
         assert run.champion is not None
         area = run.test_result["champion"]["performance"]["area"]
-        assert row[1:4] == [run.config.task, "finished", "5/5"]
-        assert row[5] == str(run.champion.generation)
+        done = ["5", "of", "5", "generations"]
+        assert row[1:7] == [run.config.task, "finished", *done]
+        assert row[8] == str(run.champion.generation)
         assert row[-3:] == [f"{area['mean']:.4g}", "+-", f"{area['sd']:.4g}"]
     table = shown[shown.index("number  stage  task") :].splitlines()
     seen = [line.split()[:4] for line in table[1:]]
@@ -148,7 +149,7 @@ def test_an_interrupted_shaping_is_shown_tested_and_resumed(say, tmp_path: Path)
     assert "Continue it with: conevo resume here" in shown.out
     (row,) = json.loads(say("list", "runs", ".", "--json").out)
     assert row["status"] == "interrupted"
-    assert row["generations"].endswith("/180")
+    assert row["generations"].endswith(" of 180 generations")
     assert say("test", "here", "--scenarios", "2").code == 0
     said = say("resume", "here")
     assert said.code == 0, said.err

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,8 +12,9 @@ import pytest
 from rich.console import Console
 
 from conevo.cli.progress import Display, Pace
+from conevo.cli.summary import exchange_text, run_text
 from conevo.cli.summary import test_text as text_of_test
-from conevo.cli.text import bars, castes, duration, neurons, number, spread, table
+from conevo.cli.text import bars, castes, duration, neurons, number, progress, spread, table
 from runs.tiny import evolve_tiny
 
 
@@ -37,6 +39,34 @@ def test_numbers_have_four_digits(value: float | None, text: str) -> None:
 )
 def test_durations(seconds: float, text: str) -> None:
     assert duration(seconds) == text
+
+
+@pytest.mark.parametrize(
+    ("counts", "text"),
+    [
+        ((5, 30, 600, 0), "5 of 30 generations"),
+        ((5, 30, 600, 10_000), "5 of 30 generations"),
+        ((13, 1000, 49_920, 50_000), "13 generations, 49,920 of 50,000 evaluations"),
+        ((1000, 1000, 50_000, 50_000), "1,000 of 1,000 generations"),
+        ((0, 1000, 0, 50_000), "0 of 1,000 generations"),
+    ],
+)
+def test_progress_is_of_what_ends_the_run(counts: tuple[int, int, int, int], text: str) -> None:
+    assert progress(*counts) == text
+
+
+def test_units_directions_and_exchange_are_shown_where_a_run_is(tmp_path: Path) -> None:
+    shown = run_text(evolve_tiny(tmp_path / "run"), 5)
+    assert (
+        "measures: value (points, larger is better), area (share of the square, larger is better); "
+        "S: 0 = always the same action, 1 = switches all the time" in shown
+    )
+    assert re.search(r"recombined between populations: \S+ pairs \(\S+ %\) per generation", shown)
+    records = [{"sst": 0.5, "gst": 0.2, "recombinations": k, "n_hidden": [10, 10]} for k in (0, 3)]
+    assert exchange_text(records) == [
+        "recombined between populations: 1.5 pairs (15 %) per generation"
+    ]
+    assert exchange_text([one | {"sst": None, "gst": None} for one in records]) == []
 
 
 @pytest.mark.parametrize(
@@ -66,7 +96,10 @@ def test_a_run_of_an_older_conevo_is_shown_without_validation() -> None:
         "castes": {"low": 1},
     }
     lines = text_of_test({"champion": tested, "generation_0": tested}).splitlines()
-    assert lines[0] == "Testing phase, 2 fresh scenarios (mean +- standard deviation)"
+    assert lines[0] == (
+        "Testing phase, 2 fresh scenarios (mean +- standard deviation; "
+        "S: 0 = always the same action, 1 = switches all the time)"
+    )
     assert lines[2].split() == ["fittest", "team", "3", "2", "(1", "of", "2)", "0.5"]
     assert sum(line.startswith("warning: value is not finite") for line in lines) == 1
     assert not any("finalists" in line for line in lines)
@@ -120,7 +153,8 @@ def test_the_live_view_names_all_that_is_asked_of_it(tmp_path: Path) -> None:
     for words in (
         "rover-v1/complex-1, CONE, preset smoke, seed 1", "generation 5/5", "left", "value",
         "area", "best", "mean", "castes", "SST", "GST", "recombinations between populations",
-        "neurons", "team evaluations/s",
+        "neurons", "team evaluations/s", "(points, larger is better)",
+        "degree of specialization S (0 = always the same action, 1 = switches all the time)",
     ):  # fmt: skip
         assert words in shown
     assert shown.splitlines()[3].startswith("generation 5/5")  # the bar has a line of its own

@@ -2,9 +2,28 @@
 
 from __future__ import annotations
 
-__all__ = ["FEW_PAIRS", "FEW_SHARE", "is_idle", "per_generation"]
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+__all__ = ["FEW_PAIRS", "FEW_SHARE", "exchanged", "is_idle", "per_generation"]
 
 FEW_PAIRS, FEW_SHARE = 1.0, 0.1
+
+
+def exchanged(records: Sequence[Mapping[str, Any]]) -> tuple[float | None, float | None]:
+    """Return the pairs recombined in a generation's mean, and of those that could have been.
+
+    A sub-population recombines with one other at most, so that half of them could be pairs. None
+    for methods without thresholds for it, which never exchange.
+
+    Args:
+        records: of the generations of a run.
+    """
+    if all(record["sst"] is None and record["gst"] is None for record in records):
+        return None, None
+    made = sum(record["recombinations"] for record in records)
+    possible = sum(sum(record["n_hidden"]) // 2 for record in records)
+    return made / len(records), made / possible if possible else 0.0
 
 
 def is_idle(exchanges: float | None, share: float | None) -> bool:

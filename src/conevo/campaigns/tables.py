@@ -12,6 +12,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from conevo.analysis.exchange import exchanged
 from conevo.analysis.frames import SCHEMA
 from conevo.campaigns.places import Places
 from conevo.campaigns.plan import PlannedRun
@@ -102,6 +103,7 @@ def _rows(places: Places, planned: PlannedRun, cost: float) -> Iterator[tuple[st
         records = read_json_lines(path / "generations.jsonl", is_log=True)
         test = read_json(path / "test.json")
         measures = world["measures"]
+        exchanges, share = exchanged(records)
         yield (
             "runs",
             _run_row(planned, run.outline, world["name"], provenance, records)
@@ -111,7 +113,8 @@ def _rows(places: Places, planned: PlannedRun, cost: float) -> Iterator[tuple[st
                 "optimum": world["optimum"],
                 "n_robots": world["n_robots"],
                 "core_seconds": cost / len(names),
-                **_exchange(records),
+                "exchanges": exchanges,
+                "exchange_share": share,
             },
         )
         for one in measures:
@@ -160,19 +163,6 @@ def _run_row(
         "warp": provenance["warp"],
         "kernel_hash": provenance["kernel_hash"],
     }
-
-
-def _exchange(records: Sequence[Row]) -> Row:
-    """Return what was exchanged between populations; nothing of methods without thresholds for it.
-
-    A sub-population recombines with one other at most, so that half of them could be pairs.
-    """
-    if all(record["sst"] is None and record["gst"] is None for record in records):
-        return {"exchanges": None, "exchange_share": None}
-    made = sum(record["recombinations"] for record in records)
-    possible = sum(sum(record["n_hidden"]) // 2 for record in records)
-    share = made / possible if possible else 0.0
-    return {"exchanges": made / len(records), "exchange_share": share}
 
 
 def _generation_rows(name: str, record: Row) -> Iterator[tuple[str, Row]]:

@@ -33,6 +33,7 @@ def behaviours(
 
 def _text(found: dict[str, Any]) -> str:
     from conevo.cli.text import castes, number, table
+    from conevo.terms import S_SCALE
 
     def two(values: Any) -> list[str]:
         return [f"{v:.2f}" if isinstance(v, float) else str(v) for v in values]
@@ -43,7 +44,7 @@ def _text(found: dict[str, Any]) -> str:
     return "\n".join([
         f"{found['run']}: fittest team (generation {found['generation']}), {found['scenarios']} "
         f"fresh scenarios, capture time {number(found['capture_time'])}",
-        "\nShares of the windows in which a predator interacts or idles",
+        f"\nShares of the windows in which a predator interacts or idles (S: {S_SCALE})",
         table(["", *names, "S", "label"], [
             [f"predator {k}", *two(one["shares"].values()), number(one["specialization"]),
              one["label"]] for k, one in enumerate(lives)]),

@@ -3,11 +3,18 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
+from conevo.cli.text import progress
 from conevo.errors import ConevoError, UsageError
+
+if TYPE_CHECKING:
+    from conevo.runs.outline import Outline
+    from conevo.runs.run import Run
 
 __all__ = ["listing"]
 
@@ -93,8 +100,7 @@ def _runs(folder: str | None) -> Rows:
             found = find(str(path))
             runs = [found] if isinstance(found, Run) else found.stages
             outlines = [found.outline] if isinstance(found, Run) else found.outlines
-            done = sum(run.n_generations for run in runs)
-            count = f"{done}/{sum(outline.generations for outline in outlines)}"
+            count = _progress(runs, outlines)
             status, last = found.status, outlines[-1]
             task = last.task if isinstance(found, Run) else span(found)
             about = (task, last.method, last.preset, str(last.seed))
@@ -103,6 +109,17 @@ def _runs(folder: str | None) -> Rows:
         names = ("run", "world", "method", "preset", "seed", "generations", "status")
         rows.append(dict(zip(names, map(str, (path, *about, count, status)), strict=True)))
     return rows
+
+
+def _progress(runs: Sequence[Run], outlines: Sequence[Outline]) -> str:
+    """Return how far a run, or all stages of a shaping are."""
+    budgets = [outline.budget_evaluations for outline in outlines]
+    return progress(
+        sum(run.n_generations for run in runs),
+        sum(outline.generations for outline in outlines),
+        sum(run.n_evaluations for run in runs),
+        sum(budgets) if all(budgets) else 0,
+    )
 
 
 def _ranges(names: tuple[str, ...]) -> str:

@@ -10,9 +10,11 @@ from typing import Any
 
 import click
 
-from conevo.cli.summary import title
+from conevo.cli.summary import declared, title
 from conevo.cli.text import bars, castes, count, duration, neurons, number
 from conevo.runs.run import Run
+from conevo.terms import S_MEANS
+from conevo.worlds.measures import Measure
 
 __all__ = ["watching"]
 
@@ -127,6 +129,7 @@ class Display:
     def __init__(self, run: Run, heading: str = "") -> None:
         self.run, self.heading, self.pace = run, heading or title(run.outline), Pace(run)
         self.records, self.started = run.generations(), time.monotonic()
+        self.measures = declared(run.provenance)
 
     def add(self, run: Run, record: Record) -> None:
         """Show a finished generation."""
@@ -158,15 +161,17 @@ class Display:
     def _rows(self) -> Iterator[tuple[str, str]]:
         last = self.records[-1]
         for name, value in last["performance"].items():
+            measure = self.measures.get(name, Measure(name))
             series = [record["performance"][name] or 0.0 for record in self.records]
-            yield name, f"{number(value):>8}  {bars(series, 40)}  highest {number(max(series))}"
+            best = f"best {number(measure.best(series))} ({measure.about})"
+            yield name, f"{number(value):>8}  {bars(series, 40)}  {best}"
         yield (
             "fitness",
             f"best {number(last['best_fitness'])}, mean {number(last['mean_fitness'])}, "
             f"fittest team {number(last['team_fitness'])}",
         )
         yield "castes", castes(last["castes"])
-        yield "S", f"{number(last['specialization'])} (mean degree of specialization)"
+        yield "S", f"{number(last['specialization'])} (mean {S_MEANS})"
         if last["sst"] is not None or last["gst"] is not None:
             yield (
                 "thresholds",

@@ -8,10 +8,11 @@ from typing import Any
 import click
 
 from conevo.cli.summary import generations_table, spaced, title
-from conevo.cli.text import castes, count, duration, number, spread, table
+from conevo.cli.text import castes, count, duration, number, progress, spread, table
 from conevo.runs.code import changes_text
 from conevo.runs.run import Run
 from conevo.runs.shaping import Shaping
+from conevo.terms import S_SCALE
 
 __all__ = ["print_shaping_end", "shaping_text", "span", "stage_summary", "stages_test_text"]
 
@@ -93,8 +94,8 @@ def stages_test_text(results: list[dict[str, Any]]) -> str:
     last = results[0]
     return (
         f"The fittest team of stage {last['team_of']} (generation {last['generation']}), "
-        f"{last['scenarios']} fresh scenarios of each stage (mean +- standard deviation)\n"
-        + table(["stage", "task", *measures, "S", "castes"], rows)
+        f"{last['scenarios']} fresh scenarios of each stage (mean +- standard deviation; "
+        f"S: {S_SCALE})\n" + table(["stage", "task", *measures, "S", "castes"], rows)
     )
 
 
@@ -114,20 +115,21 @@ def _table(stages: list[Run]) -> str:
     measures = list(dict.fromkeys(name for tested in tests for name in tested["performance"]))
     rows = []
     for stage, (run, tested) in enumerate(zip(stages, tests, strict=True), start=1):
-        records, champion = run.generations(), run.champion
+        records, champion, outline = run.generations(), run.champion, run.outline
+        spent = records[-1]["team_evaluations"] if records else 0
         spreads = [tested["performance"].get(name) for name in measures]
         rows.append(
             [
                 str(stage),
                 run.outline.task,
                 run.status,
-                f"{len(records)}/{run.outline.generations}",
-                count(records[-1]["team_evaluations"] if records else 0),
+                progress(len(records), outline.generations, spent, outline.budget_evaluations),
+                count(spent),
                 "-" if champion is None else str(champion.generation),
                 *("-" if s is None else spread(s, tested["scenarios"]) for s in spreads),
             ]
         )
-    head = ["stage", "task", "status", "generations", "evaluations", "champion of", *measures]
+    head = ["stage", "task", "status", "done", "evaluations", "champion of", *measures]
     return table(head, rows)
 
 

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import json
 import shlex
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import click
 
+from conevo.analysis.exchange import exchanged, per_generation
 from conevo.cli.text import (
     castes,
     count,
@@ -17,6 +19,7 @@ from conevo.cli.text import (
     n_finite,
     neurons,
     number,
+    progress,
     spread,
     table,
 )
@@ -25,9 +28,14 @@ from conevo.runs.code import changes_text, sessions_of
 from conevo.runs.outline import Outline
 from conevo.runs.run import Run
 from conevo.runs.shrinkage import shrinkage
+from conevo.terms import S_SCALE
+from conevo.worlds.measures import Measure
 
 __all__ = [
+    "declared",
+    "exchange_text",
     "generations_table",
+    "measures_text",
     "next_commands",
     "print_end",
     "run_text",
@@ -68,6 +76,7 @@ def run_text(run: Run, n_rows: int) -> str:
     if changed := about.get("changed"):
         parts.append(f"other than preset {run.outline.preset}: {', '.join(changed)}")
     if records:
+        parts += [*exchange_text(records), *measures_text(about)]
         parts += ["", generations_table(spaced(records, n_rows))]
     if run.test_result:
         parts += ["", test_text(run.test_result)]
@@ -76,6 +85,24 @@ def run_text(run: Run, n_rows: int) -> str:
     if run.status == "interrupted":
         parts += ["", f"Continue it with: conevo resume {run.path}"]
     return "\n".join(parts)
+
+
+def declared(about: Mapping[str, Any]) -> dict[str, Measure]:
+    """Return the measures that a run's provenance declares, by name."""
+    found = (about.get("world") or {}).get("measures", ())
+    return {one["name"]: Measure(**one) for one in found}
+
+
+def measures_text(about: Mapping[str, Any]) -> list[str]:
+    """Return units and directions of the measures of a run, of which conevo 0.1.0 kept nothing."""
+    named = ", ".join(measure.heading for measure in declared(about).values())
+    return [f"measures: {named}; S: {S_SCALE}"] if named else []
+
+
+def exchange_text(records: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Return what the populations of CONE exchanged; nothing of methods that never do."""
+    text = per_generation(*exchanged(records))
+    return [f"recombined between populations: {text} per generation"] if text else []
 
 
 def spaced(records: list[dict[str, Any]], n: int) -> list[dict[str, Any]]:
@@ -125,7 +152,10 @@ def test_text(result: dict[str, Any]) -> str:
             ]
         )
     head = ["", "generation", *measures, "S"]
-    lines = [f"Testing phase, {n} fresh scenarios (mean +- standard deviation)", table(head, rows)]
+    lines = [
+        f"Testing phase, {n} fresh scenarios (mean +- standard deviation; S: {S_SCALE})",
+        table(head, rows),
+    ]
     lines += [
         f"castes of the {row[0]}: {castes(tested['castes'])}"
         for row, tested in zip(rows, teams.values(), strict=True)
@@ -222,12 +252,11 @@ def _state(run: Run) -> str:
         state += f" {about['finished']} (stopped by: {about['stopped_by']})"
         changed = run.changed_files
         state += f"; CHANGED SINCE: {', '.join(changed)}" if changed else ""
-    spent = f"{len(records)} of {run.outline.generations} generations"
+    planned, budget = run.outline.generations, run.outline.budget_evaluations
+    evaluations = records[-1]["team_evaluations"] if records else 0
+    done = progress(len(records), planned, evaluations, budget)
     if records:
-        last = records[-1]
         seconds = sum(record["seconds"] for record in records)
-        spent += (
-            f", {count(last['team_evaluations'])} team evaluations, "
-            f"{count(last['team_steps'])} team-steps, {duration(seconds)}"
-        )
-    return f"{run.path}: {state}\n{spent}"
+        done += "" if "evaluations" in done else f", {count(evaluations)} team evaluations"
+        done += f", {count(records[-1]['team_steps'])} team-steps, {duration(seconds)}"
+    return f"{run.path}: {state}\n{done}"

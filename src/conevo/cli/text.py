@@ -17,6 +17,7 @@ __all__ = [
     "mean",
     "n_finite",
     "number",
+    "progress",
     "spread",
     "table",
 ]
@@ -66,6 +67,22 @@ def count(value: int) -> str:
 def generations(number: int) -> str:
     """Return so many generations in words: "1 generation", "5 generations"."""
     return f"{count(number)} generation{'' if number == 1 else 's'}"
+
+
+def progress(done: int, planned: int, spent: int, budget: int) -> str:
+    """Return how far a run is: of its generations, or of its budget if that ends it sooner.
+
+    "5 of 30 generations", "13 generations, 49,920 of 50,000 evaluations".
+
+    Args:
+        done: finished generations.
+        planned: generations at most.
+        spent: team evaluations.
+        budget: team evaluations at most, 0 for any number.
+    """
+    if budget and spent / budget > done / planned:
+        return f"{generations(done)}, {count(spent)} of {count(budget)} evaluations"
+    return f"{count(done)} of {generations(planned)}"
 
 
 def duration(seconds: float) -> str:

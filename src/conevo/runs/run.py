@@ -190,6 +190,11 @@ class Run:
         """Number of finished generations."""
         return self._store.count_generations()
 
+    @property
+    def n_evaluations(self) -> int:
+        """Number of team evaluations of the finished generations."""
+        return self._store.count_evaluations()
+
     def tables(self) -> dict[str, Any]:
         """Return the three tables of its configuration as they are written; loads no world."""
         return self._store.read_tables()

@@ -38,9 +38,11 @@ from conevo.reading import (
     MOST_LOG,
     MOST_TOML,
     DamagedFile,
+    parse_json,
     read_bytes,
     read_json,
     read_json_lines,
+    read_last_line,
     read_toml,
     whole_lines,
 )
@@ -218,6 +220,16 @@ class Store(Directory):
             if not (line.startswith(b'{"generation": %d,' % number) and line.endswith(b"}")):
                 return len(self.read_generations())
         return len(lines)
+
+    def count_evaluations(self) -> int:
+        """Return the number of team evaluations that the finished generations took.
+
+        Raises:
+            UsageError: the last line is damaged.
+        """
+        path = self.path / GENERATIONS
+        line = read_last_line(path) if os.path.lexists(path) else b""
+        return int(parse_json(line, str(path))["team_evaluations"]) if line else 0
 
     def cut_generations(self, count: int) -> list[Record]:
         """Keep the log's first ``count`` lines and return them.

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["NON_SPECIALIZED", "castes", "degree", "label"]
+from conevo.terms import NON_SPECIALIZED
 
-NON_SPECIALIZED = "non-specialized"
+__all__ = ["NON_SPECIALIZED", "castes", "degree", "label"]
 
 
 def degree(switches: npt.ArrayLike, counts: npt.ArrayLike) -> npt.NDArray[np.floating[Any]]:

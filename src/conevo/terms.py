@@ -1,0 +1,13 @@
+"""Terms of the thesis, worded as they are printed everywhere."""
+
+from __future__ import annotations
+
+__all__ = ["NON_SPECIALIZED", "S_MEANS", "S_SCALE"]
+
+NON_SPECIALIZED = "non-specialized"
+"""The caste of robots that are specialized to nothing."""
+
+S_SCALE = "0 = always the same action, 1 = switches all the time"
+"""Which way S goes: the thesis calls it the degree of specialization, and 0 is a specialist."""
+
+S_MEANS = f"degree of specialization S ({S_SCALE})"
