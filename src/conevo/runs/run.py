@@ -374,7 +374,13 @@ class Run:
             self._extend(self.config.of_length(length), threads, is_later=True)
         return self
 
-    def extend_as(self, config: RunConfig, *, threads: int | None = None) -> Run:
+    def extend_as(
+        self,
+        config: RunConfig,
+        *,
+        threads: int | None = None,
+        accept_other_code: bool = False,
+    ) -> Run:
         """Give the run the length that another configuration has; ``resume`` carries it on.
 
         It may be one at which the run ends where it has ended.
@@ -382,12 +388,14 @@ class Run:
         Args:
             config: the run's own but for its length.
             threads: CPU threads, all by default.
+            accept_other_code: as for ``resume``.
 
         Raises:
             UsageError: as ``extend``, or the configuration is of another run.
             EnvironmentFailure: the machine refused.
         """
-        self.refuse_other_code()
+        if not accept_other_code:
+            self.refuse_other_code()
         with self._open():
             self._extend(config, threads)
         return self
