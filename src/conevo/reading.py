@@ -288,9 +288,10 @@ def check(value: object, model: type, problem: str) -> None:
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         field = ".".join(map(str, first["loc"]))
-        message = first["msg"].replace("Input should be", "must be")
-        given = "" if first["type"] == "missing" else f" = {shown(first['input'])}"
-        raise DamagedFile(f"{problem}: {field}{given}: {message}") from error
+        if first["type"] == "missing":
+            raise DamagedFile(f"{problem}: {field} is missing") from error
+        message = first["msg"].replace("Input should", "must")
+        raise DamagedFile(f"{problem}: {field} = {shown(first['input'])}: {message}") from error
     except RecursionError:
         raise DamagedFile(f"{problem}: it is nested too deeply") from None
 

@@ -12,7 +12,9 @@ import pytest
 import conevo
 from conevo.errors import EnvironmentFailure, UsageError
 from conevo.runs.config import resolve
+from conevo.runs.provenance import describe_machine
 from conevo.runs.store import Store, create
+from replay.followed import record
 from runs.tiny import command, evolve_tiny, spawn, wait_for
 
 HOLD = """
@@ -27,7 +29,9 @@ sys.stdin.read()
 
 def fresh_store(path: Path) -> Store:
     config = resolve("rover/complex-1", preset="smoke")
-    return create(path, config, {"run_id": config.run_id})
+    texts = ("preset", "command", "kernel_hash", "created")
+    about = dict.fromkeys(texts, "") | describe_machine("cpu")
+    return create(path, config, about | {"run_id": config.run_id, "sessions": []})
 
 
 def test_a_new_directory_holds_the_resolved_configuration(tmp_path: Path) -> None:
@@ -103,27 +107,37 @@ def test_readers_do_not_disturb_a_working_process(tmp_path: Path) -> None:
 def test_a_torn_last_line_does_not_count(tmp_path: Path) -> None:
     store = fresh_store(tmp_path / "run")
     for generation in range(3):
-        store.append({"generation": generation})
+        store.append(record(generation))
     file = store.path / "generations.jsonl"
-    for length in range(1, 18):
+    for length in (*range(1, 18), 100, 380):
         whole = file.read_bytes()
-        file.write_bytes(whole + b'{"generation": 3}\n'[:length])
+        file.write_bytes(whole + json.dumps(record(3))[:length].encode())
         assert [r["generation"] for r in store.read_generations()] == [0, 1, 2]
         assert [r["generation"] for r in store.cut_generations(2)] == [0, 1]
-        store.append({"generation": 2})
+        store.append(record(2))
         assert file.read_bytes() == whole
 
 
 def test_a_damaged_line_in_the_middle_is_named(tmp_path: Path) -> None:
     store = fresh_store(tmp_path / "run")
-    (store.path / "generations.jsonl").write_bytes(b'{"generation": 0}\n{"gen\n{"generation": 2}\n')
-    with pytest.raises(UsageError, match=r"generations\.jsonl is damaged in line 2"):
-        store.read_generations()
+    first = json.dumps(record(0))
+    for second, words in (
+        ('{"gen', "Unterminated string"),
+        (json.dumps(record(2)), "generation 1 expected"),
+        (json.dumps(record(1, seconds="2")), "seconds = '2': must be a valid number"),
+        (json.dumps(record(1)).replace("n_hidden", "n_hiddem"), "n_hidden is missing"),
+        ("[" * 50_000, "nested too deeply"),
+    ):
+        (store.path / "generations.jsonl").write_text(f"{first}\n{second}\n{first}\n")
+        with pytest.raises(
+            UsageError, match=rf"generations\.jsonl is damaged in line 2: .*{words}"
+        ):
+            store.read_generations()
 
 
 def test_a_log_shorter_than_the_checkpoint_is_refused(tmp_path: Path) -> None:
     store = fresh_store(tmp_path / "run")
-    store.append({"generation": 0})
+    store.append(record(0))
     with pytest.raises(UsageError, match="has 1 generations, the checkpoint is at 2"):
         store.cut_generations(2)
 

@@ -25,4 +25,5 @@ def equip(run: Run, threads: int | None = None) -> tuple[Team, Lab]:
             f"{run.path} was made with other kernels ({about['kernel_hash']}, here "
             f"{lab.rollout.kernel_hash}): its team would not behave as it did"
         )
+    lab.refuse_other_team(team, run.path)
     return team, lab

@@ -14,9 +14,12 @@ from typing import Any
 
 from conevo.analysis.exchange import exchanged
 from conevo.analysis.frames import SCHEMA
+from conevo.analysis.study_record import Study
+from conevo.campaigns.ended import read_ended
 from conevo.campaigns.places import Places
 from conevo.campaigns.plan import PlannedRun
-from conevo.reading import read_json, read_json_lines
+from conevo.errors import ConevoError
+from conevo.reading import DamagedFile, read_json
 from conevo.runs.code import changes_text, sessions_of
 from conevo.runs.directory import as_json
 from conevo.runs.drafts import draft_of
@@ -35,13 +38,17 @@ Row = dict[str, Any]
 def is_sealed(places: Places, finished: Sequence[PlannedRun]) -> bool:
     """Whether the tables are those of exactly these runs."""
     path = places.tables / MANIFEST
-    return path.is_file() and read_json(path) == _manifest(finished)
+    try:
+        return path.is_file() and read_json(path) == _manifest(finished) | {"left_out": {}}
+    except DamagedFile:
+        return False
 
 
 def seal_tables(places: Places, finished: Sequence[PlannedRun], spent: Mapping[str, float]) -> None:
     """Make the tables of these runs, unless they are there.
 
-    A kill leaves the tables that were there before, or none.
+    A run whose files are damaged is left out, and the manifest shows which and why; it is looked at
+    again the next time. A kill leaves the tables that were there before, or none.
 
     Args:
         places: of the campaign.
@@ -49,7 +56,7 @@ def seal_tables(places: Places, finished: Sequence[PlannedRun], spent: Mapping[s
         spent: core seconds by label, as far as the ledger knows them.
 
     Raises:
-        UsageError: a file of a run is damaged.
+        UsageError: every run is damaged.
         EnvironmentFailure: they cannot be written.
     """
     if is_sealed(places, finished):
@@ -59,10 +66,18 @@ def seal_tables(places: Places, finished: Sequence[PlannedRun], spent: Mapping[s
     with writing(places.tables), draft_of(places.tables) as draft:
         draft.mkdir()
         files = {name: (draft / f"{name}.jsonl").open("w", encoding="utf-8") for name in SCHEMA}
+        left_out: dict[str, str] = {}
         for planned in finished:
             cost = max(spent.get(planned.label, 0.0), _last_cost(places, planned.label))
-            for table, row in _rows(places, planned, cost):
+            try:
+                rows = list(_rows(places, planned, cost))
+            except ConevoError as error:
+                left_out[planned.label] = str(error)
+                continue
+            for table, row in rows:
                 files[table].write(json.dumps(row, allow_nan=False) + "\n")
+        if len(left_out) == len(finished) > 0:
+            raise DamagedFile(next(iter(left_out.values())))
         for file in files.values():
             file.close()
         for table, columns in SCHEMA.items():
@@ -72,7 +87,7 @@ def seal_tables(places: Places, finished: Sequence[PlannedRun], spent: Mapping[s
                 f"columns={columns})) TO {_quoted(target)} (FORMAT parquet, COMPRESSION zstd)"
             )
             source.unlink()
-        replace_file(draft / MANIFEST, as_json(_manifest(finished)))
+        replace_file(draft / MANIFEST, as_json(_manifest(finished) | {"left_out": left_out}))
         shutil.rmtree(places.tables, ignore_errors=True)
         draft.rename(places.tables)
         sync_directory(places.root)
@@ -88,8 +103,8 @@ def _quoted(path: Path) -> str:
 
 def _last_cost(places: Places, label: str) -> float:
     """Return the core seconds of a run's last worker, which may have known no coordinator."""
-    ended = places.ended(label)
-    return float(read_json(ended)["core_seconds"]) if ended.is_file() else 0.0
+    ended = read_ended(places.ended(label))
+    return ended["core_seconds"] if ended is not None else 0.0
 
 
 def _rows(places: Places, planned: PlannedRun, cost: float) -> Iterator[tuple[str, Row]]:
@@ -98,10 +113,10 @@ def _rows(places: Places, planned: PlannedRun, cost: float) -> Iterator[tuple[st
     for name in names:
         path = places.run(name)
         run = Run(path)
-        provenance = run.provenance
+        provenance, records, test = run.provenance, run.generations(), run.test_result
+        if test is None or not records:
+            raise DamagedFile(f"{path} is sealed, but lacks its generations or its testing phase")
         world = provenance.get("world") or describe_world(run.config.build_world())  # 0.1.0: none
-        records = read_json_lines(path / "generations.jsonl", is_log=True)
-        test = read_json(path / "test.json")
         measures = world["measures"]
         exchanges, share = exchanged(records)
         yield (
@@ -130,7 +145,7 @@ def _rows(places: Places, planned: PlannedRun, cost: float) -> Iterator[tuple[st
         for record in records:
             yield from _generation_rows(name, record)
         if places.study(name).is_file():
-            yield from _study_rows(name, read_json(places.study(name)))
+            yield from _study_rows(name, read_json(places.study(name), Study))
 
 
 def _run_row(

@@ -23,6 +23,7 @@ from conevo.campaigns.admission import admit_code
 from conevo.campaigns.inputs import located
 from conevo.campaigns.places import Places
 from conevo.campaigns.plan import PlannedRun
+from conevo.campaigns.records import PlannedLine
 from conevo.errors import ConevoError, EnvironmentFailure, UsageError
 from conevo.reading import read_json_lines
 from conevo.runs.directory import as_json, kind_of
@@ -47,13 +48,10 @@ def planned_runs(root: Path) -> dict[str, PlannedRun]:
         EnvironmentFailure: it cannot be read.
     """
     path = Places(root).runs
-    try:
-        runs = [
-            PlannedRun(**{key: _frozen(value) for key, value in line.items()})
-            for line in read_json_lines(path)
-        ]
-    except TypeError as error:
-        raise UsageError(f"{path} is damaged: {error}") from error
+    runs = [
+        PlannedRun(**{key: _frozen(line[key]) for key in PlannedLine.__annotations__})
+        for line in read_json_lines(path, PlannedLine)
+    ]
     if not runs:
         raise UsageError(f"{path} is damaged: it lists no run")
     return {run.label: run.mapped(lambda value: located(value, root)) for run in runs}

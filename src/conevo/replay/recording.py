@@ -56,6 +56,7 @@ def record(
     team = champion
     if generation is not None and generation != champion.generation:
         team = run.team_again(generation, lab, progress)
+        lab.refuse_other_team(team, run.path)
     scenario = fold(run.config.run.seed, "test", epoch)
     if like is not None:
         _refuse_other(run, lab.world, like)

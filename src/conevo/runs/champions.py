@@ -32,6 +32,28 @@ class Team:
     specialization: npt.NDArray[np.float64]
 
     @property
+    def problem(self) -> str:
+        """What makes this no team, nothing if it is one; for teams that were read from a file."""
+        genes, active = self.genes, self.active
+        n = (len(genes),)
+        if genes.ndim != 3 or active.shape != genes.shape[:2] or not genes.size:
+            return f"genes of shape {genes.shape} in slots of shape {active.shape}"
+        if not self.fitness.shape == self.specialization.shape == n:
+            return f"fitness or specialization not of {n[0]} robots"
+        wanted = (np.float32, np.bool_, np.float64, np.float64)
+        arrays: tuple[npt.NDArray[np.generic], ...] = (
+            genes,
+            active,
+            self.fitness,
+            self.specialization,
+        )
+        if any(array.dtype != kind for array, kind in zip(arrays, wanted, strict=True)):
+            return "numbers of another type"
+        if not (np.abs(genes) <= 1).all() or self.generation < 0:
+            return "genes outside [-1, 1], or a generation below 0"
+        return ""
+
+    @property
     def mean_fitness(self) -> float:
         """Mean credit of the robots."""
         return float(self.fitness.mean())

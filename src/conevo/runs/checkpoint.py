@@ -13,9 +13,10 @@ import io
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_type_hints
 
-from conevo.reading import DamagedFile, read_arrays
+from conevo.errors import shown
+from conevo.reading import DamagedFile, check, read_arrays
 from conevo.runs.durable import replace_file
 
 __all__ = ["UnusableFile", "content_digest", "load", "save"]
@@ -60,6 +61,10 @@ def load(path: Path, record_class: type[Record], identity: Mapping[str, str]) ->
         UnusableFile: the file is damaged, or belongs to something else than ``identity``.
         EnvironmentFailure: the file cannot be read.
     """
+    import numpy as np
+
+    from conevo.runs.records import FileText
+
     try:
         arrays = read_arrays(path, kind="a file of conevo")
     except DamagedFile as error:
@@ -68,6 +73,7 @@ def load(path: Path, record_class: type[Record], identity: Mapping[str, str]) ->
         about = json.loads(arrays.pop("about").tobytes())
         arrays = {name.removeprefix("field."): value for name, value in arrays.items()}
         is_whole = about.pop("digest") == _digest(about, arrays)
+        check(about, FileText, "its text")
         version, found, fields = about["format"], about["identity"], about["fields"]
     except Exception as error:  # whatever a damaged file makes its readers say
         reason = " ".join(str(error).split()) or type(error).__name__
@@ -82,6 +88,11 @@ def load(path: Path, record_class: type[Record], identity: Mapping[str, str]) ->
     expected = {field.name for field in dataclasses.fields(record_class)}  # type: ignore[arg-type]
     if version != FORMAT or expected != fields.keys() | arrays.keys():
         raise UnusableFile(f"{path} was written by another version of conevo")
+    for name, hint in get_type_hints(record_class).items():
+        value = arrays.get(name, fields.get(name))
+        kinds = {float: (float, int)}.get(hint, (hint if isinstance(hint, type) else np.ndarray,))
+        if type(value) not in kinds:
+            raise UnusableFile(f"{path} is damaged: {name} is {shown(value)}")
     return record_class(**fields, **arrays)
 
 

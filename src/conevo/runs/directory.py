@@ -175,7 +175,9 @@ class Directory:
 
     def read_seal(self) -> dict[str, str]:
         """Return the digests of all files when the directory was sealed, by name."""
-        files: dict[str, str] = read_json(self.path / SEAL)["files"]
+        from conevo.runs.records import Seal
+
+        files: dict[str, str] = read_json(self.path / SEAL, Seal)["files"]
         return files
 
     def check_seal(self) -> list[str]:

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+import numpy as np
 
 from conevo.evolution.inheritance import hand_on
 from conevo.evolution.methods.registry import METHODS
 from conevo.evolution.protocol import Layout, Method, State
+from conevo.reading import DamagedFile
+from conevo.runs.champions import Team
 from conevo.runs.config import RunConfig
 from conevo.runs.evaluation import Evaluate, make_evaluator
 from conevo.runs.loop import check_budget, price
@@ -91,6 +96,40 @@ class Lab:
                 credit=config.run.credit,
             ),
         )
+
+    def refuse_other_team(self, team: Team, path: Path) -> None:
+        """Raise DamagedFile if a team, of the run at ``path``, cannot play in this world."""
+        layout = layout_of(self.world)
+        fits = (layout.n_robots, layout.max_hidden, layout.n_genes)
+        if team.genes.shape != fits:
+            raise DamagedFile(
+                f"{path}: a team of {team.genes.shape} robots, neurons and genes cannot play "
+                f"{self.config.task}, which has {fits}"
+            )
+
+    def refuse_other_state(self, state: State, path: Path) -> None:
+        """Raise DamagedFile if a state, of the run at ``path``, is not one of this method's here.
+
+        It begins a generation, and has the arrays and the seed of the first one.
+        """
+        first = self.method.init(layout_of(self.world), self.config.run.seed)
+        for field in fields(first):
+            right, found = getattr(first, field.name), getattr(state, field.name)
+            if isinstance(right, np.ndarray):
+                # There is neither an elite nor partners before the first generation is graded.
+                length = {"elite": -1, "partners": -2}.get(field.name)
+                is_right = right.shape[:length] == found.shape[:length]
+                is_right &= right.ndim == found.ndim and right.dtype == found.dtype
+                if field.name in ("genes", "partners", "fittest_genes"):
+                    is_right &= bool((np.abs(found) <= 1).all())
+            elif field.name in ("root", "phase"):
+                is_right = right == found
+            else:
+                is_right = not isinstance(right, int) or found >= 0
+            if not is_right:
+                raise DamagedFile(f"{path}: {field.name} of its checkpoint is not one of this run")
+        if not ((state.elite >= 0) & (state.elite < state.genes.shape[2])).all():
+            raise DamagedFile(f"{path}: elite of its checkpoint names genotypes that are not there")
 
     def first_state(self, ancestor: State | None = None) -> State:
         """Return the state before generation 0, after checking that it can be paid.

@@ -438,12 +438,6 @@ class Run:
         if champion is None:
             raise UsageError(f"{self.path} has no finished generation yet, so no team to test")
         lab = self._equip(threads)
-        fits = (lab.world.n_robots, lab.world.controller.max_hidden, lab.world.controller.n_genes)
-        if champion.genes.shape != fits:
-            raise UsageError(
-                f"{self.path}: a team of {champion.genes.shape} robots, neurons and genes cannot "
-                f"play {self.config.task}, which has {fits}"
-            )
         return self._test(lab, champion, scenarios, seed)
 
     def _test(
@@ -451,6 +445,7 @@ class Run:
     ) -> Record:
         from conevo.runs.testing import test_team
 
+        lab.refuse_other_team(team, self.path)
         return test_team(
             lab.rollout,
             lab.world,

@@ -49,6 +49,7 @@ def evolve_on(
     state, problem = store.load_checkpoint(method)
     if state is None:
         state = store.load_origin(method) or lab.first_state()
+    lab.refuse_other_state(state, store.path)
     if problem and remark is not None:
         remark(f"{problem}; going on from generation {state.generation} instead")
     records = store.cut_generations(state.generation)

@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING, Any
 import tomli_w
 
 from conevo.errors import UsageError
-from conevo.reading import read_bytes, read_toml
+from conevo.reading import check, read_bytes, read_toml
 from conevo.runs.code import last_code, refuse_other_code, sessions_of
 from conevo.runs.directory import CONFIG, SHAPING, Directory, appearing, refuse_existing
 from conevo.runs.durable import replace_file
@@ -369,10 +369,13 @@ def label(configs: Sequence[RunConfig]) -> str:
 
 def _read(path: Path) -> dict[str, Any]:
     """Return what a shaping file says, with settings and outline of every stage; loads no world."""
+    from conevo.runs.records import ShapingText
+
     try:
         about = read_toml(path)
         if about["format"] != FORMAT:
             raise UsageError(f"{path} was written by another version of conevo")
+        check(about, ShapingText, f"{path} is damaged")
         stages, run_ids = about["stages"], about["run_ids"]
         tasks = about.get("tasks", ["" for _ in stages])
         settings = [

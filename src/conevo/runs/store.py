@@ -136,8 +136,18 @@ class Store(Directory):
         return config.of_length(extension["length"]) if extension else config
 
     def read_provenance(self) -> Record:
-        """Return versions, machine and sessions."""
-        about, extension = read_json(self.path / PROVENANCE), self._read_extension()
+        """Return versions, machine and sessions.
+
+        Raises:
+            DamagedFile: it is damaged, or lacks the end of a run that is sealed.
+        """
+        from conevo.runs.records import Provenance
+
+        ending = ("finished", "stopped_by") if self.is_finished else ()  # written before the seal
+        about, extension = read_json(self.path / PROVENANCE, Provenance), self._read_extension()
+        for key in ending:
+            if key not in about:
+                raise DamagedFile(f"{self.path / PROVENANCE} is damaged: {key} is missing")
         if extension is None or about.get("run_id") == extension["run_id"]:
             return about
         kept = {k: v for k, v in about.items() if k not in ("finished", "stopped_by")}
@@ -185,7 +195,11 @@ class Store(Directory):
     def _read_extension(self) -> Record | None:
         """Return the extension that counts but is not in all files yet, None if there is none."""
         path = self.path / EXTENSION
-        return read_json(path) if path.is_file() and not self.is_finished else None
+        if not path.is_file() or self.is_finished:
+            return None
+        from conevo.runs.records import Extension
+
+        return read_json(path, Extension)
 
     # --- generations ------------------------------------------------------------------------------
 
@@ -199,10 +213,12 @@ class Store(Directory):
         Raises:
             UsageError: a line in the middle is damaged.
         """
+        from conevo.runs.records import Generation
+
         path = self.path / GENERATIONS
-        records = read_json_lines(path, is_log=True) if os.path.lexists(path) else []
+        records = read_json_lines(path, Generation, is_log=True) if os.path.lexists(path) else []
         for number, record in enumerate(records):
-            if record.get("generation") != number:
+            if record["generation"] != number:
                 raise DamagedFile(
                     f"{path} is damaged in line {number + 1}: generation {number} expected"
                 )
@@ -377,7 +393,9 @@ class Store(Directory):
 
     def read_test(self) -> Record | None:
         """Return the testing phase, None if the run has not come to it."""
-        return read_json(self.path / TEST) if os.path.lexists(self.path / TEST) else None
+        from conevo.runs.records import Testing
+
+        return read_json(self.path / TEST, Testing) if os.path.lexists(self.path / TEST) else None
 
     def seal(self) -> None:
         """Close the run: drop the older checkpoint, write the digests of all files."""

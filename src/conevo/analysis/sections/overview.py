@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from typing_extensions import TypedDict
+
 from conevo.analysis.exhibits import Column, Section, Table, number, plain
 from conevo.analysis.frames import Tables
+from conevo.errors import ConevoError
 from conevo.reading import parse_toml, read_json, read_json_lines, read_text
 
 __all__ = ["Campaign", "overview", "read_campaign", "repetition"]
@@ -24,6 +27,7 @@ class Campaign:
         plan: text of the plan, empty without one.
         planned: label of every run -> what the plan says of it.
         failed: label -> origin and message of runs that ended without a result.
+        left_out: run or file -> why it could not be read.
     """
 
     name: str
@@ -32,6 +36,15 @@ class Campaign:
     plan: str
     planned: dict[str, dict[str, Any]]
     failed: dict[str, dict[str, Any]]
+    left_out: dict[str, str] = field(default_factory=dict)
+
+
+class Ending(TypedDict):
+    """What is shown of ``ended/LABEL.json``, see ``campaigns.ended``."""
+
+    status: str
+    origin: str
+    message: str
 
 
 def read_campaign(root: Path) -> Campaign:
@@ -40,7 +53,17 @@ def read_campaign(root: Path) -> Campaign:
     text = read_text(plan) if plan.is_file() else ""
     head = parse_toml(text, str(plan)).get("campaign", {})
     lines = read_json_lines(listed) if listed.is_file() else []
-    endings = {path.stem: read_json(path) for path in sorted((root / "ended").glob("*.json"))}
+    manifest = root / "tables" / "tables.json"
+    sealed = read_json(manifest) if manifest.is_file() else {}
+    left_out = {f"runs/{label}": why for label, why in sealed.get("left_out", {}).items()}
+    endings: dict[str, dict[str, Any]] = {}
+    for path in sorted((root / "ended").glob("*.json")):
+        try:
+            endings[path.stem] = read_json(path, Ending)
+        except ConevoError as error:
+            left_out[f"ended/{path.name}"] = str(error)
+    # Of paths below the campaign: the same report wherever it is.
+    left_out = {file: why.replace(f"{root}/", "") for file, why in left_out.items()}
     name = str(head.get("name", root.resolve().name))
     return Campaign(
         name=name,
@@ -48,7 +71,8 @@ def read_campaign(root: Path) -> Campaign:
         produces=tuple(map(str, head.get("produces", ()))),
         plan=text,
         planned={str(line["label"]): line for line in lines},
-        failed={k: v for k, v in endings.items() if v.get("status") != "finished"},
+        failed={k: v for k, v in endings.items() if v["status"] != "finished"},
+        left_out=left_out,
     )
 
 
@@ -72,6 +96,9 @@ def overview(tables: Tables, campaign: Campaign) -> Section:
     exhibits = [_cost(tables), _versions(tables)]
     if failed:
         exhibits.insert(1, _failures(failed, campaign))
+    if campaign.left_out:
+        exhibits.insert(1, _left_out(campaign.left_out))
+        text.append(f"What could not be read is left out: {len(campaign.left_out):,}, see below.")
     return Section("What was run", text, exhibits)
 
 
@@ -172,6 +199,13 @@ def _failures(failed: dict[str, dict[str, Any]], campaign: Campaign) -> Table:
         "Origin: the machine refused, the request could not be carried out, or the program failed."
     )
     return Table("failures", "Runs that failed", note, columns, rows, is_open=len(rows) <= 12)
+
+
+def _left_out(left_out: dict[str, str]) -> Table:
+    columns = [Column("file", "run or file", plain), Column("why", "reason", plain, is_wide=True)]
+    rows = [{"file": file, "why": why} for file, why in left_out.items()]
+    note = "Damaged files; of a damaged run nothing counts below."
+    return Table("left-out", "What could not be read", note, columns, rows)
 
 
 def _versions(tables: Tables) -> Table:

@@ -1,0 +1,58 @@
+"""What ``studies/NAME.json`` holds, as a model that it is checked against when it is read."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from annotated_types import Ge
+from typing_extensions import TypedDict
+
+__all__ = ["Study"]
+
+Count = Annotated[int, Ge(0)]
+
+
+class Score(TypedDict):
+    """What a team of a comparison reached in one scenario."""
+
+    study: str
+    team: str
+    measure: str
+    scenario: Count
+    value: float | None
+
+
+class Robot(TypedDict):
+    """A robot of the fittest team."""
+
+    robot: Count
+    caste: str
+    specialization: float | None
+    fitness: float | None
+    hidden: Count
+
+
+class Action(TypedDict):
+    """How often a robot executed an action."""
+
+    robot: Count
+    action: str
+    count: Count
+
+
+class Behaviour(TypedDict):
+    """How many predators or captures are of a kind."""
+
+    kind: str
+    behaviour: str
+    count: Count
+
+
+class Study(TypedDict):
+    """See ``studies.study``."""
+
+    scores: list[Score]
+    robots: list[Robot]
+    actions: list[Action]
+    metrics: dict[str, float | None]
+    behaviours: list[Behaviour]

@@ -1,0 +1,222 @@
+"""What the JSON files of a run hold, as models that they are checked against where they are read.
+
+Keys that a model does not have are left alone: a later version may write them. What may be missing
+is what an earlier one did not write. None stands for a number that was not finite.
+"""
+
+from __future__ import annotations
+
+from typing import (
+    Annotated,
+    NotRequired,  # pydantic reads typing's from Python 3.12 on
+)
+
+from annotated_types import Ge, Le, MinLen
+from pydantic import AllowInfNan, StringConstraints
+from typing_extensions import TypedDict
+
+__all__ = [
+    "Extension",
+    "FileText",
+    "Generation",
+    "Provenance",
+    "RunId",
+    "Seal",
+    "ShapingText",
+    "Testing",
+]
+
+Count = Annotated[int, Ge(0), Le(2**63 - 1)]
+Seconds = Annotated[float, Ge(0)]
+Finite = float | None
+RunId = Annotated[str, StringConstraints(pattern="^[0-9a-f]{12}$")]
+Digest = Annotated[str, StringConstraints(pattern="^[0-9a-f]{32}$")]
+
+
+class MeasureHeader(TypedDict):
+    """A measure of task performance, see ``worlds.measures``."""
+
+    name: str
+    unit: str
+    larger_is_better: bool
+
+
+class WorldHeader(TypedDict):
+    """What is known of a world without loading it."""
+
+    name: str
+    environment: str
+    measures: Annotated[list[MeasureHeader], MinLen(1)]
+    castes: list[str]
+    n_robots: Annotated[int, Ge(1)]
+    iterations: Annotated[int, Ge(1)]
+    optimum: Finite
+
+
+class Session(TypedDict):
+    """One time that a run was carried on."""
+
+    started: str
+    from_generation: Count
+    threads: Annotated[int, Ge(1)]
+    conevo: NotRequired[str]
+    code: NotRequired[str]
+    numpy: NotRequired[str]
+    warp: NotRequired[str]
+    device: NotRequired[str]
+
+
+class Origin(TypedDict):
+    """The run whose populations a run began with."""
+
+    path: str
+    run_id: RunId
+    generation: Count
+    checkpoint: Digest
+
+
+class Provenance(TypedDict):
+    """``provenance.json``: what made a run."""
+
+    run_id: RunId
+    preset: str
+    command: str
+    device: str
+    kernel_hash: str
+    created: str
+    conevo: str
+    python: str
+    numpy: str
+    warp: str
+    platform: str
+    cpu: str
+    sessions: list[Session]
+    code: NotRequired[str]
+    world: NotRequired[WorldHeader]
+    origin: NotRequired[Origin]
+    finished: NotRequired[str]
+    stopped_by: NotRequired[str]
+
+
+class Length(TypedDict):
+    """What ends a run, see ``RunSettings``."""
+
+    generations: Annotated[int, Ge(1)]
+    budget_evaluations: Count
+    target: Finite
+
+
+class Extension(TypedDict):
+    """``extension.json``: another length that a run is being given."""
+
+    run_id: RunId
+    length: Length
+    config: str
+    changed: list[str]
+    former: dict[str, object]
+
+
+class Generation(TypedDict):
+    """A line of ``generations.jsonl``."""
+
+    generation: Count
+    team_evaluations: Count
+    team_steps: Count
+    seconds: Seconds
+    best_fitness: Finite
+    mean_fitness: Finite
+    team_fitness: Finite
+    performance: Annotated[dict[str, Finite], MinLen(1)]
+    castes: dict[str, Count]
+    specialization: Finite
+    sst: Finite
+    gst: Finite
+    recombinations: Count
+    n_hidden: Annotated[list[Count], MinLen(1)]
+    n_nonfinite: Count
+
+
+class Spread(TypedDict):
+    """A measure over scenarios."""
+
+    mean: Finite
+    sd: Finite
+    values: list[Finite]
+    n: NotRequired[Count]
+
+
+class Tested(TypedDict):
+    """A team's testing phase."""
+
+    generation: Count
+    scenarios: Annotated[int, Ge(1)]
+    seed: Annotated[int, Ge(0), Le(2**64 - 1)]
+    performance: Annotated[dict[str, Spread], MinLen(1)]
+    fitness: Spread
+    specialization: list[Finite]
+    labels: Annotated[list[str], MinLen(1)]
+    castes: dict[str, Count]
+    n_hidden: Annotated[list[Count], MinLen(1)]
+
+
+class Selected(TypedDict):
+    """A finalist in the scenarios that it was chosen on."""
+
+    fitness: Finite
+    performance: dict[str, Finite]
+
+
+class Validated(TypedDict):
+    """A finalist in the validation scenarios."""
+
+    fitness: Spread
+    performance: dict[str, Spread]
+
+
+class Finalist(TypedDict):
+    """One of the teams of which validation chooses the champion."""
+
+    generation: Count
+    selection: Selected
+    validation: Validated
+
+
+class Validation(TypedDict):
+    """How the champion was chosen."""
+
+    scenarios: Annotated[int, Ge(1)]
+    chosen: Count
+    finalists: Annotated[list[Finalist], MinLen(1)]
+
+
+class Testing(TypedDict):
+    """``test.json``: the testing phase of a run."""
+
+    champion: Tested
+    generation_0: Tested
+    validation: NotRequired[Validation]
+
+
+class Seal(TypedDict):
+    """``DONE``: the digest of every file when the directory was sealed."""
+
+    files: dict[str, Digest]
+
+
+class FileText(TypedDict):
+    """The text of a checkpoint or team file, next to its arrays."""
+
+    format: int
+    identity: dict[str, str]
+    fields: dict[str, int | Annotated[float, AllowInfNan()] | str]
+
+
+class ShapingText(TypedDict):
+    """``shaping.toml``: the settings of every stage."""
+
+    format: int
+    command: str
+    device: str
+    run_ids: list[RunId]
+    tasks: NotRequired[list[str]]
+    stages: Annotated[list[dict[str, dict[str, bool | int | float | str]]], MinLen(1)]
