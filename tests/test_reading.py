@@ -142,7 +142,9 @@ def test_json_is_what_it_says(tmp_path: Path) -> None:
     right = {"a": [1, 2**64 - 1, -0.5, True, None, "é"], "b": {"c": {}}}
     assert read_json(path) == right
     path.write_text(f"{text}\n{text}\n" + '{"torn": ')
-    assert read_json_lines(path) == [right, right]
+    assert read_json_lines(path, is_log=True) == [right, right]
+    with pytest.raises(DamagedFile, match="line 3 is not whole"):
+        read_json_lines(path)
 
 
 TOML = {

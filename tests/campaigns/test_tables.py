@@ -1,4 +1,6 @@
+import html
 import json
+import os
 import shutil
 
 import numpy as np
@@ -6,6 +8,9 @@ import pytest
 
 from campaigns.plans import tiny_campaign
 from conevo.analysis.frames import SCHEMA, Tables
+from conevo.analysis.report import write_report
+from conevo.analysis.sections.overview import read_campaign
+from conevo.campaigns.campaign import Campaign
 from conevo.campaigns.executors import Serial
 from conevo.campaigns.places import Places
 from conevo.campaigns.tables import seal_tables
@@ -160,3 +165,35 @@ def test_tables_are_made_again_only_when_more_is_finished(campaign):
     campaign.seal()
     assert (campaign.places.tables / "runs.parquet").stat().st_mtime_ns != made
     assert not list(campaign.path.glob(".tables*"))
+
+
+def test_a_damaged_run_is_left_out_and_the_rest_is_reported(campaign, tmp_path):
+    copy = Campaign(shutil.copytree(campaign.path, tmp_path / "copy"))
+    shutil.rmtree(copy.places.tables)
+    damaged, ended = list(copy.planned)[:2]
+    test = copy.places.run(damaged) / "test.json"
+    whole = test.read_text()
+    test.write_text(whole.replace('"labels"', '"lables"'))
+    for name, content in (
+        (ended, b""),
+        ("utf-16", '{"status": "failed"}'.encode("utf-16")),
+        ("random", bytes(range(256))),
+        ("nested", b"[" * 50_000),
+    ):
+        copy.places.ended(name).write_bytes(content)
+    os.mkfifo(copy.places.ended("pipe"))
+    copy.seal()
+    with Tables(copy.places.tables) as tables:
+        runs = [run for (run,) in tables.query("SELECT run FROM runs")[1]]
+    assert sorted(runs) == sorted(set(copy.planned) - {damaged})
+    about = read_campaign(copy.path)
+    names = (ended, "utf-16", "random", "nested", "pipe")
+    assert set(about.left_out) == {f"runs/{damaged}", *(f"ended/{name}.json" for name in names)}
+    words = "test.json is damaged: champion.labels is missing"
+    assert about.left_out[f"runs/{damaged}"] == f"runs/{damaged}/{words}"
+    page = write_report(copy.path, tmp_path / "report").read_text()
+    assert all(file in page and html.escape(why) in page for file, why in about.left_out.items())
+    test.write_text(whole)  # as soon as it is whole it counts
+    copy.seal()
+    with Tables(copy.places.tables) as tables:
+        assert tables.query("SELECT count(*) FROM runs")[1] == [(len(copy.planned),)]
