@@ -6,10 +6,8 @@ is what an earlier one did not write. None stands for a number that was not fini
 
 from __future__ import annotations
 
-from typing import (
-    Annotated,
-    NotRequired,  # pydantic reads typing's from Python 3.12 on
-)
+from collections.abc import Mapping
+from typing import Annotated, Any, NotRequired
 
 from annotated_types import Ge, Le, MinLen
 from pydantic import AllowInfNan, StringConstraints
@@ -24,6 +22,7 @@ __all__ = [
     "Seal",
     "ShapingText",
     "Testing",
+    "contradiction",
 ]
 
 Count = Annotated[int, Ge(0), Le(2**63 - 1)]
@@ -195,6 +194,23 @@ class Testing(TypedDict):
     champion: Tested
     generation_0: Tested
     validation: NotRequired[Validation]
+
+
+def contradiction(found: Mapping[str, Any]) -> str:
+    """Return what does not go together in a testing phase, nothing if all does."""
+    teams = {name: found[name] for name in ("champion", "generation_0")}
+    for name, team in teams.items():
+        if not len(team["labels"]) == len(team["specialization"]) == len(team["n_hidden"]):
+            return f"{name} has not as many labels as robots"
+    parts = list(teams.values())
+    if "validation" in found:
+        about = found["validation"]
+        if about["chosen"] not in [one["generation"] for one in about["finalists"]]:
+            return f"validation.chosen = {about['chosen']} is not among the finalists"
+        parts += [one[how] for one in about["finalists"] for how in ("selection", "validation")]
+    if len({frozenset(part["performance"]) for part in parts}) > 1:
+        return "not all teams have the same measures"
+    return ""
 
 
 class Seal(TypedDict):

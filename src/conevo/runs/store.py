@@ -393,9 +393,15 @@ class Store(Directory):
 
     def read_test(self) -> Record | None:
         """Return the testing phase, None if the run has not come to it."""
-        from conevo.runs.records import Testing
+        from conevo.runs.records import Testing, contradiction
 
-        return read_json(self.path / TEST, Testing) if os.path.lexists(self.path / TEST) else None
+        path = self.path / TEST
+        if not os.path.lexists(path):
+            return None
+        found = read_json(path, Testing)
+        if problem := contradiction(found):
+            raise DamagedFile(f"{path} is damaged: {problem}")
+        return found
 
     def seal(self) -> None:
         """Close the run: drop the older checkpoint, write the digests of all files."""
