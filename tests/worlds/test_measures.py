@@ -62,6 +62,9 @@ def test_a_name_alone_is_a_measure_of_which_larger_is_better() -> None:
         ('Measure("d", unit=3)', "'d': its unit must be text, not 3"),
         ('Measure("d", "m", "down")', "'d': its larger_is_better must be True or False"),
         ("3", "name must be text, not 3"),
+        ('Measure("d", low="0")', "'d': its low must be a number: '0'"),
+        ('Measure("d", high=float("nan"))', "'d': its high must be a number: nan"),
+        ('Measure("d", low=1, high=0)', "'d': low 1 and high 0 must be in this order"),
         ('"d", Measure("d")', "two measures named 'd'"),
     ],
 )  # fmt: skip

@@ -1,6 +1,7 @@
 """What all drawings of a report have in common: style, size, legends, formats.
 
-Together with ``figures`` the only place that knows Matplotlib.
+With ``lettering``, ``figures``, ``curves``, ``tiles`` and ``panels`` the only place that knows
+Matplotlib.
 """
 
 from __future__ import annotations
@@ -9,30 +10,32 @@ import io
 import math
 import re
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 import numpy.typing as npt
+
+from conevo.analysis.lettering import FONT, LINE, SIZE, SMALL, fitted, labels_of, lines_in, width_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-WIDTH = 7.0  # inches: the text width of a page
-HALF = 4.6  # of a drawing with little in it
-STYLES = (  # colour of areas, colour of lines, hatch, line, marker
-    ("#fae8bd", "#c0922e", "", ":", "o"),
-    ("#c3dcd8", "#5f9c93", "//", "--", "s"),
-    ("#eaa78f", "#c9582f", "||", "-.", "^"),
-    ("#7fabcb", "#2f6d9c", "\\\\", (0, (5, 1.5, 1, 1.5, 1, 1.5)), "D"),
-    ("#63668a", "#14162b", "", "-", "v"),
-    ("#c9b3d1", "#84629a", "xx", (0, (1, 1)), "P"),
-    ("#a98c6d", "#6b4e30", "--", (0, (8, 2)), "X"),
-    ("#dcdcdc", "#8a8a8a", "++", (0, (3, 3)), "*"),
-)
+WIDTH = 7.0  # inches: both columns of a page, or its text width
+COLUMN = 3.4  # one of two columns
+HEIGHT = 9.0  # of a page
+HATCHES = ("", "//", "||", "\\\\", "", "xx", "--", "++")  # by ``palette.Look.number``
+DASHES: tuple[Any, ...] = (
+    ":", "--", "-.", (0, (5, 1.5, 1, 1.5, 1, 1.5)), "-", (0, (1, 1)), (0, (8, 2)), (0, (3, 3)),
+)  # fmt: skip
+MARKERS = "os^DvPX*"
 SETTINGS: dict[Any, Any] = {
-    "font.family": "DejaVu Sans",
-    "font.size": 7.5,
+    "font.family": FONT,
+    "font.size": SIZE,
+    "axes.labelsize": SIZE,
+    "xtick.labelsize": SMALL,
+    "ytick.labelsize": SMALL,
+    "axes.titlesize": SIZE,
     "axes.linewidth": 0.6,
     "axes.spines.top": False,
     "axes.spines.right": False,
@@ -42,7 +45,7 @@ SETTINGS: dict[Any, Any] = {
     "legend.frameon": False,
     "legend.handlelength": 2.2,
     "legend.columnspacing": 1.4,
-    "legend.fontsize": 7.2,
+    "legend.fontsize": SMALL,
     "pdf.fonttype": 42,
     "svg.fonttype": "path",
     "svg.hashsalt": "conevo",
@@ -51,6 +54,7 @@ SETTINGS: dict[Any, Any] = {
 }
 
 
+Key = TypeVar("Key")
 PLACES = re.compile(r'\b(?:d|x|y)="[^"]*"')
 LONG = re.compile(r"-?\d+\.\d{4,}")
 
@@ -71,10 +75,22 @@ def style() -> Any:
 
 def one_panel(height: float, width: float = WIDTH) -> tuple[Figure, Axes]:
     """Return a drawing with one pair of axes."""
+    figure, grid = several_panels(1, 1, height, width)
+    return figure, grid[0]
+
+
+def several_panels(
+    n: int, columns: int, height: float, width: float = WIDTH
+) -> tuple[Figure, list[Axes]]:
+    """Return a drawing with n pairs of axes, row by row, which share their vertical axis."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(width, height), layout="constrained")
-    return figure, figure.add_subplot()
+    grid = figure.subplots(math.ceil(n / columns), columns, sharey=True, squeeze=False)
+    listed = list(grid.flat)
+    for axes in listed[n:]:
+        axes.remove()
+    return figure, listed[:n]
 
 
 def saved(figure: Figure) -> Drawing:
@@ -95,56 +111,81 @@ def _shorter(number: re.Match[str]) -> str:
     return f"{float(number[0]):.3f}".rstrip("0").rstrip(".")
 
 
-def mark_places(axes: Axes, places: Sequence[str], label: str) -> None:
-    """Name the places along the axis, without ticks."""
-    axes.set_xticks(range(len(places)), places)
+def name_axes(figure: Figure, x_label: str, y_label: str = "") -> None:
+    """Write what the axes of all panels are below and beside them, in lines that fit."""
+    width, height = map(float, figure.get_size_inches())
+    figure.supxlabel(fitted(x_label, 0.9 * width, 2), fontsize=SIZE)
+    if y_label:
+        figure.supylabel(fitted(y_label, 0.75 * height, 3), fontsize=SIZE)
+
+
+def mark_places(axes: Axes, places: Sequence[str], slot: float) -> None:
+    """Name the places along the axis, each ``slot`` inches wide, without ticks."""
+    labels = labels_of(places, slot, SMALL)
+    turned: dict[str, Any] = {"rotation": labels.angle, "rotation_mode": "anchor", "ha": "right"}
+    if labels.angle == 90.0:
+        turned["va"] = "center"
+    axes.set_xticks(range(len(places)), labels.texts, **(turned if labels.angle else {}))
     axes.set_xlim(-0.5, len(places) - 0.5)
     axes.tick_params(axis="x", length=0)
-    axes.set_xlabel(label)
 
 
-def put_legend(figure: Figure, grid: Sequence[Axes], names: Sequence[str]) -> None:
-    """Put one legend of the lines, points or bars of all panels above them."""
-    found = {
-        name: handle
-        for axes in grid
-        for handle, name in zip(*axes.get_legend_handles_labels(), strict=True)
-    }
-    _legend(figure, {name: found[name] for name in names if name in found})
+def legend_of(names: Mapping[Key, str]) -> dict[Key, str]:
+    """Return what a legend says of each key: in lines that fit in a column of a page."""
+    return {key: fitted(name, 0.7 * COLUMN, 2, SMALL) for key, name in names.items()}
 
 
-def put_part_legend(figure: Figure, names: Sequence[str]) -> None:
-    """Put the shades of parts of a whole above the drawing."""
-    from matplotlib.patches import Patch
-
-    handles = {}
-    for k, name in enumerate(names):
-        shade, hatch = shade_of(k, len(names))
-        handles[name] = Patch(facecolor=shade, hatch=hatch, edgecolor="0.25", linewidth=0.3)
-    _legend(figure, handles)
+def legend_height(names: Sequence[str], width: float) -> float:
+    """Return how high a legend above a drawing of that width gets, in inches."""
+    columns = _columns(names, width)
+    rows = [names[k : k + columns] for k in range(0, len(names), columns)]
+    return sum(max(map(lines_in, row)) for row in rows) * LINE + 0.15
 
 
-def put_grey_legend(figure: Figure, meanings: Sequence[tuple[float, str]]) -> None:
-    """Put what each darkness means above the drawing."""
-    from matplotlib.patches import Patch
-
-    _legend(
-        figure,
-        {
-            text: Patch(facecolor=grey(darkness), edgecolor="0.4", linewidth=0.4)
-            for darkness, text in meanings
-        },
-    )
+def width_for(names: Sequence[str]) -> float:
+    """Return a column of a page, or both if a legend needs much room in one."""
+    texts = legend_of(dict(enumerate(names)))
+    return COLUMN if legend_height(list(texts.values()), COLUMN) <= 0.8 else WIDTH
 
 
-def _legend(figure: Figure, handles: Mapping[str, Any]) -> None:
+def put_legend(figure: Figure, handles: Mapping[str, Any]) -> None:
     """Put a legend above the drawing, to be read row by row, in as few rows as fit."""
     names = list(handles)
-    room = 125 * float(figure.get_figwidth()) / WIDTH
-    rows = math.ceil(sum(len(name) + 7 for name in names) / room)
-    columns = max(1, math.ceil(len(names) / max(rows, 1)))
+    columns = _columns(names, float(figure.get_figwidth()))
     order = [name for column in range(columns) for name in names[column::columns]]
     figure.legend([handles[name] for name in order], order, loc="outside upper left", ncols=columns)
+
+
+def _columns(names: Sequence[str], width: float) -> int:
+    """Return in how many columns a legend fits, as few rows as there may be."""
+    handle, gap, rim = 3.2 * SMALL / 72, 1.4 * SMALL / 72, 2.0 * SMALL / 72
+    for rows in range(1, len(names)):
+        columns = math.ceil(len(names) / rows)
+        # The widest of each column, with the sign before it and the gap after it.
+        used = [max(width_of(n, SMALL) for n in names[k::columns]) for k in range(columns)]
+        if sum(used) + columns * (handle + gap) + rim <= width:
+            return columns
+    return 1
+
+
+def part_handles(colours: Mapping[str, str]) -> dict[str, Any]:
+    """Return signs for the parts of a whole."""
+    from matplotlib.patches import Patch
+
+    return {
+        name: Patch(facecolor=colour, hatch=hatch, edgecolor="0.25", linewidth=0.3)
+        for (name, colour), hatch in zip(colours.items(), hatches(len(colours)), strict=True)
+    }
+
+
+def grey_handles(meanings: Sequence[tuple[float, str]]) -> dict[str, Any]:
+    """Return signs for degrees of darkness."""
+    from matplotlib.patches import Patch
+
+    return {
+        text: Patch(facecolor=grey(darkness), edgecolor="0.4", linewidth=0.4)
+        for darkness, text in meanings
+    }
 
 
 def grey(darkness: float) -> str:
@@ -152,14 +193,9 @@ def grey(darkness: float) -> str:
     return f"{1 - 0.75 * darkness:.3f}"
 
 
-def shade_of(k: int, n: int) -> tuple[str, str]:
-    """Return colour and hatch of part k of n: from dark to light; the last is the rest, plain."""
-    from matplotlib import colormaps
-    from matplotlib.colors import to_hex
-
-    if k == n - 1:
-        return "#f2f2f2", ""
-    return to_hex(colormaps["cividis"](0.05 + 0.9 * k / max(n - 2, 1))), ("", "//", "", "||")[k % 4]
+def hatches(n: int) -> list[str]:
+    """Return the hatches of n parts of a whole: neighbours differ, the last, the rest, is plain."""
+    return [("\\\\", "//", "..", "||", "--")[k % 5] for k in range(n - 1)] + [""]
 
 
 def is_dark(colour: str) -> bool:
@@ -181,11 +217,6 @@ def marker_size(cells: int) -> float:
 def numbers(values: Sequence[float | None]) -> npt.NDArray[np.float64]:
     """Return values with NaN for None."""
     return np.array([math.nan if value is None else value for value in values], dtype=np.float64)
-
-
-def is_positive(values: Mapping[str, Sequence[Sequence[float]]]) -> bool:
-    """Return whether no value is below 0."""
-    return all(value >= 0 for of in values.values() for runs in of for value in runs)
 
 
 def ticks_of(

@@ -51,6 +51,8 @@ SCHEMA: dict[str, dict[str, str]] = {
         "measure": "VARCHAR",
         "unit": "VARCHAR",
         "larger_is_better": "BOOLEAN",
+        "low": "DOUBLE",
+        "high": "DOUBLE",
     },
     "scores": {
         "run": "VARCHAR",
@@ -238,7 +240,7 @@ class Tables:
             """
             SELECT r.run, r.task, r.world, r.environment, r.family, r.number, r.method, r.preset,
                    r.variant, r.seed, b.budget, s.measure, coalesce(m.unit, ''),
-                   coalesce(m.larger_is_better, true),
+                   coalesce(m.larger_is_better, true), m.low, m.high,
                    if(s.measure = r.measure, r.optimum, NULL) AS optimum, avg(s.value) AS value
             FROM runs r JOIN budgets b USING (run) JOIN scores s USING (run)
                  LEFT JOIN measures m ON m.run = s.run AND m.measure = s.measure
@@ -251,8 +253,8 @@ class Tables:
             {"study": study, "team": team, "measure": measure},
         ).fetchall()
         return [
-            Value._make((*about, Measure(name, unit, is_larger), optimum, value))
-            for *about, name, unit, is_larger, optimum, value in rows
+            Value._make((*about, Measure(name, unit, is_larger, low, high), optimum, value))
+            for *about, name, unit, is_larger, low, high, optimum, value in rows
         ]
 
     def close(self) -> None:

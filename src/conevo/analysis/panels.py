@@ -14,10 +14,12 @@ import numpy.typing as npt
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+from conevo.analysis.lettering import LINE, SMALL
+
 __all__ = ["Panels"]
 
 Floats = npt.NDArray[np.float64]
-GAP_X, GAP_Y = 0.1, 0.16  # between panels, in panels
+GAP_X = 0.1  # between panels, in panels
 TICK = 0.025
 
 
@@ -29,6 +31,7 @@ class Panels:
         rows, columns: of panels.
         x, y: limits of every panel.
         shape: width and height of a panel, in inches: so that ticks are as long both ways.
+        gap_y: between rows, in panels: room for numbers and for the lines of titles.
     """
 
     def __init__(
@@ -39,10 +42,11 @@ class Panels:
         x: tuple[float, float],
         y: tuple[float, float],
         shape: tuple[float, float],
+        title_lines: int = 1,
     ) -> None:
         self.axes, self.rows, self.columns, self.x, self.y = axes, rows, columns, x, y
         self.shape = shape
-        self.gap_y = GAP_Y * max(1.0, 1.2 / shape[1])
+        self.gap_y = (0.12 + title_lines * LINE) / shape[1]
         axes.set_axis_off()
         axes.set_xlim(-0.02, columns * (1 + GAP_X) - GAP_X + 0.02)
         axes.set_ylim(-(rows - 1) * (1 + self.gap_y) - 0.02, 1.02)
@@ -106,7 +110,7 @@ class Panels:
                         name,
                         ha=side if inside and value in self.x else "center",
                         va="top",
-                        fontsize=6.5,
+                        fontsize=SMALL,
                     )
         self._mark(marks)
 
@@ -127,7 +131,7 @@ class Panels:
                         name,
                         ha="right",
                         va="center_baseline",
-                        fontsize=6.5,
+                        fontsize=SMALL,
                     )
         self._mark(marks)
 

@@ -133,7 +133,7 @@ def _rows(places: Places, planned: PlannedRun, cost: float) -> Iterator[tuple[st
             },
         )
         for one in measures:
-            about = {"unit": one["unit"], "larger_is_better": one["larger_is_better"]}
+            about = {key: one.get(key) for key in ("unit", "larger_is_better", "low", "high")}
             yield "measures", {"run": name, "measure": one["name"]} | about
         for team, title in (("champion", "champion"), ("generation_0", "generation 0")):
             for measure, values in test[team]["performance"].items():

@@ -222,9 +222,9 @@ class GaccWorld:
         *(f"{kind}-constructor" for kind in TYPES),
     )
     performance: ClassVar[tuple[Measure, ...]] = (
-        Measure("delivered", "objects"),
-        Measure("completed", "complex objects"),
-        Measure("delivered_share", "%"),
+        Measure("delivered", "objects", low=0.0),
+        Measure("completed", "complex objects", low=0.0),
+        Measure("delivered_share", "%", low=0.0, high=100.0),
     )
     heuristics: ClassVar[tuple[str, ...]] = (
         *(f"{kind}-detector" for kind in TYPES),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
@@ -25,14 +26,19 @@ class Measure:
         unit: of its values, "iterations"; empty if it has none.
         larger_is_better: False of what a team is to keep small, as a distance, a time or a count of
             mishaps.
+        low, high: least and largest value that there can be, if the world knows them: intervals in
+            reports end there. Of the main measure ``optimum`` serves as the high.
 
     Raises:
-        UsageError: a name or unit that is not text, a direction that is not True or False.
+        UsageError: a name or unit that is not text, a direction that is not True or False, ends
+            that are not finite numbers or change places.
     """
 
     name: str
     unit: str = ""
     larger_is_better: bool = True
+    low: float | None = None
+    high: float | None = None
 
     def __post_init__(self) -> None:
         given: dict[str, Any] = asdict(self)  # of a world file: anything
@@ -44,6 +50,13 @@ class Measure:
                 raise UsageError(
                     f"measure {self.name!r}: its {what} must be {must}, not {given[what]!r}"
                 )
+        for end in ("low", "high"):
+            value = given[end]
+            if value is not None and not (type(value) in (int, float) and math.isfinite(value)):
+                raise UsageError(f"measure {self.name!r}: its {end} must be a number: {value!r}")
+        if self.low is not None and self.high is not None and not self.low < self.high:
+            ends = f"low {self.low:g} and high {self.high:g}"
+            raise UsageError(f"measure {self.name!r}: {ends} must be in this order")
 
     @property
     def title(self) -> str:

@@ -77,8 +77,8 @@ class PreyWorld:
     actions: ClassVar[tuple[str, ...]] = ACTIONS
     castes: ClassVar[tuple[str, ...]] = actions
     performance: ClassVar[tuple[Measure, ...]] = (
-        Measure("path", "cm"),
-        Measure("collided", "share of the prey", larger_is_better=False),
+        Measure("path", "cm", low=0.0),
+        Measure("collided", "share of the prey", larger_is_better=False, low=0.0, high=1.0),
     )
     heuristics: ClassVar[tuple[str, ...]] = ("heuristic", "random")
 

@@ -118,10 +118,10 @@ class PursuitWorld:
     actions: ClassVar[tuple[str, ...]] = ACTIONS
     castes: ClassVar[tuple[str, ...]] = actions
     performance: ClassVar[tuple[Measure, ...]] = (
-        Measure("capture_time", "iterations"),
-        Measure("first_capture", "iteration", larger_is_better=False),
-        Measure("captures", "captures"),
-        Measure("collisions", "refused moves", larger_is_better=False),
+        Measure("capture_time", "iterations", low=0.0),
+        Measure("first_capture", "iteration", larger_is_better=False, low=0.0),
+        Measure("captures", "captures", low=0.0),
+        Measure("collisions", "refused moves", larger_is_better=False, low=0.0),
     )
     heuristics: ClassVar[tuple[str, ...]] = ("heuristic",)
 

@@ -149,8 +149,8 @@ class RoverWorld:
     actions: ClassVar[tuple[str, ...]] = ("low", "med", "hi", "move")
     castes: ClassVar[tuple[str, ...]] = actions
     performance: ClassVar[tuple[Measure, ...]] = (
-        Measure("value", "points"),
-        Measure("area", "share of the square"),
+        Measure("value", "points", low=0.0),
+        Measure("area", "share of the square", low=0.0, high=1.0),
     )
     heuristics: ClassVar[tuple[str, ...]] = ("low", "med", "hi", "non-specialized")
 

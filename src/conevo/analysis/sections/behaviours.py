@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from collections import Counter, defaultdict
 
-from conevo.analysis import figures
+from conevo.analysis import tiles
 from conevo.analysis.captures import COLLECTIVES
 from conevo.analysis.comparison import Cell
-from conevo.analysis.exhibits import Column, Figure, Section, Table, number, plain
-from conevo.analysis.sections.scope import Scope, sizes
+from conevo.analysis.exhibits import Column, Figure, Section, Table, number
+from conevo.analysis.sections.scope import KEYS, Scope, sizes
+from conevo.palette import FAINT, several
 
 __all__ = ["behaviours"]
+
+MOST_BARS = 45  # that fit on a page
+COLOURS = (*several(len(COLLECTIVES) - 1), FAINT)
 
 
 def behaviours(scope: Scope) -> Section | None:
@@ -37,11 +41,12 @@ def behaviours(scope: Scope) -> Section | None:
     return Section(
         "Behaviours",
         (),
-        [_captures(scope, counts["collective"], n), _table(scope, counts, n)],
+        [*_captures(scope, counts["collective"], n), _table(scope, counts, n)],
     )
 
 
-def _captures(scope: Scope, counts: dict[Cell, Counter[str]], n: dict[Cell, int]) -> Figure:
+def _captures(scope: Scope, counts: dict[Cell, Counter[str]], n: dict[Cell, int]) -> list[Figure]:
+    """Draw a bar per cell that captured something; nothing if they are too many for a page."""
     total = {cell: sum(counts[cell].values()) for cell in n}
     names = list(COLLECTIVES)
     shares = {
@@ -51,21 +56,26 @@ def _captures(scope: Scope, counts: dict[Cell, Counter[str]], n: dict[Cell, int]
         for cell in n
         if total[cell]
     }
+    if not 0 < len(shares) <= MOST_BARS:
+        return []
     rows = [
         scope.key(cell.environment, cell.treatment)
         | {"n": n[cell], "captures": total[cell], "behaviour": name, "count": counts[cell][name]}
         for cell in n
         for name in names
     ]
-    return Figure(
+    figure = Figure(
         f"{scope.stem}-captures",
         "Captures by collective behaviour",
         "Share of all captures of the champions in fresh scenarios. "
         f"{sizes(n.values())} per bar; teams that captured nothing have no bar.",
         (),
         rows,
-        drawing=figures.shares(shares, names, x_label="share of the captures"),
+        drawing=tiles.shares(
+            shares, dict(zip(names, COLOURS, strict=True)), x_label="share of the captures"
+        ),
     )
+    return [figure]
 
 
 def _table(scope: Scope, counts: dict[str, dict[Cell, Counter[str]]], n: dict[Cell, int]) -> Table:
@@ -79,8 +89,7 @@ def _table(scope: Scope, counts: dict[str, dict[Cell, Counter[str]]], n: dict[Ce
         for cell in n
     ]
     columns = [
-        Column("environment", "environment", plain),
-        Column("treatment", "method", plain),
+        *KEYS,
         Column("n", "n"),
         *(Column(f"runs {name}", name, number) for name in collective),
         *(Column(f"robots {name}", name, number) for name in individual),

@@ -8,22 +8,27 @@ from typing import Any
 
 import numpy as np
 
-from conevo.analysis import figures
+from conevo.analysis import curves
 from conevo.analysis.comparison import Cell, Treatment
 from conevo.analysis.courses import Histories, caste_courses
-from conevo.analysis.exhibits import Column, Exhibit, Figure, Section, Table, number, plain
-from conevo.analysis.sections.scope import Scope, sizes
+from conevo.analysis.exhibits import Column, Exhibit, Figure, Section, Table, number
+from conevo.analysis.sections.arrangement import Arrangement
+from conevo.analysis.sections.scope import KEYS, Scope, sizes
+from conevo.palette import caste_colours
 from conevo.specialization.individual import NON_SPECIALIZED
 
 __all__ = ["castes"]
+
+MOST_ROWS = 12  # of panels that fit on a page
 
 
 def castes(scope: Scope, histories: Histories) -> Section:
     """Return castes over generations, and those of the champions."""
     exhibits: list[Exhibit] = []
     x, found = caste_courses(histories)
-    if found:
-        exhibits.append(_over_generations(scope, histories, x, found))
+    at = scope.arranged(found, by_environment=True)
+    if found and at.is_drawable and len(at.small_panels()) <= MOST_ROWS:
+        exhibits.append(_over_generations(scope, histories, at, x, found))
     teams = _champions(scope)
     if teams:
         exhibits.append(_of_champions(scope, teams))
@@ -32,24 +37,28 @@ def castes(scope: Scope, histories: Histories) -> Section:
 
 
 def _over_generations(
-    scope: Scope, histories: Histories, x: Any, found: Mapping[Cell, Mapping[str, Any]]
+    scope: Scope,
+    histories: Histories,
+    at: Arrangement,
+    x: Any,
+    found: Mapping[Cell, Mapping[str, Any]],
 ) -> Figure:
-    names = [*(name for name in histories.castes if name != NON_SPECIALIZED), NON_SPECIALIZED]
-    titles = {treatment: treatment.title for treatment in scope.treatments}
+    """Draw castes, a row per environment and variant, a column per method."""
+    titles = {treatment.method: Treatment(treatment.method, "").title for _, treatment in found}
     ordered = {
-        (environment, titles[treatment]): found[Cell(environment, treatment)]
-        for environment in scope.environments
-        for treatment in scope.treatments
-        if Cell(environment, treatment) in found
+        (row, titles[cell.treatment.method]): found[cell]
+        for row, cells in at.small_panels().items()
+        for cell in sorted(cells, key=lambda one: at.methods.index(one.treatment.method))
     }
     rows = [
         scope.key(cell.environment, cell.treatment)
-        | {"evaluations": float(at), "caste": name, "share": float(share)}
+        | {"evaluations": float(evaluations), "caste": name, "share": float(share)}
         for cell, parts in found.items()
         for name, shares in parts.items()
-        for at, share in zip(x, shares, strict=True)
+        for evaluations, share in zip(x, shares, strict=True)
     ]
-    size = sizes(len(values) for values in scope.cells.values())
+    size = sizes(len(scope.cells.get(cell, ())) for cell in found)
+    colours = caste_colours(scope.group.world, histories.castes)
     return Figure(
         f"{scope.stem}-castes",
         "Castes of the fittest team over the generations",
@@ -57,10 +66,10 @@ def _over_generations(
         f"a robot is in the caste of what it does most if S < 0.5. {size} per panel.",
         (),
         rows,
-        drawing=figures.stacks(
+        drawing=curves.stacks(
             ordered,
             x,
-            names,
+            {name: colour for name, colour in colours.items() if name in histories.castes},
             x_label="team evaluations",
             y_label="share of the robots",
         ),
@@ -93,8 +102,7 @@ def _of_champions(scope: Scope, teams: Mapping[Cell, Sequence[Mapping[str, int]]
         for environment, treatment, of in _in_order(scope, teams)
     ]
     columns = [
-        Column("environment", "environment", plain),
-        Column("treatment", "method", plain),
+        *KEYS,
         Column("n", "n"),
         *(Column(name, name, number) for name in names),
         Column("specialized", "specialized castes"),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from conevo.analysis import figures
+from conevo.analysis import tiles
 from conevo.analysis.comparison import (
     Pair,
     compare_all,
@@ -27,6 +27,8 @@ from conevo.worlds.measures import Measure
 
 __all__ = ["comparisons"]
 
+MOST_ROWS = 28  # of a drawing: eight methods
+
 TESTS = (
     "p (t): Student's independent t-test, two-sided, uncorrected, as in the thesis; p (Welch): the "
     "same without equal variances; p (MW): Mann-Whitney, exact up to {exact} runs; p (MW, Holm): "
@@ -40,21 +42,9 @@ def comparisons(scope: Scope) -> Section:
     pairs = compare_all(scope.cells)
     if not pairs:
         return Section("Comparisons", ["There is one method only, so nothing to compare."])
-    names = {pair: f"{pair.a.title} − {pair.b.title}" for pair in pairs}
-    places = dict(zip(scope.environments, place_names(scope.environments), strict=True))
-    cells = {
-        (names[pair], places[pair.environment]): figures.Shade(
-            (0.25 if pair.by_thesis else 0) + (0.5 if pair.by_ranks else 0), _cell_text(pair)
-        )
-        for pair in pairs
-    }
-    legend = [
-        (0, "neither test below 0.05"),
-        (0.25, "t-test only (uncorrected)"),
-        (0.5, "Mann-Whitney only (Holm)"),
-        (0.75, "both"),
-    ]
-    size = sizes(n for pair in pairs for n in (pair.result.n_a, pair.result.n_b))
+    if all(pair.result.n_a < 2 or pair.result.n_b < 2 for pair in pairs):
+        text = ["With one run per cell nothing can be tested."]
+        return Section("Comparisons", text)
     text = []
     few = [pair for pair in pairs if pair.too_few]
     if few:
@@ -63,22 +53,7 @@ def comparisons(scope: Scope) -> Section:
             f"pairs could not fall below {ALPHA} in {len(few)} of them, whatever the runs were."
         )
     exhibits: list[Exhibit] = [
-        Figure(
-            f"{scope.stem}-significance",
-            f"Significant differences in task performance ({scope.unit})",
-            f"+: the first is better, −: worse ({scope.main.direction}); the number is "
-            f"Mann-Whitney's p after Holm's correction over {pairs[0].n_tests} pairs. {size} per "
-            "sample.",
-            (),
-            [_pair_row(scope, pair) for pair in pairs],
-            drawing=figures.heat_map(
-                list(dict.fromkeys(names.values())),
-                list(places.values()),
-                cells,
-                legend,
-                x_label=scope.axis,
-            ),
-        ),
+        *_map(scope, pairs),
         _pair_table(scope, pairs, scope.stem, scope.main, is_open=len(pairs) <= 12),
     ]
     for measure, others in scope.others.items():
@@ -87,6 +62,39 @@ def comparisons(scope: Scope) -> Section:
             _pair_table(scope, made, f"{scope.stem}-{measure.name}", measure, is_open=False)
         )
     return Section("Comparisons", text, exhibits)
+
+
+def _map(scope: Scope, pairs: Sequence[Pair]) -> list[Figure]:
+    """Draw every pair as a shaded cell, if there is more than one and they fit on a page."""
+    names = {pair: f"{pair.a.title} − {pair.b.title}" for pair in pairs}
+    rows = list(dict.fromkeys(names.values()))
+    places = dict(zip(scope.environments, place_names(scope.environments), strict=True))
+    cells = {
+        (names[pair], places[pair.environment]): tiles.Shade(
+            (0.25 if pair.by_thesis else 0) + (0.5 if pair.by_ranks else 0), _cell_text(pair)
+        )
+        for pair in pairs
+    }
+    if not len(cells) > 1 or len(rows) > MOST_ROWS:
+        return []
+    legend = [
+        (0, "neither test below 0.05"),
+        (0.25, "t-test only (uncorrected)"),
+        (0.5, "Mann-Whitney only (Holm)"),
+        (0.75, "both"),
+    ]
+    size = sizes(n for pair in pairs for n in (pair.result.n_a, pair.result.n_b))
+    figure = Figure(
+        f"{scope.stem}-significance",
+        f"Significant differences in task performance ({scope.unit})",
+        f"+: the first is better, −: worse ({scope.main.direction}); the number is "
+        f"Mann-Whitney's p after Holm's correction over {pairs[0].n_tests} pairs. {size} per "
+        "sample.",
+        (),
+        [_pair_row(scope, pair) for pair in pairs],
+        drawing=tiles.heat_map(rows, list(places.values()), cells, legend, x_label=scope.axis),
+    )
+    return [figure]
 
 
 def _cell_text(pair: Pair) -> str:

@@ -13,9 +13,18 @@ from typing import Any, NamedTuple
 
 from conevo.analysis import figures
 from conevo.analysis.comparison import Cell
-from conevo.analysis.exhibits import Column, Figure, Section, Table, interval, p_value, plain
-from conevo.analysis.sections.scope import Scope, named, place_names, sizes
-from conevo.analysis.statistics import compare, holm, mean_interval
+from conevo.analysis.exhibits import (
+    Column,
+    Exhibit,
+    Figure,
+    Section,
+    Table,
+    interval,
+    p_value,
+    plain,
+)
+from conevo.analysis.sections.scope import KEYS, Scope, named, sizes
+from conevo.analysis.statistics import Estimate, compare, holm, mean_interval
 
 __all__ = ["clones", "lesions"]
 
@@ -114,7 +123,7 @@ def _teams(scope: Scope, study: str) -> tuple[dict[Cell, list[_Team]], int]:
 
 def _figure(
     scope: Scope, study: str, what: str, note: str, cells: dict[Cell, list[_Team]]
-) -> Figure:
+) -> Exhibit:
     """Draw a point per run: the mean over its castes."""
     means: dict[Cell, list[float]] = {}
     for cell, teams in cells.items():
@@ -122,13 +131,6 @@ def _figure(
         for team in teams:
             of_run[team.run].append(team.lost)
         means[cell] = [sum(values) / len(values) for values in of_run.values()]
-    names = named(scope.treatments, means)
-    environments = [e for e in scope.environments if any(cell.environment == e for cell in means)]
-    grid = {
-        name: [means.get(Cell(e, treatment), []) for e in environments]
-        for treatment, name in names.items()
-    }
-    estimates = {name: [mean_interval(values) for values in of] for name, of in grid.items()}
     rows = [
         scope.key(cell.environment, cell.treatment)
         | {"run": team.run, "caste": team.caste, "whole": team.whole, scope.measure: team.value}
@@ -136,33 +138,44 @@ def _figure(
         for cell, teams in cells.items()
         for team in teams
     ]
+    title = f"Task performance ({scope.unit}) that is lost with a caste {what}"
+    at = scope.arranged(means)
+    if not at.is_drawable:
+        columns = [
+            *KEYS,
+            Column("run", "run", plain),
+            Column("caste", "caste", plain),
+            Column("lost", "lost, %"),
+        ]
+        return Table(f"{scope.stem}-{study}", title, note, columns, rows, is_open=False)
+    several = any(len(values) > 1 for values in means.values())
     size = sizes(len(values) for values in means.values())
     return Figure(
         f"{scope.stem}-{study}",
-        f"Task performance ({scope.unit}) that is lost with a caste {what}",
+        title,
         f"{note} Percent of the larger of the two; below 0 the changed team was better "
-        f"({scope.main.direction}). A point per run: the mean over its castes; "
-        "next to them the mean with Student's 95 % interval. "
-        f"{size} per cell.",
+        f"({scope.main.direction}). A point per run: the mean over its castes"
+        + ("; next to them the mean with Student's 95 % interval" if several else "")
+        + f". {size} per cell.",
         (),
         rows,
         drawing=figures.points(
-            place_names(environments),
-            grid,
-            {
-                name: [
-                    (one.value, one.low, one.high)
-                    if one.value is not None and one.low is not None and one.high is not None
-                    else None
-                    for one in of
-                ]
-                for name, of in estimates.items()
-            },
-            x_label=scope.axis,
+            at.grid(means, lambda values: figures.Runs(values, _ends(mean_interval(values)))),
+            at.places,
+            named({cell: len(values) for cell, values in means.items()}),
+            x_label=at.axis,
             y_label="lost, % of the larger",
             reference=0.0,
+            within=(-100.0, 100.0),
         ),
     )
+
+
+def _ends(mean: Estimate) -> tuple[float, float, float] | None:
+    """Return a mean with its interval, if it has one."""
+    if mean.value is None or mean.low is None or mean.high is None:
+        return None
+    return mean.value, mean.low, mean.high
 
 
 def _rows(scope: Scope, cells: dict[Cell, list[_Team]]) -> list[dict[str, Any]]:
@@ -191,8 +204,7 @@ def _percent(changed: float | None, whole: float | None) -> float | None:
 
 def _table(scope: Scope, study: str, what: str, note: str, rows: list[dict[str, Any]]) -> Table:
     columns = [
-        Column("environment", "environment", plain),
-        Column("treatment", "method", plain),
+        *KEYS,
         Column("caste", "caste", plain),
         Column("n", "n"),
         Column("whole", "unchanged"),

@@ -9,7 +9,7 @@ import numpy as np
 
 from conevo.analysis.comparison import Cell, Treatment
 from conevo.analysis.exhibits import Column, Section, Table, number, plain
-from conevo.analysis.sections.scope import Scope, named
+from conevo.analysis.sections.scope import Scope, span
 from conevo.specialization.diversity import task_specialization
 from conevo.specialization.team import METRICS
 
@@ -37,7 +37,11 @@ def metrics(scope: Scope) -> Section:
         return Section(title, ["No team of these runs was studied."])
     seen = {metric for metric, _ in found}
     names = [*(m for m in METRICS if m in seen), *sorted(seen - set(METRICS))]
-    treatments = named(scope.treatments, scope.cells)
+    treatments = {
+        treatment: f"{treatment.title} ({span(counts)})"
+        for treatment in scope.treatments
+        if (counts := [len(of) for cell, of in scope.cells.items() if cell.treatment == treatment])
+    }
     rows = []
     numbers: list[dict[str, object]] = []
     for environment in scope.environments:

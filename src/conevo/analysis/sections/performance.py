@@ -25,73 +25,102 @@ from conevo.analysis.exhibits import (
     p_value,
     plain,
 )
-from conevo.analysis.sections.scope import Scope, named, place_names, sizes, span
+from conevo.analysis.sections.scope import KEYS, Scope, named, sizes, span
 
 __all__ = ["performance"]
 
 
 def performance(scope: Scope) -> Section:
     """Return what every cell reached."""
-    found = summarize(scope.cells)
-    by_cell = {Cell(one.environment, one.treatment): one for one in found}
-    names = named(scope.treatments, scope.cells)
-    places = place_names(scope.environments)
-    grid = [
-        (name, [by_cell.get(Cell(e, treatment)) for e in scope.environments])
-        for treatment, name in names.items()
-    ]
-    rows = [scope.key(one.environment, one.treatment) | _summary_row(one, scope) for one in found]
-    size = sizes(len(one.values) for one in found)
-    exhibits: list[Exhibit] = [
-        Figure(
-            f"{scope.stem}-bars",
-            f"Task performance ({scope.unit}) by environment and method",
-            "Mean over runs of the fittest team in fresh scenarios; error bars: standard deviation "
-            f"of the runs. {size} per bar.",
-            (),
-            rows,
-            drawing=figures.bars(
-                places,
-                {name: [one.mean.value if one else None for one in of] for name, of in grid},
-                {name: [one.sd if one else None for one in of] for name, of in grid},
-                x_label=scope.axis,
-                y_label=f"{scope.unit} (mean, sd)",
-            ),
-        ),
-        Figure(
-            f"{scope.stem}-runs",
-            f"Task performance ({scope.unit}) of every run",
-            f"A point per run; beside them the mean with Student's 95 % interval. {size} per cell.",
-            (),
-            [
-                scope.key(cell.environment, cell.treatment)
-                | {"seed": one.seed, "run": one.run, scope.measure: one.value}
-                for cell, values in scope.cells.items()
-                for one in values
-            ],
-            drawing=figures.points(
-                places,
-                {name: [one.values if one else () for one in of] for name, of in grid},
-                {name: [_ends(one) if one else None for one in of] for name, of in grid},
-                x_label=scope.axis,
-                y_label=f"{scope.unit} (runs, mean, 95 % interval)",
-            ),
-        ),
-        Table(
-            f"{scope.stem}-performance",
-            f"Task performance ({scope.unit}) by environment and method",
-            f"{scope.main.direction.capitalize()}. Mean over runs of the mean over fresh "
-            "scenarios; n: runs; 95 % interval: Student's t; "
-            "generation 0: the fittest team of the first generation in the same scenarios; p (KS): "
-            "Kolmogorov-Smirnov against the normal fitted to the runs, as in the thesis, which is "
-            "too large; p (Lilliefors): the same distance, judged correctly.",
-            _performance_columns(rows),
-            rows,
-            is_open=len(rows) <= 12,
-        ),
-    ]
-    exhibits += [*_pooled(scope), *_others(scope)]
+    found = {Cell(one.environment, one.treatment): one for one in summarize(scope.cells)}
+    rows = [scope.key(*cell) | _summary_row(one, scope) for cell, one in found.items()]
+    exhibits = [*_drawn(scope, found, rows), _table(scope, rows), *_pooled(scope), *_others(scope)]
     return Section(f"Task performance: {scope.main.heading}", _warnings(scope), exhibits)
+
+
+def _drawn(
+    scope: Scope, found: Mapping[Cell, Summary], rows: Sequence[Mapping[str, Any]]
+) -> list[Exhibit]:
+    """Return means as bars, and every run as a point; a table of the runs if that is too much."""
+    runs = [
+        scope.key(*cell) | {"seed": one.seed, "run": one.run, scope.measure: one.value}
+        for cell, values in scope.cells.items()
+        for one in values
+    ]
+    title = f"Task performance ({scope.unit}) of every run"
+    at = scope.arranged(found)
+    if not at.is_drawable:
+        columns = [*KEYS, Column("seed", "seed"), Column(scope.measure, scope.unit)]
+        note = "Mean over fresh scenarios."
+        return [Table(f"{scope.stem}-runs", title, note, columns, runs, is_open=False)]
+    names = named({cell: len(one.values) for cell, one in found.items()})
+    size = sizes(len(one.values) for one in found.values())
+    several = any(len(one.values) > 1 for one in found.values())
+    bars = Figure(
+        f"{scope.stem}-bars",
+        f"Task performance ({scope.unit}) by {at.axis_name} and method",
+        "Mean over runs of the fittest team in fresh scenarios"
+        + ("; error bars: standard deviation of the runs" if several else "")
+        + f". {size} per bar.",
+        (),
+        rows,
+        drawing=figures.bars(
+            at.grid(found, lambda one: figures.Bar(one.mean.value, one.sd)),
+            at.places,
+            names,
+            x_label=at.axis,
+            y_label=scope.unit,
+            within=scope.within,
+        ),
+    )
+    if not several:
+        return [bars]
+    points = Figure(
+        f"{scope.stem}-runs",
+        title,
+        f"A point per run; next to them the mean with Student's 95 % interval. {size} per cell.",
+        (),
+        runs,
+        drawing=figures.points(
+            at.grid(found, lambda one: figures.Runs(one.values, _ends(one))),
+            at.places,
+            names,
+            x_label=at.axis,
+            y_label=scope.unit,
+            within=scope.within,
+        ),
+    )
+    return [bars, points]
+
+
+def _table(scope: Scope, rows: Sequence[Mapping[str, Any]]) -> Table:
+    """Return what every cell reached, with what is known of it."""
+    shown = _performance_columns(rows)
+    keys = {column.key for column in shown}
+    notes = {
+        "interval": "95 % interval: Student's t",
+        "generation_0": "generation 0: the fittest team of the first generation in the same "
+        "scenarios",
+        "p_ks": "p (KS): Kolmogorov-Smirnov against the normal fitted to the runs, as in the "
+        "thesis, which is too large",
+        "p_lilliefors": "p (Lilliefors): the same distance, judged correctly",
+    }
+    return Table(
+        f"{scope.stem}-performance",
+        f"Task performance ({scope.unit}) by environment and method",
+        "; ".join(
+            [
+                f"{scope.main.direction.capitalize()}. Mean over runs of the mean over fresh "
+                "scenarios",
+                "n: runs",
+            ]
+            + [note for key, note in notes.items() if key in keys]
+        )
+        + ".",
+        shown,
+        rows,
+        is_open=len(rows) <= 12,
+    )
 
 
 def _ends(one: Summary) -> tuple[float, float, float] | None:
@@ -122,8 +151,7 @@ def _summary_row(one: Summary, scope: Scope) -> dict[str, Any]:
 
 def _performance_columns(rows: Sequence[Mapping[str, Any]]) -> list[Column]:
     columns = [
-        Column("environment", "environment", plain),
-        Column("treatment", "method", plain),
+        *KEYS,
         Column("n", "n"),
         Column("mean", "mean"),
         Column("sd", "sd"),
@@ -134,14 +162,20 @@ def _performance_columns(rows: Sequence[Mapping[str, Any]]) -> list[Column]:
         Column("p_ks", "p (KS)", p_value),
         Column("p_lilliefors", "p (Lilliefors)", p_value),
     ]
-    optional = ("share", "generation_0")
-    return [c for c in columns if c.key not in optional or any(r[c.key] is not None for r in rows)]
+    return [c for c in columns if c in KEYS or any(_is_known(row[c.key]) for row in rows)]
+
+
+def _is_known(value: Any) -> bool:
+    """Whether there is a number, or two."""
+    return value is not None and value != (None, None)
 
 
 def _warnings(scope: Scope) -> list[str]:
     counts = [len(of) for of in scope.cells.values()]
     text = []
-    if min(counts) < 2:
+    if max(counts) < 2:
+        text.append("There is one run per cell: no deviation, no interval, and nothing is tested.")
+    elif min(counts) < 2:
         text.append("Cells with a single run have no deviation, no interval and no t-test.")
     if max(counts) < 20:
         text.append(

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+import math
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from conevo.analysis.comparison import Cell, Group, Treatment, group_values, treatments_of
-from conevo.analysis.exhibits import slug
+from conevo.analysis.exhibits import Column, plain, slug
 from conevo.analysis.frames import Tables, Value
+from conevo.analysis.sections.arrangement import Arrangement, arrange
 from conevo.worlds.measures import Measure
 
-__all__ = ["Scope", "named", "place_names", "scopes", "sizes", "span"]
+__all__ = ["KEYS", "Scope", "named", "place_names", "scopes", "sizes", "span"]
 
+
+KEYS = (Column("environment", "environment", plain), Column("treatment", "method", plain))
+"""Columns that name a cell."""
 
 Cells = Mapping[Cell, Sequence[Value]]
 
@@ -63,12 +67,36 @@ class Scope:
         return self.main.axis
 
     @property
+    def within(self) -> tuple[float, float]:
+        """Least and largest value of the main measure; infinite where nothing is known."""
+        optima = [one.optimum for values in self.cells.values() for one in values]
+        most = max((o for o in optima if o is not None), default=math.inf)
+        low, high = self.main.low, self.main.high
+        return (
+            -math.inf if low is None else low,
+            high if high is not None else math.inf if None in optima else most,
+        )
+
+    @property
     def axis(self) -> str:
         """What stands under an axis of environments."""
         short = self.group.world.rpartition("-v")[0] or self.group.world
         if place_names(self.environments) == self.environments:
             return f"{short} environment"
         return f"{short}/{self.group.family}-N, N ="
+
+    def arranged(self, cells: Collection[Cell], *, by_environment: bool = False) -> Arrangement:
+        """Return where cells are drawn; with ``by_environment`` places are always environments."""
+        environments = [e for e in self.environments if any(c.environment == e for c in cells)]
+        treatments = [t for t in self.treatments if any(c.treatment == t for c in cells)]
+        return arrange(
+            cells,
+            environments,
+            place_names(environments),
+            treatments,
+            self.axis,
+            by_environment=by_environment,
+        )
 
     def key(self, environment: str, treatment: Treatment) -> dict[str, str]:
         """Return how rows of numbers name a cell."""
@@ -106,15 +134,20 @@ def scopes(tables: Tables) -> list[Scope]:
     return found
 
 
-def named(
-    treatments: Iterable[Treatment], cells: Mapping[Cell, Sequence[Any]]
-) -> dict[Treatment, str]:
-    """Return the name of each treatment in legends, with the number of its runs per cell."""
-    return {
-        treatment: f"{treatment.title} ({span(counts)})"
-        for treatment in treatments
-        if (counts := [len(of) for cell, of in cells.items() if cell.treatment == treatment])
-    }
+def named(cells: Mapping[Cell, int]) -> dict[str, str]:
+    """Return the name of each method in legends, with its runs per cell unless all have as many.
+
+    Args:
+        cells: with their numbers of runs.
+    """
+    counts: dict[str, list[int]] = {}
+    for treatment in treatments_of(treatment for _, treatment in cells):
+        runs = [n for cell, n in cells.items() if cell.treatment == treatment]
+        counts.setdefault(treatment.method, []).extend(runs)
+    titles = {method: Treatment(method, "").title for method in counts}
+    if len(set(cells.values())) < 2:
+        return titles
+    return {method: f"{title} ({span(counts[method])})" for method, title in titles.items()}
 
 
 def place_names(environments: Sequence[str]) -> list[str]:
