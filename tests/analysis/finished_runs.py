@@ -198,6 +198,8 @@ def _run(
             "measure": list(task.measures),
             "unit": ["points"] * len(task.measures),
             "larger_is_better": [1.0] * len(task.measures),
+            "low": [0.0] * len(task.measures),
+            "high": [np.nan] * len(task.measures),
         },
         "scores": _scores(run, task, level, [names[k] for k in present], rng),
         "champions": {

@@ -21,6 +21,8 @@ from conevo.analysis.sections.overview import read_campaign
 from conevo.analysis.sections.scope import scopes
 from conevo.errors import UsageError
 
+pytestmark = pytest.mark.filterwarnings("error")
+
 PLACES = ["rover/complex-1", "rover/complex-2", "pursuit/team-4"]
 
 
@@ -274,7 +276,9 @@ def test_budgets_stand_apart(tmp_path) -> None:
 def test_odd_campaigns_have_a_report_too(of, tmp_path) -> None:
     root = write_campaign(tmp_path / "c", of, 1, 2, without=["behaviours", "robots", "castes"])
     text = write_report(root, tmp_path / "out").read_text()
-    assert "Cells with a single run have no deviation" in text
+    assert text.count("There is one run per cell: no deviation, no interval, and nothing") == 1
+    assert "Mann-Whitney" not in re.sub(r"(?s)<section id=.section-claims.*?</section>", "", text)
+    assert "95 % interval" not in re.sub(r"(?s)<section id=.section-claims.*?</section>", "", text)
 
 
 def test_a_world_where_nothing_was_achieved_has_no_losses(tmp_path) -> None:

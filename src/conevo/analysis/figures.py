@@ -265,7 +265,7 @@ def _bound(grid: Sequence[Axes], ends: Sequence[float]) -> None:
     if high < 0 and high > 0.7 * low:
         high = 0.0
     room = 0.05 * (high - low) or 0.05 * abs(high) or 1.0
-    bottom, top = (low if low == 0 else low - room), (high if high == 0 else high + room)
+    bottom, top = (low if low == 0 else low - room), (high if high == 0 > low else high + room)
     grid[0].set_ylim(bottom, top)
 
 

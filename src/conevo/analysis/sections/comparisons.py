@@ -37,14 +37,13 @@ TESTS = (
 )
 
 
-def comparisons(scope: Scope) -> Section:
-    """Return every two treatments of each environment compared."""
+def comparisons(scope: Scope) -> Section | None:
+    """Return every two treatments of each environment compared; None with one run per cell."""
     pairs = compare_all(scope.cells)
     if not pairs:
         return Section("Comparisons", ["There is one method only, so nothing to compare."])
     if all(pair.result.n_a < 2 or pair.result.n_b < 2 for pair in pairs):
-        text = ["With one run per cell nothing can be tested."]
-        return Section("Comparisons", text)
+        return None
     text = []
     few = [pair for pair in pairs if pair.too_few]
     if few:

@@ -189,6 +189,8 @@ def _warnings(scope: Scope) -> list[str]:
 
 def _pooled(scope: Scope) -> list[Exhibit]:
     """Return the table over all environments, if there is something to pool."""
+    if max(map(len, scope.cells.values())) < 2:
+        return []
     found = aggregate(scope.cells)
     if len(found) < 2 or (found[0].environments < 2 and len(scope.environments) > 1):
         return []
