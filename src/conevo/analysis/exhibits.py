@@ -27,6 +27,7 @@ __all__ = [
     "plain",
     "slug",
     "to_latex",
+    "with_values",
 ]
 
 Row = Mapping[str, Any]
@@ -194,6 +195,15 @@ class Section:
     def all_exhibits(self) -> list[Exhibit]:
         """Return the exhibits of the section and of its parts, in order."""
         return [*self.exhibits, *(one for part in self.sections for one in part.all_exhibits())]
+
+
+def with_values(columns: Sequence[Column], rows: Sequence[Row]) -> list[Column]:
+    """Return the columns that have a value in one of the rows."""
+    return [
+        column
+        for column in columns
+        if any(row.get(column.key) not in (None, (None, None)) for row in rows)
+    ]
 
 
 def slug(text: str) -> str:

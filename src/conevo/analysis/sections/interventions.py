@@ -22,6 +22,7 @@ from conevo.analysis.exhibits import (
     interval,
     p_value,
     plain,
+    with_values,
 )
 from conevo.analysis.sections.scope import KEYS, Scope, named, sizes
 from conevo.analysis.statistics import Estimate, compare, holm, mean_interval
@@ -215,14 +216,19 @@ def _table(scope: Scope, study: str, what: str, note: str, rows: list[dict[str, 
         Column("p_t", "p (t)", p_value),
         Column("p_holm", "p (MW, Holm)", p_value),
     ]
+    shown = with_values(columns, rows)
+    is_tested = any(column.key == "p_t" for column in shown)
+    tests = (
+        " with Student's 95 % interval. p (t): Student's independent t-test of changed and "
+        "unchanged teams, uncorrected, as in the thesis; p (MW, Holm): Mann-Whitney, corrected by "
+        f"Holm for the {len(rows)} rows."
+    )
     return Table(
         f"{scope.stem}-{study}-castes",
         f"Task performance ({scope.unit}) with a caste {what}",
         f"{note} n: runs that have the caste; % of unchanged: of the means; lost: percent of the "
-        "larger of the two, mean over runs with Student's 95 % interval. p (t): Student's "
-        "independent t-test of changed and unchanged teams, uncorrected, as in the thesis; p (MW, "
-        f"Holm): Mann-Whitney, corrected by Holm for the {len(rows)} rows.",
-        columns,
+        f"larger of the two, mean over runs{tests if is_tested else '.'}",
+        shown,
         rows,
         is_open=len(rows) <= 12,
     )

@@ -24,6 +24,7 @@ from conevo.analysis.exhibits import (
     number,
     p_value,
     plain,
+    with_values,
 )
 from conevo.analysis.sections.scope import KEYS, Scope, named, sizes, span
 
@@ -162,12 +163,7 @@ def _performance_columns(rows: Sequence[Mapping[str, Any]]) -> list[Column]:
         Column("p_ks", "p (KS)", p_value),
         Column("p_lilliefors", "p (Lilliefors)", p_value),
     ]
-    return [c for c in columns if c in KEYS or any(_is_known(row[c.key]) for row in rows)]
-
-
-def _is_known(value: Any) -> bool:
-    """Whether there is a number, or two."""
-    return value is not None and value != (None, None)
+    return with_values(columns, rows)
 
 
 def _warnings(scope: Scope) -> list[str]:
