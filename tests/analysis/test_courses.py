@@ -35,7 +35,7 @@ def tables(tmp_path: Path) -> Tables:
             for seed, *row in of:
                 if name == "generations":
                     generation, evaluations, value, s, sst = row
-                    row = [generation, evaluations, 0, value, 0, s, sst, None, 0, 10]
+                    row = [generation, evaluations, 0, value, 0, s, sst, None, 0, 0, 10]
                 run = f"rover-complex-1-cone--smoke-40-s{seed}"
                 marks = ", ".join("?" * (1 + len(row)))
                 connection.execute(f"INSERT INTO {name} VALUES ({marks})", [run, *row])

@@ -38,13 +38,13 @@ def test_a_value_is_the_mean_over_scenarios_of_one_run(tmp_path) -> None:
         )[1]
         assert len(scores) == 20
         assert first.value == pytest.approx(np.mean(scores), rel=1e-12)
-        assert (first.measure, first.optimum) == ("value", 5000.0)
+        assert (first.measure.name, first.optimum) == ("value", 5000.0)
 
 
 def test_other_measures_studies_and_teams_are_asked_for_by_name(tmp_path) -> None:
     with tables_of(tmp_path, cells(["rover/complex-2"], ["cone"]), seeds=2) as tables:
         area = tables.values("area")
-        assert {one.measure for one in area} == {"area"}
+        assert {one.measure.name for one in area} == {"area"}
         assert all(one.optimum is None and one.value < 1 for one in area)
         begun = tables.values(team="generation 0")
         assert all(a.value < b.value / 5 for a, b in zip(begun, tables.values(), strict=True))
