@@ -1,11 +1,11 @@
 """Measure what type C fitness and scenarios per round do to how well methods learn.
 
-    python docs/measure_learning.py TASK [--budget N] [--seeds 5] [--only NAME ...] [--threads 1]
+    python docs/measure_learning.py TASK [--part example] [--budget N] [--seeds 5] [--only NAME ...]
 
 evolves TASK with the preset ``desk`` in every variant of ``VARIANTS`` at the same number of team
-evaluations, and adds a row per run to ``docs/results/learning.csv``: the champion's main task
-performance in 100 fresh scenarios, and what was spent. The table between the markers of
-``docs/results/learning.md`` is made from all rows. The same seeds give the same numbers.
+evaluations, and adds a row per run to ``docs/results/learning-PART.csv``: the champion's main task
+performance in 100 fresh scenarios, and what was spent. The table of that part on the page
+``docs/results/learning.md`` is made from all its rows. The same seeds give the same numbers.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ import conevo
 from pages import Row, put, table, write
 
 RESULTS = Path(__file__).parent / "results"
-NUMBERS, PAGE = RESULTS / "learning.csv", RESULTS / "learning.md"
+PAGE = RESULTS / "learning.md"
 SAME: Row = {"method.fresh_rounds": False}
 OWN, TEAM, ONE = {"method.type_c": "own"}, {"method.type_c": "team"}, {"method.type_c_rounds": 1}
 FEWER: Row = {"method.genotypes": 20, "method.rounds": 10}
@@ -115,23 +115,25 @@ def main() -> None:
     """Make the runs that are missing, the numbers and the page."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("task")
+    parser.add_argument("--part", choices=("example", "rover"), default="example")
     parser.add_argument("--budget", type=int, default=50_000)
     parser.add_argument("--seeds", type=int, default=5)
     parser.add_argument("--only", nargs="*", choices=VARIANTS, default=list(VARIANTS))
     parser.add_argument("--threads", type=int, default=1)
     options = parser.parse_args()
+    numbers = RESULTS / f"learning-{options.part}.csv"
     rows: list[Row] = []
-    if NUMBERS.exists():
-        with NUMBERS.open(newline="") as file:
+    if numbers.exists():
+        with numbers.open(newline="") as file:
             rows = list(csv.DictReader(file))
     for seed in range(1, options.seeds + 1):
         for name in options.only:
             row = measure(options.task, name, seed, options.budget, options.threads)
             print(row, flush=True)
             rows.append(row)
-            write(rows, NUMBERS)
-    with NUMBERS.open(newline="") as file:
-        put(tables(list(csv.DictReader(file))), PAGE)
+            write(rows, numbers)
+    with numbers.open(newline="") as file:
+        put(tables(list(csv.DictReader(file))), PAGE, options.part)
 
 
 if __name__ == "__main__":
