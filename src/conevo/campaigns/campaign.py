@@ -24,11 +24,12 @@ import dataclasses
 import json
 import time
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
 from conevo.campaigns.admission import admit_code
+from conevo.campaigns.devices import CPU, next_device
 from conevo.campaigns.ended import read_ended
 from conevo.campaigns.executors import Ending, Executor, Job
 from conevo.campaigns.inputs import keep_files, renamed
@@ -215,7 +216,12 @@ class Campaign:
         return failed
 
     def carry_on(
-        self, executor: Executor, *, threads: int = 1, watch: Watch | None = None
+        self,
+        executor: Executor,
+        *,
+        threads: int = 1,
+        devices: Sequence[str] = (CPU,),
+        watch: Watch | None = None,
     ) -> dict[str, Entry]:
         """Finish what is missing, and make the tables of all that is finished.
 
@@ -225,6 +231,7 @@ class Campaign:
         Args:
             executor: where runs are carried out.
             threads: CPU threads of a run, at most as many as the executor has cores.
+            devices: on which runs are begun, in turn; the executor must have them.
             watch: called with the campaign and each ending; with None while there is none.
 
         Raises:
@@ -236,7 +243,7 @@ class Campaign:
             self.places.stop.unlink(missing_ok=True)
             self._reconcile()
             try:
-                self._carry_on(executor, min(threads, executor.cores), watch)
+                self._carry_on(executor, min(threads, executor.cores), devices, watch)
             finally:
                 executor.stop()
                 self.ledger.release()
@@ -262,7 +269,9 @@ class Campaign:
         self.ledger.put(sorted(done - was), "finished", "found finished")
         self.ledger.put(sorted((was & set(self.planned)) - done), "pending", "found unfinished")
 
-    def _carry_on(self, executor: Executor, threads: int, watch: Watch | None) -> None:
+    def _carry_on(
+        self, executor: Executor, threads: int, devices: Sequence[str], watch: Watch | None
+    ) -> None:
         waiting = deque(
             entry.label
             for entry in self.ledger.entries()
@@ -275,7 +284,8 @@ class Campaign:
             ready = self._ready(waiting, free) if waiting and free >= threads else deque()
             while ready and free >= threads:
                 share = max(threads, free // len(ready))
-                job = Job(self.path, ready.popleft(), share)
+                device = next_device(devices, (job.device for job in at_work.values()))
+                job = Job(self.path, ready.popleft(), share, device)
                 waiting.remove(job.label)
                 at_work[job.label] = job
                 free -= share

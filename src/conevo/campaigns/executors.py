@@ -10,11 +10,12 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar, Protocol
 
+from conevo.campaigns.devices import CPU, check_here
 from conevo.campaigns.places import Places
 from conevo.campaigns.work import carry_out, core_seconds
 from conevo.errors import UsageError, unknown_name
@@ -26,11 +27,12 @@ ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 @dataclass(frozen=True)
 class Job:
-    """One run to carry out, on so many threads."""
+    """One run to carry out, on so many threads and, if it has not begun, on this device."""
 
     root: Path
     label: str
     threads: int
+    device: str = CPU
 
 
 @dataclass(frozen=True)
@@ -78,7 +80,8 @@ class Serial:
 
     def submit(self, job: Job) -> None:
         """Carry the job out now; Ctrl-C reaches the run itself."""
-        carry_out(job.root, job.label, job.threads, spent_before=core_seconds())
+        spent = core_seconds()
+        carry_out(job.root, job.label, job.threads, device=job.device, spent_before=spent)
         self._endings.append(Ending(job.label))
 
     def wait(self, seconds: float) -> list[Ending]:
@@ -149,6 +152,7 @@ def spawn(job: Job) -> subprocess.Popen[bytes]:
 def worker_command(job: Job) -> list[str]:
     """Return the command that carries a job out."""
     arguments = [str(job.root.resolve()), job.label, str(job.threads)]
+    arguments += [job.device] if job.device != CPU else []
     return [sys.executable, "-m", "conevo.campaigns.work", *arguments]
 
 
@@ -170,7 +174,11 @@ EXECUTORS = (Processes.name, Serial.name, "ray")
 
 
 def make_executor(
-    name: str, cores: int | None = None, address: str | None = None, store: str | None = None
+    name: str,
+    cores: int | None = None,
+    address: str | None = None,
+    store: str | None = None,
+    devices: Sequence[str] = (CPU,),
 ) -> Executor:
     """Return an executor.
 
@@ -180,18 +188,22 @@ def make_executor(
         address: of an existing Ray cluster, or "auto"; by default Ray is started here.
         store: address of an object store ("s3://BUCKET/PATH") for Ray's nodes, if they do not see
             the campaign's directory.
+        devices: that its jobs will name.
 
     Raises:
-        UsageError: there is no such executor, what it needs is not installed, or it has no address.
+        UsageError: there is no such executor, what it needs is not installed, it has no address, or
+            devices that it does not choose among.
+        EnvironmentFailure: it does not have such a device.
     """
     if name not in EXECUTORS:
         raise unknown_name("executor", name, EXECUTORS)
     if name == "ray":
         from conevo.campaigns.executors_ray import RayCluster
 
-        return RayCluster(cores, address, store or "")
+        return RayCluster(cores, address, store or "", devices)
     for option, value in (("--address", address), ("--store", store)):
         if value is not None:
             raise UsageError(f"{option} {value}: only the executor ray has one, not {name}")
+    check_here(devices)
     kinds: dict[str, Callable[[int], Executor]] = {k.name: k for k in (Serial, Processes)}
     return kinds[name](cores or usable_cores())

@@ -12,11 +12,14 @@ import os
 import signal
 import tempfile
 import time
+from collections.abc import Sequence
 from contextlib import suppress
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 from typing import Any, ClassVar
 
+from conevo.campaigns.devices import CPU
 from conevo.campaigns.executors import Ending, Job, spawn, usable_cores, why_lost
 from conevo.campaigns.object_store import ObjectStore
 from conevo.campaigns.places import Places
@@ -37,17 +40,27 @@ class RayCluster:
         address: of a cluster that is running, "auto" or "HOST:PORT"; None begins one on this
             machine, which ends with this executor. conevo must be installed on all nodes.
         store: address of an object store, if the nodes do not see the campaign's directory.
+        devices: of its jobs: "cpu", or "cuda" for a GPU per task.
 
     Raises:
-        UsageError: Ray is not installed, or the object store's address is none.
-        EnvironmentFailure: there is no cluster at the address.
+        UsageError: Ray is not installed, the object store's address is none, or other devices.
+        EnvironmentFailure: there is no cluster at the address, or it has no GPU.
     """
 
     name: ClassVar[str] = "ray"
 
     def __init__(
-        self, cores: int | None = None, address: str | None = None, store: str = ""
+        self,
+        cores: int | None = None,
+        address: str | None = None,
+        store: str = "",
+        devices: Sequence[str] = (CPU,),
     ) -> None:
+        if not set(devices) <= {CPU, "cuda"}:
+            raise UsageError(
+                f"--device {','.join(devices)}: with the executor ray it is cpu or cuda; Ray gives "
+                f"every task a GPU of its own"
+            )
         os.environ["RAY_USAGE_STATS_ENABLED"] = "0"
         try:
             self._ray: Any = import_module("ray")
@@ -69,13 +82,18 @@ class RayCluster:
         if not any(nodes):
             self._ray.shutdown()
             raise EnvironmentFailure(f"Ray at {address or 'this machine'}: no node has CPU cores")
+        if set(devices) != {CPU} and not self._ray.cluster_resources().get("GPU"):
+            self._ray.shutdown()
+            raise EnvironmentFailure(
+                f"Ray at {address or 'this machine'}: no node has a GPU, for --device cuda"
+            )
         self._widest = max(nodes)
         self.cores = min(cores or sum(nodes), sum(nodes))
 
     def submit(self, job: Job) -> None:
         """Hand a task to the cluster; it never asks for more cores than one node has."""
         threads = min(job.threads, self._widest)
-        job = Job(job.root.resolve(), job.label, threads)
+        job = replace(job, root=job.root.resolve(), threads=threads)
         uri = ""
         if self._store is not None:
             uri = self._store.uri
@@ -83,8 +101,9 @@ class RayCluster:
             if not self._store.has_run(job.label):
                 self._store.put_run(job.root, job.label)
             self._store.forget_ending(job.root, job.label)
-        task = self._ray.remote(num_cpus=threads, max_retries=RETRIES)(_carry)
-        self._tasks[task.remote(str(job.root), job.label, threads, uri)] = job
+        gpus = {} if job.device == CPU else {"num_gpus": 1}
+        task = self._ray.remote(num_cpus=threads, max_retries=RETRIES, **gpus)(_carry)
+        self._tasks[task.remote(str(job.root), job.label, threads, uri, job.device)] = job
 
     def wait(self, seconds: float) -> list[Ending]:
         """Return the workers that are gone; their files have been fetched by then."""
@@ -118,13 +137,13 @@ class RayCluster:
         return Ending(job.label, lost)
 
 
-def _carry(root: str, label: str, threads: int, store: str) -> int:
+def _carry(root: str, label: str, threads: int, store: str, device: str = CPU) -> int:
     """Carry a run on, on the node where this is called, and return the worker's exit code."""
     if not store:
-        return _supervise(Job(Path(root), label, threads))
+        return _supervise(Job(Path(root), label, threads, device))
     copies = ObjectStore(store)
     with tempfile.TemporaryDirectory(prefix="conevo-") as folder:
-        job = Job(Path(folder), label, threads)
+        job = Job(Path(folder), label, threads, device)
         copies.get_plan(job.root)
         copies.get_run(job.root, label)
         Places(job.root).ended(label).unlink(missing_ok=True)

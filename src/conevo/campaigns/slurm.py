@@ -14,6 +14,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from conevo.campaigns.devices import CPU, parse_devices
 from conevo.campaigns.executors import ONE_THREAD
 from conevo.campaigns.places import Places
 from conevo.errors import UsageError, shown
@@ -51,14 +52,15 @@ runs=(
 export {variables}
 mkdir -p "$campaign/logs"
 exec >> "$campaign/logs/slurm-$SLURM_ARRAY_TASK_ID.txt" 2>&1
-leaving= failed=
+{check}leaving= failed=
 trap 'leaving=requeue; exec 3>&-' USR1  # the worker leaves when its stdin ends
 trap 'leaving=end; exec 3>&-' TERM
 for ((k = SLURM_ARRAY_TASK_ID; k < {n_runs}; k += {tasks})); do
     label=${{runs[k]}}
     if grep -qs '"status": "finished"' "$campaign/ended/$label.json"; then continue; fi
     echo "$(date -Is) $(hostname) $label"
-    exec 3> >(exec {python} -m conevo.campaigns.work "$campaign" "$label" "$SLURM_CPUS_PER_TASK" \\
+    exec 3> >(exec {python} -m conevo.campaigns.work "$campaign" "$label" \\
+        "$SLURM_CPUS_PER_TASK"{device} \\
         >> "$campaign/logs/$label.txt" 2>&1)
     worker=$!
     while kill -0 "$worker" 2> /dev/null; do wait "$worker"; done  # a signal interrupts wait
@@ -73,6 +75,11 @@ done
 [ -z "$failed" ]  # SLURM lists a task as failed if one of its runs is
 """
 
+# A node without the device ends its task with one line, before any of its runs is begun.
+CHECK = """\
+{python} -m conevo.campaigns.devices {device} || exit 3
+"""
+
 
 def write_array(
     root: Path,
@@ -82,6 +89,7 @@ def write_array(
     hours: float = 24.0,
     at_once: int | None = None,
     options: Sequence[str] = (),
+    device: str = CPU,
     python: str = sys.executable,
 ) -> Path:
     """Write ``slurm.sh`` into a campaign's directory; nothing is submitted.
@@ -93,6 +101,7 @@ def write_array(
         hours: time limit of a task; what takes longer is put into the queue again.
         at_once: tasks that may run together; no limit by default.
         options: of sbatch, for every task: "--gres=gpu:1"; see ``check_request``.
+        device: on which runs are begun: "cpu" or a CUDA device of every node.
         python: the interpreter on the nodes.
 
     Raises:
@@ -102,7 +111,7 @@ def write_array(
     """
     if not labels:
         raise UsageError(f"{root} has no run left to carry out")
-    check_request(hours, options)
+    check_request(hours, options, device)
     root = root.resolve()
     path = root / "slurm.sh"
     tasks = min(len(labels), TASKS)
@@ -120,6 +129,8 @@ def write_array(
         runs="\n".join(shlex.quote(label) for label in labels),
         variables=" ".join(f"{name}=1" for name in ONE_THREAD),
         python=shlex.quote(python),
+        device="" if device == CPU else f" {device}",
+        check="" if device == CPU else CHECK.format(python=shlex.quote(python), device=device),
     )
     for label in labels:  # what the script would take for finished, and is not any more
         _forget_finished(Places(root).ended(label))
@@ -127,14 +138,16 @@ def write_array(
     return path
 
 
-def check_request(hours: float, options: Sequence[str]) -> None:
-    """Refuse a time limit or options with which the script would not work.
+def check_request(hours: float, options: Sequence[str], device: str = CPU) -> None:
+    """Refuse a time limit, options or devices with which the script would not work.
 
     Raises:
         UsageError: less time than a worker is given to leave, or more than a year; an option is
             not written ``--NAME`` or ``--NAME=VALUE`` in the characters that ``#SBATCH`` lines take
-            as they are, is the script's own, or is there twice.
+            as they are, is the script's own, or is there twice; several devices.
     """
+    if len(parse_devices(device)) > 1:
+        raise UsageError(f"--device {device}: a task of the array has one device, cpu or cuda")
     if not 2 * GRACE <= hours * 3600 <= MOST_HOURS * 3600:
         raise UsageError(
             f"--hours {hours:g}: must be from {2 * GRACE / 3600:g} (a worker has {GRACE} s to "

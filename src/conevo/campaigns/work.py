@@ -1,8 +1,8 @@
 """One worker: carries one run of a campaign to its end, wherever it stands.
 
-``python -m conevo.campaigns.work CAMPAIGN LABEL THREADS`` is the unit of work of every executor.
-It is idempotent: a finished run is left alone, an interrupted one goes on from its checkpoint, and
-how it ended is a file, ``ended/LABEL.json``, that holds plain data.
+``python -m conevo.campaigns.work CAMPAIGN LABEL THREADS [DEVICE]`` is the unit of work of every
+executor. It is idempotent: a finished run is left alone, an interrupted one goes on from its
+checkpoint, and how it ended is a file, ``ended/LABEL.json``, that holds plain data.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from conevo.campaigns.admission import admit_code
+from conevo.campaigns.devices import CPU
 from conevo.campaigns.inputs import located
 from conevo.campaigns.places import Places
 from conevo.campaigns.plan import PlannedRun
@@ -57,13 +58,16 @@ def planned_runs(root: Path) -> dict[str, PlannedRun]:
     return {run.label: run.mapped(lambda value: located(value, root)) for run in runs}
 
 
-def carry_out(root: Path, label: str, threads: int, *, spent_before: float = 0.0) -> bool:
+def carry_out(
+    root: Path, label: str, threads: int, *, device: str = CPU, spent_before: float = 0.0
+) -> bool:
     """Carry a run on to its end, study it, and write down how it ended.
 
     Args:
         root: the campaign's directory.
         label: which of its runs.
         threads: CPU threads; no result depends on it.
+        device: of a run that has not begun; what has is carried on where it was.
         spent_before: core seconds of this process that are not the run's.
 
     Returns:
@@ -77,7 +81,7 @@ def carry_out(root: Path, label: str, threads: int, *, spent_before: float = 0.0
         if label not in planned:
             raise UsageError(f"{root} plans no run {label!r}")
         admit_code(places, planned)
-        found = _evolve(places, planned[label], threads)
+        found = _evolve(places, planned[label], threads, device)
         if planned[label].studies:
             _study(places, planned[label], found, threads)
     except _InUse:
@@ -112,7 +116,7 @@ def _describe(error: Exception) -> dict[str, str]:
     return {"origin": "program", "message": repr(error), "traceback": trace}
 
 
-def _evolve(places: Places, planned: PlannedRun, threads: int) -> Run | Shaping:
+def _evolve(places: Places, planned: PlannedRun, threads: int, device: str) -> Run | Shaping:
     """Return the run, finished by now."""
     path = places.run(planned.label)
     if not kind_of(path):
@@ -127,10 +131,11 @@ def _evolve(places: Places, planned: PlannedRun, threads: int) -> Run | Shaping:
                 path,
                 planned.overrides,
                 threads=threads,
+                device=device,
                 command=command,
             )
         else:
-            start(configs[0], path, threads=threads, command=command)
+            start(configs[0], path, threads=threads, device=device, command=command)
     found = Shaping(path) if kind_of(path) == "shaping" else Run(path)
     if found.run_ids != planned.run_ids:
         raise UsageError(f"{path} is not the run that was planned; move it away and retry")
@@ -162,7 +167,7 @@ def _frozen(value: Any) -> Any:
 
 def main() -> None:
     """Carry out one run; end when the coordinator does, which holds the other end of stdin."""
-    root, label, threads = sys.argv[1:]
+    root, label, threads, device = [*sys.argv[1:], CPU][:4]
     # A shell's background jobs ignore interrupts, and what they begin does so, too.
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
@@ -173,7 +178,7 @@ def main() -> None:
     if not sys.stdin.isatty():
         threading.Thread(target=leave_with_coordinator, daemon=True).start()
     try:
-        is_finished = carry_out(Path(root), label, int(threads))
+        is_finished = carry_out(Path(root), label, int(threads), device=device)
     except KeyboardInterrupt:
         os._exit(130)
     sys.stdout.flush()

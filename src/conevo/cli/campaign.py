@@ -27,6 +27,10 @@ EXECUTION = (
         "--threads", type=click.IntRange(1), default=1, show_default=True,
         help="CPU threads of a run; changes no result.",
     ),
+    click.option(
+        "--device", metavar="DEVICES", default="cpu", show_default=True,
+        help="cpu, cuda, or several that workers use in turn: cuda:0,cuda:1.",
+    ),
     click.option("--address", metavar="ADDRESS", help="With ray: of an existing cluster, or auto."),
     click.option(
         "--store", metavar="URI",
@@ -130,6 +134,7 @@ def start(
 @click.option("--account", metavar="NAME", help="SLURM account.")
 @click.option("--gres", metavar="GRES", help="Resources of a task, for example gpu:1.")
 @click.option("--mem", metavar="SIZE", help="Memory of a task, for example 8G.")
+@click.option("--device", default="cpu", show_default=True, help="cpu or cuda; see --gres.")
 @click.option(
     "--sbatch", "others", metavar="OPTION", multiple=True,
     help="Another option of sbatch, for example --sbatch=--constraint=avx512.",
@@ -144,6 +149,7 @@ def slurm(
     threads: int,
     hours: float,
     at_once: int | None,
+    device: str,
     others: tuple[str, ...],
     accept_other_code: bool,
     **named: str | None,
@@ -157,15 +163,23 @@ def slurm(
 
     options = [f"--{key}={value}" for key, value in named.items() if value is not None]
     options += others
-    check_request(hours, options)
+    check_request(hours, options, device)
     found, plan = _planned(name, preset, seeds, settings, out)
     found = found or _create(plan, name, out, accept_other_code)
     found.admit_code(accept_other_code)
     left = [label for label in found.planned if not found.is_finished(label)]
     path = write_array(
-        found.path, left, threads=threads, hours=hours, at_once=at_once, options=options
+        found.path,
+        left,
+        threads=threads,
+        hours=hours,
+        at_once=at_once,
+        options=options,
+        device=device,
     )
     click.echo(f"{len(left)} runs; submit them with: sbatch {path}")
+    if device != "cpu" and not any(option.startswith(("--gres", "--gpus")) for option in options):
+        click.echo("conevo: note: the tasks ask SLURM for no GPU; add --gres gpu:1", err=True)
 
 
 @campaign.command(short_help="How a campaign stands.")

@@ -12,6 +12,7 @@ from typing import Any
 import click
 
 from conevo.campaigns.campaign import Campaign, Stopped
+from conevo.campaigns.devices import parse_devices
 from conevo.campaigns.estimate import remaining_seconds
 from conevo.campaigns.executors import Ending, Executor, make_executor
 from conevo.campaigns.ledger import Entry
@@ -31,6 +32,7 @@ class Execution:
 
     executor: Executor
     threads: int
+    devices: tuple[str, ...]
     style: str
 
 
@@ -38,6 +40,7 @@ def ready(
     executor: str,
     cores: int | None,
     threads: int,
+    device: str,
     address: str | None,
     store: str | None,
     as_json: bool,
@@ -47,13 +50,15 @@ def ready(
 
     Raises:
         UsageError: options that do not go together, an unknown executor or one not installed.
+        EnvironmentFailure: there is no such device.
     """
-    made = make_executor(executor, cores, address, store)
+    devices = parse_devices(device)
+    made = make_executor(executor, cores, address, store, devices)
     if threads > made.cores:
         raise UsageError(f"--threads {threads}: there are only {made.cores} cores to use")
     if executor == "serial":
         threads = made.cores  # of the only run at work
-    return Execution(made, threads, style_of(as_json, quiet, False))
+    return Execution(made, threads, devices, style_of(as_json, quiet, False))
 
 
 def carry_on(campaign: Campaign, execution: Execution) -> int:
@@ -63,7 +68,10 @@ def carry_on(campaign: Campaign, execution: Execution) -> int:
     try:
         with view.showing():
             entries = campaign.carry_on(
-                execution.executor, threads=execution.threads, watch=view.watch
+                execution.executor,
+                threads=execution.threads,
+                devices=execution.devices,
+                watch=view.watch,
             )
     except (KeyboardInterrupt, Stopped) as error:
         word = "stopped" if isinstance(error, Stopped) else "interrupted"

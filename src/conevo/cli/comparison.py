@@ -65,6 +65,15 @@ def compare(order: Order, plan: Plan, dry_run: bool) -> int:
     if dry_run:
         print_plan(plan.write_out(), order.as_json)
         return 0
-    execution = ready("processes", order.threads, 1, None, None, order.as_json, order.quiet)
+    execution = ready(
+        executor="processes",
+        cores=order.threads,
+        threads=1,
+        device=order.device,
+        address=None,
+        store=None,
+        as_json=order.as_json,
+        quiet=order.quiet,
+    )
     path = Path(order.out) if order.out else CAMPAIGNS / plan.name
     return carry_on(create(plan, path), execution)

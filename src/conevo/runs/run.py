@@ -9,7 +9,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from conevo.errors import UsageError
+from conevo.errors import EnvironmentFailure, UsageError
 from conevo.runs import provenance
 from conevo.runs.code import last_code, refuse_other_code
 from conevo.runs.directory import refuse_existing
@@ -474,7 +474,15 @@ class Run:
         lab, self._lab = self._lab, None
         about = self.provenance
         if lab is None:
-            lab = Lab.equip(self.config, threads, about["device"])
+            device = about["device"]
+            try:
+                lab = Lab.equip(self.config, threads, device)
+            except EnvironmentFailure as error:
+                if device == "cpu":
+                    raise
+                raise EnvironmentFailure(
+                    f"{self.path} was begun on {device} and goes on there only: {error}"
+                ) from error
         if lab.rollout.kernel_hash != about["kernel_hash"]:
             raise UsageError(
                 f"{self.path} was made with other kernels ({about['kernel_hash']}, here "

@@ -20,7 +20,7 @@ from conevo.worlds.contract import PHASES, refuse_faults, sizes_of
 from conevo.worlds.measures import measures_of
 from conevo.worlds.protocol import Outcome, Scenarios, Simulation, World
 
-__all__ = ["Rollout", "episode_kernel"]
+__all__ = ["Rollout", "check_device", "episode_kernel"]
 
 # Worlds simulated at once: bounds memory (about 0.13 MB each), keeps all threads or blocks busy.
 CHUNK = 512
@@ -151,8 +151,9 @@ def _settling_kernel(
     return episode
 
 
-def _check_device(device: str) -> None:
-    """Refuse a device that this machine does not have."""
+def check_device(device: str) -> None:
+    """Raise EnvironmentFailure for a device that this machine does not have."""
+    engine.start()
     allowed = ["cpu", *(d.alias for d in wp.get_cuda_devices())]
     if device not in (*allowed, *(["cuda"] if len(allowed) > 1 else [])):
         why = "no CUDA device on this machine; " if len(allowed) == 1 else ""
@@ -190,7 +191,7 @@ class Rollout:
         self.n_threads = n_threads or engine.usable_threads()
         self.lanes = 32 if device != "cpu" else lanes
         self._chunk = CHUNK if device == "cpu" else CUDA_CHUNK
-        _check_device(device)
+        check_device(device)
         with engine.building:
             self._simulation = world.simulation()
             refuse_faults(world, self._simulation)

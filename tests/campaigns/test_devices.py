@@ -1,0 +1,233 @@
+"""Campaigns on GPUs, of which this machine may have none: what is asked and what is refused."""
+
+import json
+import subprocess
+import sys
+from types import SimpleNamespace
+
+import pytest
+
+from campaigns.plans import tiny_campaign
+from conevo.campaigns import devices, slurm, work
+from conevo.campaigns.devices import next_device, parse_devices
+from conevo.campaigns.executors import Ending, Job, make_executor, worker_command
+from conevo.cli.main import main
+from conevo.errors import EnvironmentFailure, UsageError
+
+
+@pytest.fixture
+def campaign(tmp_path):
+    return tiny_campaign(tmp_path / "campaigns")
+
+
+@pytest.fixture
+def two_gpus(monkeypatch):
+    """Pretend that this machine has two GPUs; nothing is compiled for them."""
+    known = [SimpleNamespace(alias=f"cuda:{k}") for k in range(2)]
+    monkeypatch.setattr("warp.get_cuda_devices", lambda: known)
+
+
+class Recorder:
+    """An executor that only notes what it is given; ``finish`` ends its oldest job."""
+
+    name = "recorder"
+
+    def __init__(self, cores):
+        self.cores, self.jobs, self.running = cores, [], []
+
+    def submit(self, job):
+        self.jobs.append(job)
+        self.running.append(job)
+
+    def wait(self, seconds):
+        return [Ending(self.running.pop(0).label, "killed by signal 9")]
+
+    def stop(self):
+        self.running.clear()
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [("cpu", ("cpu",)), ("cuda", ("cuda",)), ("cuda:1", ("cuda:1",)),
+     ("cuda:0, cuda:3", ("cuda:0", "cuda:3"))],
+)  # fmt: skip
+def test_devices_are_named_as_warp_does(text, expected):
+    assert parse_devices(text) == expected
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("", "'' is not a device"),
+        ("gpu", "'gpu' is not a device; allowed: cpu, cuda, cuda:0, or several"),
+        ("cuda:0,", "'' is not a device"),
+        ("cuda:0;reboot", "is not a device"),
+        ("cuda:1,cuda:1", "a device is there twice"),
+        ("cpu,cuda:0", "several devices are written cuda:0,cuda:1"),
+        ("cuda,cuda:0", "several devices are written cuda:0,cuda:1"),
+    ],
+)
+def test_what_is_not_a_device_is_refused(text, says):
+    with pytest.raises(UsageError, match=says):
+        parse_devices(text)
+
+
+def test_workers_use_devices_in_turn():
+    assert next_device(["cuda:0", "cuda:1"], []) == "cuda:0"
+    assert next_device(["cuda:0", "cuda:1"], ["cuda:0"]) == "cuda:1"
+    assert next_device(["cuda:0", "cuda:1"], ["cuda:1", "cuda:0", "cuda:1"]) == "cuda:0"
+
+
+def test_every_worker_slot_has_a_device(campaign):
+    executor = Recorder(4)
+    campaign.carry_on(executor, devices=("cuda:0", "cuda:1"))
+    first = [job.device for job in executor.jobs[:4]]
+    assert first == ["cuda:0", "cuda:1", "cuda:0", "cuda:1"]
+    # Whoever takes the place of a worker that has ended takes its device.
+    assert executor.jobs[4].device == "cuda:0"
+
+
+def test_the_device_reaches_the_run_that_is_begun(campaign, monkeypatch):
+    label = next(iter(campaign.planned))
+    job = Job(campaign.path, label, 1, "cuda:1")
+    assert worker_command(job)[-4:] == [str(campaign.path.resolve()), label, "1", "cuda:1"]
+    asked = []
+    monkeypatch.setattr(work, "start", lambda *_, **more: asked.append(more["device"]))
+    monkeypatch.setattr(sys, "argv", ["work", *worker_command(job)[-4:]])
+    monkeypatch.setattr(work.os, "_exit", lambda code: asked.append(code))
+    monkeypatch.setattr(work.signal, "signal", lambda *_: None)
+    monkeypatch.setattr(sys.stdin, "isatty", lambda: True, raising=False)
+    work.main()
+    assert asked == ["cuda:1", 1]  # nothing was begun, and so nothing finished
+
+
+def test_a_device_that_is_not_here_ends_a_campaign_before_a_run_is_begun(campaign, capsys):
+    for executor in ("serial", "processes"):
+        with pytest.raises(SystemExit) as ended:
+            main(["campaign", "start", str(campaign.path), "--executor", executor,
+                  "--device", "cuda:7"])  # fmt: skip
+        assert ended.value.code == 3
+        said = capsys.readouterr()
+        assert said.out == ""
+        assert said.err.startswith("conevo: error: device 'cuda:7': ")
+        assert said.err.count("\n") == 1
+    assert not (campaign.path / "runs").exists()
+    assert not (campaign.path / "ledger.sqlite").exists()
+
+
+def test_devices_that_are_here_are_accepted(two_gpus):
+    assert make_executor("processes", 2, devices=("cuda:0", "cuda:1")).cores == 2
+    with pytest.raises(EnvironmentFailure, match="'cuda:2': allowed here: cpu, cuda:0, cuda:1"):
+        make_executor("processes", 2, devices=("cuda:2",))
+
+
+def test_a_run_goes_on_where_it_was_begun_or_says_that_it_cannot(campaign):
+    label = next(iter(campaign.planned))
+    path = campaign.places.run(label)
+    run = work.start(campaign.planned[label].configs()[0], path, threads=1)
+    about = json.loads((path / "provenance.json").read_text())
+    (path / "provenance.json").write_text(json.dumps(about | {"device": "cuda:7"}))
+    assert not work.carry_out(campaign.path, label, 1)
+    ended = json.loads(campaign.places.ended(label).read_text())
+    assert ended["origin"] == "machine"
+    assert ended["message"].startswith(
+        f"{path} was begun on cuda:7 and goes on there only: device 'cuda:7': "
+    )
+    (path / "provenance.json").write_text(json.dumps(about))
+    assert work.carry_out(campaign.path, label, 1, device="cuda:7")  # begun on the CPU
+    assert run.status == "finished"
+
+
+# --- clusters -------------------------------------------------------------------------------------
+
+
+def test_a_slurm_task_has_its_device_and_looks_for_it_first(campaign, tmp_path):
+    labels = list(campaign.planned)
+    assert "cuda" not in slurm.write_array(campaign.path, labels).read_text()
+    script = slurm.write_array(campaign.path, labels, device="cuda:7")
+    environment = {"SLURM_ARRAY_TASK_ID": "0", "SLURM_CPUS_PER_TASK": "1", "PATH": "/usr/bin:/bin"}
+    pythonpath = {"PYTHONPATH": ":".join(sys.path)}
+    done = subprocess.run(["bash", str(script)], env=environment | pythonpath, check=False)
+    assert done.returncode == 3
+    said = (campaign.path / "logs" / "slurm-0.txt").read_text()
+    assert "device 'cuda:7': " in said
+    assert said.count("\n") == 1
+    assert not (campaign.path / "runs").exists()
+    text = script.read_text()
+    assert '"$SLURM_CPUS_PER_TASK" cuda:7 \\\n' in text
+    with pytest.raises(UsageError, match="a task of the array has one device"):
+        slurm.write_array(campaign.path, labels, device="cuda:0,cuda:1")
+
+
+@pytest.mark.parametrize(
+    ("options", "advice"),
+    [([], True), (["--gres", "gpu:1"], False), (["--sbatch", "--gpus-per-task=1"], False)],
+)
+def test_a_slurm_array_on_gpus_that_asks_for_none_is_told(campaign, capsys, options, advice):
+    with pytest.raises(SystemExit) as ended:
+        main(["campaign", "slurm", str(campaign.path), "--device", "cuda", *options])
+    assert ended.value.code == 0
+    assert ("add --gres gpu:1" in capsys.readouterr().err) == advice
+
+
+class FakeRay:
+    """As much of Ray as an executor asks of it, on a cluster with so many GPUs."""
+
+    def __init__(self, gpus):
+        self.gpus, self.asked = gpus, []
+
+    def init(self, address, **options):
+        pass
+
+    def shutdown(self):
+        pass
+
+    def nodes(self):
+        return [{"Alive": True, "Resources": {"CPU": 4.0, "GPU": self.gpus}}]
+
+    def cluster_resources(self):
+        return {"CPU": 4.0} | ({"GPU": self.gpus} if self.gpus else {})
+
+    def remote(self, **resources):
+        def task(_):
+            return SimpleNamespace(remote=lambda *words: self.asked.append((resources, words)))
+
+        return task
+
+
+@pytest.fixture
+def ray_with(monkeypatch):
+    """Return a function that puts a cluster with so many GPUs in place of Ray."""
+
+    def make(gpus):
+        fake = FakeRay(gpus)
+        monkeypatch.setattr("conevo.campaigns.executors_ray.import_module", lambda _: fake)
+        return fake
+
+    return make
+
+
+def test_a_ray_task_asks_for_a_gpu_where_its_device_is_one(campaign, ray_with):
+    label = next(iter(campaign.planned))
+    fake = ray_with(2)
+    executor = make_executor("ray", 4, devices=("cuda",))
+    executor.submit(Job(campaign.path, label, 1, "cuda"))
+    executor.submit(Job(campaign.path, label, 1))
+    (on_gpu, words), (on_cpu, others) = fake.asked
+    assert (on_gpu["num_gpus"], on_gpu["num_cpus"], words[-1]) == (1, 1, "cuda")
+    assert ("num_gpus" in on_cpu, others[-1]) == (False, "cpu")
+
+
+def test_a_ray_cluster_without_gpus_or_with_numbered_ones_is_refused(ray_with):
+    ray_with(0)
+    with pytest.raises(EnvironmentFailure, match="no node has a GPU, for --device cuda"):
+        make_executor("ray", 4, devices=("cuda",))
+    assert make_executor("ray", 4).cores == 4
+    with pytest.raises(UsageError, match="with the executor ray it is cpu or cuda"):
+        make_executor("ray", 4, devices=("cuda:0", "cuda:1"))
+
+
+def test_the_check_of_a_node_is_quiet_where_all_is_well(monkeypatch, capsys):
+    monkeypatch.setattr(sys, "argv", ["devices", "cpu"])
+    devices.main()
+    assert capsys.readouterr() == ("", "")
