@@ -1,4 +1,5 @@
 import tomllib
+from pathlib import Path
 
 import pytest
 
@@ -67,6 +68,26 @@ def test_a_factor_may_belong_to_some_runs_only(tmp_path):
     again = tmp_path / "again.toml"
     again.write_text(plan.to_toml())
     assert read_plan(again) == plan
+
+
+def test_two_worlds_of_one_name_are_refused(tmp_path):
+    text = (Path(__file__).parents[2] / "examples" / "light.py").read_text()
+    for name in ("one.py", "two.py"):
+        (tmp_path / name).write_text(f"{text}\n# {name}\n")
+    worlds = [f"{tmp_path}/{name}:dark-1" for name in ("one.py", "two.py")]
+    file = tmp_path / "plan.toml"
+    for levels, is_fine in ((worlds, False), (worlds[:1], True)):
+        levels_text = ", ".join(f'"{one}"' for one in levels)
+        file.write_text(
+            '[campaign]\nname = "mine"\ntitle = "x"\npreset = "smoke"\nseeds = 1\n\n'
+            f'[factors]\nworld = [{levels_text}]\nmethod = ["homcne"]\n'
+        )
+        if is_fine:
+            assert len(read_plan(file).write_out()) == 1
+            continue
+        words = "light-v1 in .*plan.toml is the name of two worlds, .*/one.py and .*/two.py: their ENTRY"
+        with pytest.raises(UsageError, match=words):
+            read_plan(file).write_out()
 
 
 def test_a_plan_is_what_it_was_after_being_written_and_read(tmp_path):

@@ -9,7 +9,7 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -20,6 +20,7 @@ from conevo.campaigns.inputs import located, shown_as
 from conevo.errors import UsageError, unknown_name
 from conevo.runs.config import PRESETS, RunConfig, resolve
 from conevo.runs.shaping import tasks_up_to
+from conevo.worlds.registry import resolve as resolve_world
 
 __all__ = ["Plan", "PlannedRun", "Where"]
 
@@ -195,12 +196,25 @@ class Plan:
         Raises:
             UsageError: an unknown name or a value that is not allowed in any run.
         """
-        written = [self._write_cell(levels) for levels in self._cells()]
+        cells = self._cells()
+        self._refuse_namesakes({levels["world"] for levels in cells})
+        written = [self._write_cell(levels) for levels in cells]
         runs = [run for same_seed in zip(*written, strict=True) for run in same_seed]
         labels = [run.label for run in runs]
         if twice := sorted({label for label in labels if labels.count(label) > 1}):
             raise UsageError(f"{twice[0]} {self.place} is planned twice: a level or seed is double")
         return runs
+
+    def _refuse_namesakes(self, worlds: Iterable[str]) -> None:
+        """Refuse two worlds that are named alike: results go by the name."""
+        files: dict[str, str] = {}
+        for entry, _ in map(resolve_world, sorted(worlds)):
+            other = files.setdefault(entry.name, entry.file)
+            if other != entry.file:
+                raise UsageError(
+                    f"{entry.name} {self.place} is the name of two worlds, {other} and "
+                    f"{entry.file}: their ENTRY must have different names"
+                )
 
     def _write_cell(self, levels: Mapping[str, Any]) -> list[PlannedRun]:
         """Return the runs of one combination of levels."""
