@@ -55,7 +55,9 @@ class Simulation:
     scene: struct type of a scenario; its arrays are those of the scenarios object, by name: flat
         over the scenarios, or of two and more dimensions if all scenarios share them.
     params_type, params: struct type of the parameters, and the parameters.
-    functions: the phases of an epoch: reset, sense, act, commit, resolve, outcome.
+    functions: the phases of an epoch: reset, sense, act, commit, resolve, outcome; and, of a world
+        with something that robots share, settle, once for the team between commit and resolve.
+        Within a phase, robots visited in any order must give the same bits.
     recorded: state arrays that ``Rollout.record`` keeps, iteration by iteration.
     recorded_at_end: state arrays that it keeps at the end.
     """
