@@ -68,6 +68,42 @@ def test_details_have_every_generation(tmp_path):
         watched.details("other")
 
 
+def test_units_and_directions_are_those_that_the_provenance_declares(tmp_path):
+    path = write_run(tmp_path / "run", 2)
+    watched = Watched([path])
+    (panel,) = watched.snapshot()["panels"]
+    assert (panel["about"], panel["larger_is_better"]) == ("larger is better", True)
+    assert one(watched)["declared"] == {}
+
+    other = write_run(tmp_path / "other", 2)
+    declared = {"name": "value", "unit": "cm", "larger_is_better": False}
+    (other / "provenance.json").write_text(json.dumps({"world": {"measures": [declared]}}))
+    watched = Watched([other])
+    (panel,) = watched.snapshot()["panels"]
+    assert (panel["measure"], panel["about"]) == ("value", "cm, smaller is better")
+    assert panel["larger_is_better"] is False
+    assert one(watched)["declared"] == {"value": "cm, smaller is better"}
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        "",
+        "[]",
+        "{",
+        '{"world": 1}',
+        '{"world": {"measures": [3]}}',
+        '{"world": {"measures": [{"name": 1}]}}',
+        "[" * 50_000,
+    ],
+)
+def test_a_damaged_provenance_declares_nothing(tmp_path, content):
+    path = write_run(tmp_path / "run", 2)
+    (path / "provenance.json").write_text(content)
+    run = one(Watched([path]))
+    assert (run["declared"], run["problem"], run["generation"]) == ({}, "", 2)
+
+
 def test_very_many_generations_are_thinned_evenly_with_the_first_and_the_last(tmp_path):
     path = write_run(tmp_path / "run", 5003, generations=6000)
     watched = Watched([path])

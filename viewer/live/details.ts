@@ -107,7 +107,7 @@ export class DetailsView {
     this.data = data;
     const measures = Object.keys(data.measures);
     if (JSON.stringify(measures) !== JSON.stringify([...this.measure.options].map((o) => o.value))) {
-      this.measure.replaceChildren(...measures.map((name) => make("option", { value: name }, name)));
+      this.measure.replaceChildren(...measures.map((name) => make("option", { value: name }, titled(name, data))));
     }
     this.measure.hidden = measures.length < 2;
     this.drawCharts();
@@ -130,14 +130,14 @@ export class DetailsView {
     const name = this.measure.value;
     const [blue, orange, green] = state.palette;
     const column = (key: string): Values => data.columns[key] ?? [];
-    this.lines(this.performance, name, [[name, own(data.measures, name) ?? [], blue ?? INK]]);
+    this.lines(this.performance, titled(name, data), [[name, own(data.measures, name) ?? [], blue ?? INK]]);
     this.lines(this.fitness, "fitness", [
       ["fittest team", column("team_fitness"), blue ?? INK],
       ["best genotype", column("best_fitness"), orange ?? INK],
       ["mean of genotypes", column("mean_fitness"), green ?? INK],
     ]);
     const has = (key: string): boolean => column(key).some((value) => value !== null);
-    const lines: Line[] = [["S (mean of the team)", column("specialization"), INK]];
+    const lines: Line[] = [["S (0 = always the same action, 1 = switches all the time)", column("specialization"), INK]];
     if (has("sst")) lines.push(["SST", column("sst"), blue, [6, 3]]);
     if (has("gst")) lines.push(["GST", column("gst"), orange, [2, 3]]);
     this.lines(this.thresholds, "", lines, [0, 1]);
@@ -269,4 +269,10 @@ function markStages(plot: uPlot, stages: Details["stages"]): void {
     ctx.fillText(`stage ${stage}`, x + 4, bbox.top + 10 * devicePixelRatio);
   }
   ctx.restore();
+}
+
+/** Return a measure with its unit and direction, as far as they are known. */
+function titled(name: string, run: Summary): string {
+  const about = own(run.declared, name);
+  return about ? `${name} (${about})` : name;
 }

@@ -45,9 +45,11 @@ export class PanelView {
 
   private drawTable(state: State, panel: Panel): void {
     const measure = panel.measure || "performance";
-    const head = [panel.by, "runs", `${measure} (median)`, "lowest to highest", "fitness", "S", "evaluations"];
+    const head = [panel.by, "runs", `${measure} (median; ${panel.about})`, "lowest to highest", "fitness", "S", "evaluations"];
     this.head.replaceChildren(...head.map((text) => make("th", { scope: "col" }, text)));
-    const rows = [...panel.rows].sort((a, b) => (b.performance ?? -Infinity) - (a.performance ?? -Infinity));
+    const sign = panel.larger_is_better ? 1 : -1; // the best first, and last what has come to nothing
+    const rank = (value: number | null): number => (value === null ? -Infinity : sign * value);
+    const rows = [...panel.rows].sort((a, b) => rank(b.performance) - rank(a.performance));
     this.body.replaceChildren(
       ...rows.map((row) => {
         const title = panel.by === "method" ? methodTitle(state, row.series) : row.series;
@@ -87,7 +89,7 @@ export class PanelView {
     const many = Math.sqrt(Math.min(1, 30 / curves.lines.length)); // the more lines, the fainter
     const alpha = Math.max(20, Math.round(102 * many)).toString(16);
     const data = [curves.x, ...curves.lines.map((l) => l[quantity]), ...medians.map((m) => m[quantity])];
-    const measure = quantity === "performance" ? panel.measure : "fitness of the fittest team";
+    const measure = quantity === "performance" ? `${panel.measure} (${panel.about})` : "fitness of the fittest team";
     const xLabel = axis === "evaluations" ? "team evaluations" : "generations";
     const key = JSON.stringify([quantity, axis, this.names, colours, measure]);
     this.chart.draw(key, data as uPlot.AlignedData, () => ({

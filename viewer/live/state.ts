@@ -25,6 +25,7 @@ export interface Summary {
   champion: number | null; // generation of the fittest team so far
   champion_stage: number; // in which it was, of a shaping; else 0
   performance: Record<string, number | null>;
+  declared: Record<string, string>; // unit and direction of each
   fitness: number | null;
   best: number | null;
   specialization: number | null;
@@ -78,6 +79,8 @@ export interface Panel {
   variant: string;
   by: string;
   measure: string;
+  about: string; // its unit and which way is better
+  larger_is_better: boolean;
   rows: Row[];
   over: Record<Axis, Curves>;
 }

@@ -13,11 +13,16 @@ interface Column {
   isNumber?: boolean;
 }
 
+/** Whether its budget will end a run, or did, before its last generation. */
+function endsByBudget(run: Summary): boolean {
+  return run.budget > 0 && run.evaluations / run.budget > run.generation / run.generations;
+}
+
 /** Return where a run is: of its generations, or of its budget if that will end it. */
 export function place(run: Summary): string {
   const stage = run.n_stages ? `stage ${run.stage} of ${run.n_stages}, ` : "";
   if (!run.generations) return "";
-  if (run.budget && run.evaluations / run.budget > run.generation / run.generations) {
+  if (endsByBudget(run)) {
     return `${stage}generation ${run.generation}, ${count(run.evaluations)} of ${count(run.budget)} evaluations`;
   }
   return `${stage}generation ${run.generation} of ${run.generations}`;
@@ -62,7 +67,7 @@ const COLUMNS: Column[] = [
   {
     name: "generation",
     value: (r) => r.generation,
-    cell: (r) => (r.generations ? `${r.generation}/${r.generations}` : ""),
+    cell: (r) => (r.generations ? `${r.generation}${endsByBudget(r) ? "" : `/${r.generations}`}` : ""),
     isNumber: true,
   },
   { name: "time left", value: (r) => r.ends_at, cell: (r) => left(r.ends_at), isNumber: true },

@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from conevo.replay.live.runs import Subject
 from conevo.replay.live.settings import comparisons, differences
+from conevo.worlds.measures import Measure
 
 __all__ = ["Panel", "panels_of"]
 
@@ -48,17 +49,21 @@ class Panel:
         if key != self._key:
             self._key = key
             self._data = self._title | {
-                "measure": self._measure,
+                "measure": self._measure.name,
+                "about": self._measure.about,
+                "larger_is_better": self._measure.larger_is_better,
                 "rows": [self._row(name) for name in dict.fromkeys(self._series.values())],
                 "over": {axis: self._curves(axis, points) for axis in AXES},
             }
         return self._data
 
     @property
-    def _measure(self) -> str:
-        """The main measure of task performance, "" if no run has come to one."""
-        named = (next(iter(one.summary["performance"]), "") for one in self._series)
-        return next((name for name in named if name), "")
+    def _measure(self) -> Measure:
+        """The main measure of task performance; of no world while no run has come to one."""
+        for one in self._series:
+            if name := next(iter(one.summary["performance"]), ""):
+                return one.measures.get(name, Measure(name))
+        return Measure("performance")
 
     def _row(self, series: str) -> dict[str, Any]:
         """Return how the runs of a series stand, and the medians of what they came to last."""

@@ -15,9 +15,11 @@ import numpy as np
 import numpy.typing as npt
 
 from conevo.errors import ConevoError, UsageError
+from conevo.replay.live.declared import Declared
 from conevo.replay.live.files import Log, Whole, is_locked, readable, stamp
 from conevo.replay.live.settings import Choices, choices_of, factors
 from conevo.runs.directory import CONFIG, LOCK, SEAL, SHAPING, kind_of
+from conevo.worlds.measures import Measure
 
 __all__ = ["Settings", "Standing", "Subject", "plain"]
 
@@ -100,6 +102,7 @@ class Subject:
         self._config: Whole[list[Settings]] | None = None
         self._settings: list[Settings] = []
         self._logs: list[Log] = []
+        self._declared: Declared | None = None
         self._key: tuple[Any, ...] = ()
         self._status, self._reason, self._problem = "waiting", "", ""
         self._summary: dict[str, Any] = {}
@@ -159,6 +162,7 @@ class Subject:
             if folder.is_symlink() or stamp(folder / CONFIG) is None:
                 break
             self._logs.append(Log(folder / "generations.jsonl"))
+            self._declared = Declared(folder)
         for log in self._logs:
             log.read(go_on)
 
@@ -183,6 +187,11 @@ class Subject:
         return (
             "waiting" if standing is not None and not self._n_generations else "interrupted"
         ), ""
+
+    @property
+    def measures(self) -> dict[str, Measure]:
+        """The measures that it declares, by name; of a shaping those of its last stage begun."""
+        return self._declared.read() if self._declared is not None else {}
 
     # --- what is said -----------------------------------------------------------------------------
 
@@ -219,7 +228,7 @@ class Subject:
         """Return what the last generation came to; of a shaping of the last stage that has one."""
         stage = next((log.generations for log in reversed(self._logs) if log.generations), None)
         found: dict[str, Any] = {"champion": None, "champion_stage": 0}
-        found |= {"performance": {}, "castes": {}}
+        found |= {"performance": {}, "declared": {}, "castes": {}}
         found |= dict.fromkeys(("fitness", "best", "specialization", "sst", "gst"))
         if stage is None:
             return found
@@ -229,6 +238,7 @@ class Subject:
             "champion": generation,
             "champion_stage": number + 1 if self._kind == "shaping" else 0,
             "performance": {name: _plain(c[-1]) for name, c in stage.performance.items()},
+            "declared": {name: one.about for name, one in self.measures.items()},
             "castes": {name: int(c[-1]) for name, c in stage.castes.items() if c[-1] > 0},
             **{
                 name: _plain(stage.numbers[names.get(name, name)][-1])
