@@ -19,7 +19,7 @@ class UsageError(ConevoError):
 
 
 class EnvironmentFailure(ConevoError):
-    """The machine refused: full disk, no permission, no such device (exit code 3)."""
+    """The environment failed: disk full, no permission, no such device (exit code 3)."""
 
     exit_code = 3
 

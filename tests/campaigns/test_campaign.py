@@ -129,7 +129,7 @@ def test_an_old_ending_does_not_speak_for_a_new_worker(tmp_path):
         end_as(campaign, status="finished")(Job(tmp_path, label, 1))
     entries = campaign.carry_on(Scripted(fate=lambda job: None))
     assert {entry.state for entry in entries.values()} == {"failed"}
-    assert "left without a word" in next(iter(entries.values())).reason
+    assert "worker exited without reporting" in next(iter(entries.values())).reason
 
 
 def test_what_is_on_the_disk_counts_not_the_ledger(tmp_path):
@@ -196,7 +196,7 @@ def test_nothing_is_written_where_something_else_is_or_for_a_plan_that_cannot_be
     plan = read_plan(write_plan(tmp_path))
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "letter.txt").write_text("dear")
-    with pytest.raises(UsageError, match="exists and is no run"):
+    with pytest.raises(UsageError, match="already exists and is not a run"):
         create(plan, tmp_path / "mine")
     with pytest.raises(UsageError, match="generations = 0"):
         create(plan.at(settings={"run.generations": 0}), tmp_path / "new")

@@ -100,13 +100,13 @@ def test_show_finds_a_run_by_the_beginning_of_its_name(say) -> None:
     say(*tiny("--quiet", "--seed", "2"))
     said = say("show", "rover")
     assert said.code == 2
-    assert "may be any of these runs" in said.err
+    assert "is ambiguous; it matches" in said.err
 
 
 def test_show_says_so_if_a_sealed_file_was_changed(say, tmp_path: Path) -> None:
     run = evolve_tiny(tmp_path / "run")
     (run.path / "champion.npz").write_bytes(b"")
-    assert "CHANGED SINCE: champion.npz" in say("show", "run").out
+    assert "modified since the run: champion.npz" in say("show", "run").out
 
 
 def test_test_prints_fresh_scenarios(say, tmp_path: Path) -> None:
@@ -157,7 +157,7 @@ BAD = [
     (["run", TASK, "--threads", "0"], "0 is not in the range x>=1"),
     (["run", TASK, "--budget-evaluations", "-5"], "run.budget_evaluations = -5"),
     (["run", TASK, "--preset", "smoke", "--budget-evaluations", "5"], "does not pay for one"),
-    (["run", TASK, "--json", "--quiet"], "exclude each other"),
+    (["run", TASK, "--json", "--quiet"], "are mutually exclusive"),
     (["run", TASK, "--sed", "1"], "--sed"),
     (["rum", TASK], "did you mean 'run'"),
     (["resume", "nothing"], "unknown run 'nothing'"),

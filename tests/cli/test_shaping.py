@@ -79,7 +79,7 @@ def test_show_prints_the_stages_with_what_their_champions_achieved(say, tmp_path
     assert everything["tasks"] == [f"rover-v1/complex-{k}" for k in (1, 2, 3)]
     assert [len(stage["generations"]) for stage in everything["stages"]] == [5, 5, 5]
     (tmp_path / "here" / "stage-1" / "test.json").write_bytes(b"{}")
-    assert "CHANGED SINCE: stage-1/test.json" in say("show", "here").out
+    assert "modified since the run: stage-1/test.json" in say("show", "here").out
     assert "SST" in say("show", "here/stage-2").out
 
 
@@ -223,7 +223,7 @@ BAD = [
     (["shape-prey", "pursuit/team-2"], "unexpected extra argument"),
     (["shape-prey", "--method", "coen"], "did you mean 'cone'"),
     (["shape-prey", "--set", "run.generatoins=3"], "did you mean 'run.generations'"),
-    (["shape-prey", "--json", "--quiet"], "exclude each other"),
+    (["shape-prey", "--json", "--quiet"], "are mutually exclusive"),
     (["shape-pray"], "did you mean 'shape-prey'"),
 ]
 
@@ -247,7 +247,7 @@ def test_places_that_are_taken_are_refused_with_what_can_be_done(say, tmp_path: 
     assert "run already holds a run, finished: see it with 'conevo show run'" in said.err
     (tmp_path / "other").mkdir()
     (tmp_path / "other" / "thesis.txt").write_text("precious")
-    assert "other exists and is no run" in say(*shape("--out", "other")).err
+    assert "other already exists and is not a run" in say(*shape("--out", "other")).err
     (tmp_path / "file").write_text("")
     said = say(*shape("--out", "file/here"))
     assert said.code == 3

@@ -48,9 +48,9 @@ def test_an_empty_directory_may_be_used(tmp_path: Path) -> None:
 
 def test_a_directory_with_other_things_is_left_alone(tmp_path: Path) -> None:
     (tmp_path / "thesis.txt").write_text("precious")
-    with pytest.raises(UsageError, match="exists and is no run"):
+    with pytest.raises(UsageError, match="already exists and is not a run"):
         fresh_store(tmp_path)
-    with pytest.raises(UsageError, match="exists and is no run"):
+    with pytest.raises(UsageError, match="already exists and is not a run"):
         fresh_store(tmp_path / "thesis.txt")
     assert [p.name for p in tmp_path.iterdir()] == ["thesis.txt"]
 

@@ -75,7 +75,7 @@ def clone(
         rollout: of the team's world.
         team: R controllers.
         labels: [R] caste of each robot.
-        fitness: [R] of each robot; of equals the first is cloned, one that is not finite last.
+        fitness: [R] of each robot; ties go to the first; non-finite values rank last.
         castes: those to clone, each with a robot at least.
         scenarios: E scenarios for all the teams.
     """

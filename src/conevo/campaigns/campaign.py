@@ -327,7 +327,7 @@ class Campaign:
         label, path = ending.label, self.places.ended(ending.label)
         attempts = 1 + next(e.attempts for e in self.ledger.entries() if e.label == label)
         if (ended := read_ended(path)) is None:
-            lost = ending.lost or f"left without a word; see {self.places.log(label)}"
+            lost = ending.lost or f"worker exited without reporting; see {self.places.log(label)}"
             state = "pending" if attempts < ATTEMPTS else "failed"
             self.ledger.end(label, state, f"{lost} (attempt {attempts} of {ATTEMPTS})")
             return state

@@ -145,7 +145,7 @@ class Ledger:
                 raise EnvironmentFailure(f"cannot use {self.path}: {error}") from error
             raise UsageError(
                 f"{self.path} is damaged ({error}); remove it and start the campaign again: it is "
-                f"made anew from the runs"
+                f"rebuilt from the runs"
             ) from error
 
 

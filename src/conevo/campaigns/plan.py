@@ -202,7 +202,7 @@ class Plan:
         runs = [run for same_seed in zip(*written, strict=True) for run in same_seed]
         labels = [run.label for run in runs]
         if twice := sorted({label for label in labels if labels.count(label) > 1}):
-            raise UsageError(f"{twice[0]} {self.place} is planned twice: a level or seed is double")
+            raise UsageError(f"{twice[0]} {self.place} is planned twice: duplicate level or seed")
         return runs
 
     def _refuse_namesakes(self, worlds: Iterable[str]) -> None:

@@ -98,7 +98,7 @@ def write_array(
         root: the campaign's directory, which all nodes must see under the same path.
         labels: of the runs to carry out.
         threads: CPU threads of a run.
-        hours: time limit of a task; what takes longer is put into the queue again.
+        hours: time limit of a task; unfinished runs are requeued.
         at_once: tasks that may run together; no limit by default.
         options: of sbatch, for every task: "--gres=gpu:1"; see ``check_request``.
         device: on which runs are begun: "cpu" or a CUDA device of every node.

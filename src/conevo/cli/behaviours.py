@@ -10,7 +10,9 @@ import click
 __all__ = ["behaviours"]
 
 
-@click.command(short_help="Say who pursues, blocks, flanks, knocks and idles.")
+@click.command(
+    short_help="Classify predators' behaviour: pursuer, blocker, flanker, knocker, idle."
+)
 @click.argument("run")
 @click.option(
     "--scenarios", type=click.IntRange(1), default=20, show_default=True, help="How many."

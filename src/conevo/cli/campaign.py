@@ -47,7 +47,7 @@ PLAN = (
         "--set", "settings", metavar="KEY=VALUE", multiple=True,
         help="A setting of all runs, for example run.budget_evaluations=5000.",
     ),
-    click.option("--out", metavar="DIR", help="Its directory (default: campaigns/NAME)."),
+    click.option("--out", metavar="DIR", help="Output directory (default: campaigns/NAME)."),
 )  # fmt: skip
 
 
@@ -69,7 +69,7 @@ def execution_options(function: Function) -> Function:
 def campaign() -> None:
     """Plans of many runs: methods x environments x seeds, resumable.
 
-    Begin with: conevo campaign start rover-complex --preset smoke --seeds 2
+    Try: conevo campaign start rover-complex --preset smoke --seeds 2
     """
 
 
@@ -127,7 +127,7 @@ def start(
 )  # fmt: skip
 @click.option(
     "--hours", type=float, default=24.0, show_default=True,
-    help="Time limit of a task; what takes longer is put into the queue again.",
+    help="Time limit per task; unfinished runs are requeued.",
 )  # fmt: skip
 @click.option("--at-once", type=click.IntRange(1), help="Tasks running together (default: any).")
 @click.option("--partition", metavar="NAME", help="SLURM partition.")
@@ -182,7 +182,7 @@ def slurm(
         click.echo("conevo: note: the tasks ask SLURM for no GPU; add --gres gpu:1", err=True)
 
 
-@campaign.command(short_help="How a campaign stands.")
+@campaign.command(short_help="Show a campaign's progress.")
 @click.argument("name", metavar="NAME")
 @click.option("--runs", is_flag=True, help="A line for every run.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON value.")
@@ -197,7 +197,7 @@ def status(name: str, runs: bool, as_json: bool) -> int:
     return FAILED if print_status(find_campaign(name), runs, as_json) else 0
 
 
-@campaign.command(short_help="Let a running campaign stop where it is.")
+@campaign.command(short_help="Stop a running campaign.")
 @click.argument("name", metavar="NAME")
 def stop(name: str) -> None:
     """Ask the campaign's coordinator, on whatever machine, to stop; runs keep all they have."""

@@ -79,7 +79,7 @@ def carry_on(campaign: Campaign, execution: Execution) -> int:
         click.echo(f"{word} with {done}; go on with: {advice}", err=True)
         sys.exit(0 if isinstance(error, Stopped) else 130)
     except EnvironmentFailure as error:
-        raise EnvironmentFailure(f"{error}; when that is mended: {advice}") from error
+        raise EnvironmentFailure(f"{error}; once fixed: {advice}") from error
     if execution.style == "quiet":
         click.echo(str(campaign.path))
     elif execution.style != "json":

@@ -43,7 +43,7 @@ def accept_option(function: Function) -> Function:
 def style_of(as_json: bool, quiet: bool, verbose: bool) -> str:
     """Return how to report: "json", "quiet", "verbose", "live" (a terminal) or "plain"."""
     if as_json + quiet + verbose > 1:
-        raise UsageError("--json, --quiet and --verbose exclude each other")
+        raise UsageError("--json, --quiet and --verbose are mutually exclusive")
     if as_json or quiet or verbose:
         return "json" if as_json else "quiet" if quiet else "verbose"
     return "live" if sys.stdout.isatty() else "plain"
@@ -123,7 +123,7 @@ def carry_on(
         click.echo(f"interrupted after {_done(found)}; continue with: {advice}", err=True)
         sys.exit(130)
     except EnvironmentFailure as error:
-        raise EnvironmentFailure(f"{error}; when that is mended: {advice}") from error
+        raise EnvironmentFailure(f"{error}; once fixed: {advice}") from error
     if found.status != "finished":
         click.echo(f"time is over after {_done(found)}; continue with: {advice}", err=True)
     if isinstance(found, Run):

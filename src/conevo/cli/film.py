@@ -48,7 +48,8 @@ def film(
 ) -> None:
     """Record an epoch of RUN's fittest team (or take one that is kept, FILE) and make a film of it.
 
-    An MP4 if ffmpeg is there, else a GIF, unless told otherwise. No film is written over another.
+    An MP4 if ffmpeg is there, else a GIF, unless an option names another format. Existing films are
+    never overwritten.
     """
     from conevo.cli.seeing import REPLAYS, bar, name_of, stages, trajectories
     from conevo.replay.film import SIZES, choose_format, frames_of, write_film, write_poster
@@ -57,7 +58,7 @@ def film(
 
     wanted = {"gif": gif, "mp4": mp4, "png": poster is not None}
     if sum(wanted.values()) > 1:
-        raise UsageError("--gif, --mp4 and --poster exclude each other")
+        raise UsageError("--gif, --mp4 and --poster are mutually exclusive")
     kind = choose_format(out, next((name for name in wanted if wanted[name]), ""))
     if out:
         refuse_file(Path(out))

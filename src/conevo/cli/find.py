@@ -39,7 +39,7 @@ def find(text: str) -> Run | Shaping:
     if len(matches) == 1:
         return _open(names[matches[0]])
     if matches:
-        raise UsageError(f"{text!r} may be any of these runs: {', '.join(matches)}")
+        raise UsageError(f"{text!r} is ambiguous; it matches: {', '.join(matches)}")
     raise unknown_name("run", text, names, f"in {RUNS}/")
 
 

@@ -26,10 +26,10 @@ VERBS = {
     "replay": "See a run's fittest team in the browser.",
     "film": "Make a film of a run's fittest team (GIF, MP4).",
     "watch": "Follow runs live in the browser.",
-    "behaviours": "Say who pursues, blocks, flanks, knocks and idles.",
+    "behaviours": "Classify predators' behaviour: pursuer, blocker, flanker, knocker, idle.",
     "campaign": "Start, watch, stop and retry plans of many runs.",
-    "report": "Write what a campaign says: page, tables, figures, numbers.",
-    "query": "Ask the tables of a campaign anything, in SQL.",
+    "report": "Write a campaign's report: page, tables, figures, data.",
+    "query": "Query a campaign's tables with SQL.",
     "show": "Print a finished or running run.",
     "list": "List worlds, methods, presets, settings or runs.",
 }
@@ -84,7 +84,7 @@ def print_version(ctx: click.Context, parameter: click.Parameter, is_asked: bool
 def cli() -> None:
     """Collective Neuro-Evolution: evolve teams of robots that specialize.
 
-    Begin with: conevo run rover/complex-1
+    Try: conevo run rover/complex-1
     """
 
 

@@ -44,7 +44,7 @@ OPTIONS = (
         "--threads", type=click.IntRange(1), help="CPU threads (default all); changes no result."
     ),
     click.option("--device", default="cpu", show_default=True, help="cpu or cuda."),
-    click.option("--out", metavar="DIR", help="Its directory (default: a new one in runs/)."),
+    click.option("--out", metavar="DIR", help="Output directory (default: a new one under runs/)."),
     time_limit_option,
 )  # fmt: skip
 
@@ -61,7 +61,7 @@ class Order:
     """What a command line asks for; the fields are named as the options are.
 
     Raises:
-        UsageError: options that exclude each other.
+        UsageError: options that are mutually exclusive.
     """
 
     method: str | None

@@ -11,7 +11,7 @@ import click
 __all__ = ["query"]
 
 
-@click.command(short_help="Ask the tables of a campaign anything, in SQL.")
+@click.command(short_help="Query a campaign's tables with SQL.")
 @click.argument("arguments", metavar="[CAMPAIGN] SQL", nargs=-1, required=True)
 @click.option("--csv", "as_csv", is_flag=True, help="Print comma-separated values.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object per row.")
@@ -27,7 +27,7 @@ def query(arguments: tuple[str, ...], as_csv: bool, as_json: bool) -> None:
     from conevo.errors import UsageError
 
     if as_csv and as_json:
-        raise UsageError("--csv and --json exclude each other")
+        raise UsageError("--csv and --json are mutually exclusive")
     if len(arguments) > 2:
         raise UsageError('query takes a campaign and one SQL text: conevo query NAME "SELECT ..."')
     found = find_campaign(arguments[0]) if len(arguments) == 2 else only_campaign()

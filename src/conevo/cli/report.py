@@ -9,7 +9,7 @@ import click
 __all__ = ["report"]
 
 
-@click.command(short_help="Write what a campaign says: page, tables, figures, numbers.")
+@click.command(short_help="Write a campaign's report: page, tables, figures, data.")
 @click.argument("name", metavar="CAMPAIGN")
 @click.option("--out", metavar="DIR", help="Where (default: report/ in the campaign).")
 def report(name: str, out: str | None) -> None:

@@ -71,7 +71,7 @@ def trajectories(
     second = _trajectory(beside, beside_generation, None, threads, first)
     for key in ("task", "scenario", "params"):
         if first.about[key] != second.about[key]:
-            raise UsageError(f"{what} and {beside} are of different {key}s: not side by side")
+            raise UsageError(f"{what} and {beside} cannot be shown side by side: different {key}s")
     return [first, second]
 
 

@@ -18,7 +18,7 @@ __all__ = ["shape_prey"]
 def shape_prey(**options: Any) -> None:
     """Run the six prey experiments in turn, each beginning with the populations of the one before.
 
-    Everything is kept in one directory, the evolved prey in its prey.npz. Ctrl-C leaves what
+    Everything is written to one directory, the evolved prey in its prey.npz. Ctrl-C leaves what
     conevo resume continues.
     """
     from conevo.runs.evolved_prey import PREY_TASKS

@@ -49,7 +49,7 @@ def shaping_text(shaping: Shaping, n_rows: int = 0) -> str:
     """
     stages = shaping.stages
     state, changed = shaping.status, shaping.changed_files
-    state += f"; CHANGED SINCE: {', '.join(changed)}" if changed else ""
+    state += f"; modified since the run: {', '.join(changed)}" if changed else ""
     records = shaping.generations()
     seconds = sum(record["seconds"] for record in records)
     parts = [

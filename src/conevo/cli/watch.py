@@ -19,7 +19,10 @@ __all__ = ["watch"]
 @click.command(short_help="Follow runs live in the browser.")
 @click.argument("what", metavar="[RUN|CAMPAIGN]", required=False)
 @click.option(
-    "--port", type=click.IntRange(0, 65535), default=0, help="Of the page (default: any)."
+    "--port",
+    type=click.IntRange(0, 65535),
+    default=0,
+    help="Port to serve on (default: any free port).",
 )
 @click.option("--no-browser", is_flag=True, help="Do not open it, only print its address.")
 def watch(what: str | None, port: int, no_browser: bool) -> None:

@@ -61,7 +61,7 @@ def choose_format(out: str | None, wanted: str = "") -> str:
     ending = Path(out).suffix[1:].lower() if out else ""
     kind = wanted or ending or ("mp4" if find_ffmpeg() else "gif")
     if out and ending != kind:
-        raise UsageError(f"{out} is to hold {kind.upper()}, so its name must end in .{kind}")
+        raise UsageError(f"{out}: the name of a {kind.upper()} must end in .{kind}")
     if kind == "png" and not wanted:
         raise UsageError(f"{out}: a picture is of one iteration, choose it with --poster T")
     if kind not in ("gif", "mp4", "png"):
@@ -152,7 +152,7 @@ def write_gif(
         EnvironmentFailure: it cannot be written.
     """
     if not frames:
-        raise UsageError("a film without frames")
+        raise UsageError("the film has no frames")
     duration = 10 * max(round(100 / fps), 2)
     palette = _Palette([painter.frame(t) for t in _spread(frames, _SAMPLES)])
     with _appearing(path) as draft, draft.open("xb") as file:
@@ -195,7 +195,7 @@ def write_mp4(
     if ffmpeg is None:
         raise UsageError(_NO_FFMPEG)
     if not frames:
-        raise UsageError("a film without frames")
+        raise UsageError("the film has no frames")
     with _appearing(path) as draft, tempfile.TemporaryFile() as said:
         command = _command(ffmpeg, painter.size, fps, draft)
         with _running(command, said) as process:

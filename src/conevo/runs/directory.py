@@ -82,7 +82,9 @@ def refuse_existing(path: Path) -> None:
         return
     kind = kind_of(path)
     if not kind:
-        raise UsageError(f"{path} exists and is no run; choose another place with --out")
+        raise UsageError(
+            f"{path} already exists and is not a run; choose another directory with --out"
+        )
     directory = Directory(path, kind)
     if kind == "campaign":
         raise UsageError(f"{path} already holds a campaign; see 'conevo campaign status {path}'")

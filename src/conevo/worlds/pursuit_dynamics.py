@@ -3,7 +3,7 @@
 One set of rules serves two worlds: in ``worlds.pursuit`` the team are the predators, in
 ``worlds.prey`` the prey. Bodies are numbered: first the team's robots, then the others (the prey,
 or the heuristic predators), which robot ``i`` looks after in turn (``i + R``, ``i + 2 R``, ...).
-Every function writes only data of the robot it is called for and of the bodies it looks after. The
+Every function writes only data of the robot it is called for and of the bodies it owns. The
 rules and the choices stand on the cards of the two worlds.
 """
 

@@ -86,7 +86,7 @@ def _section(scope: Scope, study: str, title: str, what: str, note: str) -> Sect
             f"{lost} teams are left out: neither they nor the unchanged ones reached anything."
         )
     if not cells:
-        return Section(title, text or ["No team of these runs was studied so."])
+        return Section(title, text or ["None of these runs has an intervention study."])
     rows = _rows(scope, cells)
     figure, table = _figure(scope, study, what, note, cells), _table(scope, study, what, note, rows)
     return Section(title, text, [figure, table])
