@@ -222,7 +222,7 @@ def test_a_refusal_in_mid_run_leaves_a_run_to_resume(say, tmp_path: Path) -> Non
     )
     _, err = process.communicate()
     assert process.returncode == 3, err
-    assert re.search(rf"conevo: error: cannot write {path}/\S+: File too large; when that", err)
+    assert re.search(rf"conevo: error: cannot write {path}/\S+: File too large; once fixed", err)
     assert f"conevo resume {path}\n" in err
     assert say("resume", "run", "--quiet").code == 0
     assert content(path) == content(evolve_tiny(tmp_path / "whole", **changes).path)

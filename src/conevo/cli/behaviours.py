@@ -11,7 +11,7 @@ __all__ = ["behaviours"]
 
 
 @click.command(
-    short_help="Classify predators' behaviour: pursuer, blocker, flanker, knocker, idle."
+    short_help="Classify predators: pursuer, blocker, flanker, knocker, idle."
 )
 @click.argument("run")
 @click.option(

@@ -26,7 +26,7 @@ VERBS = {
     "replay": "See a run's fittest team in the browser.",
     "film": "Make a film of a run's fittest team (GIF, MP4).",
     "watch": "Follow runs live in the browser.",
-    "behaviours": "Classify predators' behaviour: pursuer, blocker, flanker, knocker, idle.",
+    "behaviours": "Classify predators: pursuer, blocker, flanker, knocker, idle.",
     "campaign": "Start, watch, stop and retry plans of many runs.",
     "report": "Write a campaign's report: page, tables, figures, data.",
     "query": "Query a campaign's tables with SQL.",
