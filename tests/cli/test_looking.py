@@ -88,7 +88,7 @@ def test_a_run_is_shown_without_its_world(runs: Path) -> None:
     out, modules = look("show", str(runs / "own"))
     assert HEAVY & modules == set()
     assert out.startswith("light-v1/dark-1, CONE, preset smoke, seed 1\n")
-    assert "CHANGED SINCE: inputs/light.py" in out
+    assert "modified since the run: inputs/light.py" in out
     out, modules = look("show", str(runs / "finished"), "--json")
     assert HEAVY & modules == set()
     assert json.loads(out)["config"]["run"]["world"] == "rover-v1/complex-1"

@@ -10,9 +10,7 @@ import click
 __all__ = ["behaviours"]
 
 
-@click.command(
-    short_help="Classify predators: pursuer, blocker, flanker, knocker, idle."
-)
+@click.command(short_help="Classify predators: pursuer, blocker, flanker, knocker, idle.")
 @click.argument("run")
 @click.option(
     "--scenarios", type=click.IntRange(1), default=20, show_default=True, help="How many."

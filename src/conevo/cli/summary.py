@@ -251,7 +251,7 @@ def _state(run: Run) -> str:
     if state == "finished":
         state += f" {about['finished']} (stopped by: {about['stopped_by']})"
         changed = run.changed_files
-        state += f"; CHANGED SINCE: {', '.join(changed)}" if changed else ""
+        state += f"; modified since the run: {', '.join(changed)}" if changed else ""
     planned, budget = run.outline.generations, run.outline.budget_evaluations
     evaluations = records[-1]["team_evaluations"] if records else 0
     done = progress(len(records), planned, evaluations, budget)

@@ -41,7 +41,7 @@ def comparisons(scope: Scope) -> Section | None:
     """Return every two treatments of each environment compared; None with one run per cell."""
     pairs = compare_all(scope.cells)
     if not pairs:
-        return Section("Comparisons", ["There is one method only, so nothing to compare."])
+        return Section("Comparisons", ["Only one method: nothing to compare."])
     if all(pair.result.n_a < 2 or pair.result.n_b < 2 for pair in pairs):
         return None
     text = []

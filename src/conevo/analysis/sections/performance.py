@@ -104,7 +104,7 @@ def _table(scope: Scope, rows: Sequence[Mapping[str, Any]]) -> Table:
         "scenarios",
         "p_ks": "p (KS): Kolmogorov-Smirnov against the normal fitted to the runs, as in the "
         "thesis, which is too large",
-        "p_lilliefors": "p (Lilliefors): the same distance, judged correctly",
+        "p_lilliefors": "p (Lilliefors): the same distance with the corrected null distribution",
     }
     return Table(
         f"{scope.stem}-performance",
