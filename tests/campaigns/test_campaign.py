@@ -187,7 +187,7 @@ def test_more_seeds_extend_a_campaign_and_other_settings_do_not(tmp_path):
     assert [job.label[-3:] for job in executor.begun] == ["-s3", "-s3"]
     with pytest.raises(UsageError, match="this plan does not have"):
         create(campaign.plan.at(seeds=1), campaign.path)
-    with pytest.raises(UsageError, match="has with other settings"):
+    with pytest.raises(UsageError, match="has other settings in this plan"):
         create(bigger.plan.at(settings={"run.epochs": 2}), campaign.path)
     assert len(Campaign(campaign.path).planned) == 6
 

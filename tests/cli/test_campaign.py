@@ -71,6 +71,75 @@ def test_a_started_campaign_needs_no_plan_and_more_seeds_extend_it(conevo, tmp_p
     assert (code, out) == (0, "campaigns/tiny\n")
 
 
+PLAN = """
+[campaign]
+seeds = 1
+preset = "smoke"
+studies = []
+[factors]
+world = ["{world}"]
+method = ["{method}"]
+[settings]
+"run.generations" = 2
+"run.n_tests" = 1
+"run.n_validations" = 1
+"world.iterations" = 20
+"""
+
+
+@pytest.mark.parametrize("command", [("start", "--dry-run"), ("start",), ("slurm",)])
+def test_a_plan_that_is_named_is_never_ignored(conevo, tmp_path, command):
+    """Whatever campaign is in the directory, and whether there is such a plan."""
+    (tmp_path / "a.toml").write_text(PLAN.format(world="rover/complex-1", method="homcne"))
+    (tmp_path / "b.toml").write_text(PLAN.format(world="gacc/complex-1", method="mesp"))
+    assert conevo("campaign", "slurm", "a.toml", "--out", "c")[0] == 0
+    before = {p: p.read_bytes() for p in Path("c").rglob("*") if p.is_file()}
+    verb, *more = command
+    code, _, err = conevo("campaign", verb, "b.toml", "--out", "c", *more)
+    assert code == 2
+    assert "c holds another campaign: its run rover-v1-complex-1-homcne-s1 is one that this" in err
+    code, _, err = conevo("campaign", verb, "absent.toml", "--out", "c", *more)
+    assert code in (2, 3)
+    assert "absent.toml" in err
+    code, _, err = conevo("campaign", verb, "a.toml", "--out", "c", "--set", "run.epochs=2", *more)
+    assert (code, "has other settings in this plan" in err) == (2, True)
+    assert {p: p.read_bytes() for p in Path("c").rglob("*") if p.is_file()} == before
+    assert conevo("campaign", verb, "a.toml", "--out", "c", *more)[0] == 0
+
+
+def test_a_larger_plan_extends_and_a_smaller_one_is_refused(conevo, tmp_path):
+    file = tmp_path / "a.toml"
+    file.write_text(PLAN.format(world="rover/complex-1", method="homcne"))
+    serial = ("--executor", "serial", "--json")
+    assert conevo("campaign", "start", "a.toml", "--out", "c", *serial)[0] == 0
+    code, out, _ = conevo("campaign", "start", "c", "--set", "run.generations=3", *serial)
+    assert (code, json.loads(out)["state"]) == (0, "finished")
+    file.write_text(file.read_text().replace('generations" = 2', 'generations" = 4'))
+    code, out, _ = conevo("campaign", "start", "a.toml", "--out", "c", *serial)
+    assert (code, json.loads(out)["state"]) == (0, "finished")
+    (run,) = Path("c/runs").iterdir()
+    assert len((run / "generations.jsonl").read_text().splitlines()) == 4
+    code, _, err = conevo("campaign", "start", "c", "--set", "run.generations=3", *serial)
+    assert code == 2
+    assert "would be shorter in this plan (run.generations = 3, planned: 4)" in err
+    code, _, err = conevo("resume", str(run), "--generations", "9")
+    assert code == 2
+    assert "conevo campaign start" in err
+    assert "--set run.generations=9" in err
+
+
+def test_a_time_limit_ends_with_0_and_says_how_to_go_on(conevo, tmp_path):
+    (tmp_path / "a.toml").write_text(PLAN.format(world="rover/complex-1", method="homcne"))
+    code, _, err = conevo(
+        "campaign", "start", "a.toml", "--executor", "serial", "--time-limit", "0.001s"
+    )
+    assert code == 0
+    assert "time is over with 1 pending; go on with: conevo campaign start campaigns/a" in err
+    for wrong in ("soon", "0", "-1m", "5w"):
+        code, _, err = conevo("campaign", "start", "a", "--time-limit", wrong)
+        assert (code, "expected a time above 0" in err) == (2, True)
+
+
 def test_failures_are_said_with_their_reason_and_can_be_tried_again(conevo, tmp_path):
     path = write_plan(tmp_path, "studies = []")
     with path.open("a") as file:

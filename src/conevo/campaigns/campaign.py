@@ -21,18 +21,16 @@ is missing, and a finished run is never run twice.
 from __future__ import annotations
 
 import dataclasses
-import json
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
 
 from conevo.campaigns.admission import admit_code
 from conevo.campaigns.devices import CPU, next_device
 from conevo.campaigns.ended import read_ended
 from conevo.campaigns.executors import Ending, Executor, Job
-from conevo.campaigns.inputs import keep_files, renamed
+from conevo.campaigns.extension import check_plan, settle, texts_of, write_plan
 from conevo.campaigns.ledger import Entry, Ledger
 from conevo.campaigns.places import Places
 from conevo.campaigns.plan import Plan, PlannedRun
@@ -41,10 +39,12 @@ from conevo.campaigns.progress import is_held
 from conevo.campaigns.tables import seal_tables
 from conevo.campaigns.work import planned_runs
 from conevo.errors import UsageError
+from conevo.reading import read_json
 from conevo.runs.directory import Directory, appearing
 from conevo.runs.durable import replace_file
+from conevo.runs.time_limit import TimeLimit
 
-__all__ = ["ATTEMPTS", "CAMPAIGNS", "Campaign", "Stopped", "create"]
+__all__ = ["ATTEMPTS", "CAMPAIGNS", "Campaign", "Stopped", "check", "create"]
 
 CAMPAIGNS = Path("campaigns")  # where campaigns are made and looked for unless told otherwise
 ATTEMPTS = 3  # of a run whose worker is lost, or whose machine refused
@@ -53,16 +53,29 @@ LOOK = 0.25  # seconds between two looks at workers and the order to stop
 
 
 class Stopped(Exception):
-    """The campaign was told to stop by ``Campaign.stop``."""
+    """The campaign was told to stop by ``Campaign.stop``, or its time is over."""
 
 
 Watch = Callable[["Campaign", "Ending | None"], None]
 
 
+def check(plan: Plan, path: Path) -> list[PlannedRun]:
+    """Return the runs of a plan, if ``create`` can write it out; writes nothing.
+
+    Raises:
+        UsageError: a run that cannot be, or ``path`` holds a campaign that this does not extend.
+    """
+    runs = plan.write_out()
+    if Places(path).plan.is_file():
+        check_plan(Campaign(path), {run.label: run for run in runs})
+    return runs
+
+
 def create(plan: Plan, path: Path, accept_other_code: bool = False) -> Campaign:
     """Write a campaign out; nothing is started.
 
-    A campaign that is there already is extended if the plan has all its runs and more.
+    A campaign that is there already is extended, if the plan has all its runs, as long or longer,
+    and perhaps more.
 
     Args:
         plan: what to run.
@@ -74,46 +87,21 @@ def create(plan: Plan, path: Path, accept_other_code: bool = False) -> Campaign:
             the campaign there; nothing was written.
         EnvironmentFailure: it cannot be written.
     """
-    runs = plan.write_out()
-    if Places(path).plan.is_file():
-        campaign = Campaign(path)
-        _refuse_other(campaign, {run.label: run for run in runs})
-        with campaign.locked():
-            campaign.admit_code(accept_other_code)
-            _write(plan, runs, path)
+    runs = check(plan, path)
+    if not Places(path).plan.is_file():
+        with appearing(path) as draft:
+            places, texts = Places(draft), texts_of(plan, runs, draft)
+            replace_file(places.plan, texts["plan"].encode())
+            replace_file(places.runs, texts["runs"].encode())
         return Campaign(path)
-    with appearing(path) as draft:
-        _write(plan, runs, draft)
-    return Campaign(path)
-
-
-def _write(plan: Plan, runs: Iterable[PlannedRun], directory: Path) -> None:
-    """Write a plan and its runs, with copies of the files that they name."""
-    root = directory.resolve()
-    names = keep_files([*plan.values, *(value for run in runs for value in run.values)], root)
-
-    def rename(value: Any) -> Any:
-        return renamed(value, names)
-
-    rows = [dataclasses.asdict(run.mapped(rename)) for run in runs]
-    replace_file(Places(root).runs, "".join(f"{json.dumps(row)}\n" for row in rows).encode())
-    replace_file(Places(root).plan, plan.mapped(rename).to_toml().encode())
-
-
-def _refuse_other(campaign: Campaign, runs: dict[str, PlannedRun]) -> None:
-    """Raise UsageError if a campaign has runs that are not among these."""
-    for label, planned in campaign.planned.items():
-        if label not in runs:
-            what = "does not have"
-        elif runs[label].run_ids != planned.run_ids:
-            what = "has with other settings"
-        else:
-            continue
-        raise UsageError(
-            f"{campaign.path} holds another campaign: its run {label} is one that this plan "
-            f"{what}; continue it with 'conevo campaign start {campaign.path}', or choose another "
-            f"--out"
-        )
+    campaign = Campaign(path)
+    with campaign.locked():
+        campaign.settle()
+        check_plan(campaign, {run.label: run for run in runs})
+        campaign.admit_code(accept_other_code)
+        write_plan(campaign, plan, runs)
+        campaign.settle()
+    return campaign
 
 
 class Campaign:
@@ -130,10 +118,19 @@ class Campaign:
         self._directory = Directory(Path(path), "campaign")
         self.path = self._directory.path
         self.places = Places(self.path)
-        self.plan: Plan = read_plan(self.places.plan)
-        self.planned: dict[str, PlannedRun] = planned_runs(self.path)
+        self._load()
         self.ledger = Ledger(self.places.ledger)
         self.locked = self._directory.locked
+
+    def _load(self) -> None:
+        self.plan: Plan = read_plan(self.places.plan)
+        self.planned: dict[str, PlannedRun] = planned_runs(self.path)
+        self._shorter: set[str] | None = None  # runs that had not the planned length when found
+
+    def settle(self) -> None:
+        """Put a new plan in place that a killed process has left; the lock is held."""
+        settle(self.places)
+        self._load()
 
     def __repr__(self) -> str:
         return f"Campaign({str(self.path)!r})"
@@ -144,8 +141,19 @@ class Campaign:
         return self._directory.is_in_use
 
     def is_finished(self, label: str) -> bool:
-        """Whether a run is sealed and studied."""
-        return (self.places.run(label) / "DONE").is_file() and self._is_studied(label)
+        """Whether a run is sealed, has the planned length, and is studied."""
+        if not ((self.places.run(label) / "DONE").is_file() and self._is_studied(label)):
+            return False
+        if self._shorter is None:
+            self._shorter = {one for one in self.planned if self._is_shorter(one)}
+        return label not in self._shorter or not self._is_shorter(label)
+
+    def _is_shorter(self, label: str) -> bool:
+        """Whether a sealed run has another length than the plan, which was extended meanwhile."""
+        planned, path = self.planned[label], self.places.run(label)
+        if planned.shape or not (path / "DONE").is_file():
+            return False
+        return read_json(path / "provenance.json").get("run_id") != planned.run_ids[0]
 
     def _is_studied(self, label: str) -> bool:
         planned = self.planned[label]
@@ -208,6 +216,7 @@ class Campaign:
             UsageError: a coordinator is at work.
         """
         with self.locked():
+            self.settle()
             self._reconcile()
             failed = [label for label, one in self.standings().items() if one.state == "failed"]
             for label in failed:
@@ -222,6 +231,7 @@ class Campaign:
         threads: int = 1,
         devices: Sequence[str] = (CPU,),
         watch: Watch | None = None,
+        time_limit: float | TimeLimit | None = None,
     ) -> dict[str, Entry]:
         """Finish what is missing, and make the tables of all that is finished.
 
@@ -233,17 +243,21 @@ class Campaign:
             threads: CPU threads of a run, at most as many as the executor has cores.
             devices: on which runs are begun, in turn; the executor must have them.
             watch: called with the campaign and each ending; with None while there is none.
+            time_limit: seconds after which it stops, as by ``stop``.
 
         Raises:
             UsageError: a coordinator is at work already, or other code has begun the campaign.
-            Stopped: by ``stop``; the campaign can be carried on.
+            Stopped: by ``stop``, or the time is over; the campaign can be carried on.
         """
+        limit = time_limit if isinstance(time_limit, TimeLimit) else TimeLimit(time_limit)
         with self.locked():
+            self.settle()
             self.admit_code()
             self.places.stop.unlink(missing_ok=True)
             self._reconcile()
             try:
-                self._carry_on(executor, min(threads, executor.cores), devices, watch)
+                least = min(threads, executor.cores)
+                self._carry_on(executor, least, devices, watch, limit)
             finally:
                 executor.stop()
                 self.ledger.release()
@@ -270,7 +284,12 @@ class Campaign:
         self.ledger.put(sorted((was & set(self.planned)) - done), "pending", "found unfinished")
 
     def _carry_on(
-        self, executor: Executor, threads: int, devices: Sequence[str], watch: Watch | None
+        self,
+        executor: Executor,
+        threads: int,
+        devices: Sequence[str],
+        watch: Watch | None,
+        limit: TimeLimit,
     ) -> None:
         waiting = deque(
             entry.label
@@ -285,7 +304,7 @@ class Campaign:
             while ready and free >= threads:
                 share = max(threads, free // len(ready))
                 device = next_device(devices, (job.device for job in at_work.values()))
-                job = Job(self.path, ready.popleft(), share, device)
+                job = Job(self.path, ready.popleft(), share, device, limit)
                 waiting.remove(job.label)
                 at_work[job.label] = job
                 free -= share
@@ -296,12 +315,17 @@ class Campaign:
                 time.sleep(LOOK)  # others carry out what is left
             for ending in executor.wait(LOOK) if at_work else ():
                 del at_work[ending.label]
+                if limit.is_over and not (self.places.ended(ending.label).is_file() or ending.lost):
+                    waiting.appendleft(ending.label)  # it stopped in time
+                    continue
                 if self._settle(ending) == "pending":
                     waiting.appendleft(ending.label)
                 if watch is not None:
                     watch(self, ending)
             if self.places.stop.is_file():
-                raise Stopped
+                raise Stopped("stopped")
+            if limit.is_over and (waiting or at_work):
+                raise Stopped("time is over")
             if (began := time.monotonic()) >= next_seal:
                 self.seal()
                 ended = time.monotonic()

@@ -11,7 +11,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import ClassVar, Protocol
 
@@ -19,6 +19,7 @@ from conevo.campaigns.devices import CPU, check_here
 from conevo.campaigns.places import Places
 from conevo.campaigns.work import carry_out, core_seconds
 from conevo.errors import UsageError, unknown_name
+from conevo.runs.time_limit import TimeLimit
 
 __all__ = ["EXECUTORS", "Ending", "Executor", "Job", "make_executor", "usable_cores"]
 
@@ -27,12 +28,16 @@ ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 @dataclass(frozen=True)
 class Job:
-    """One run to carry out, on so many threads and, if it has not begun, on this device."""
+    """One run to carry out, on so many threads and, if it has not begun, on this device.
+
+    ``limit`` is for an executor that is no other process.
+    """
 
     root: Path
     label: str
     threads: int
     device: str = CPU
+    limit: TimeLimit = field(default_factory=lambda: TimeLimit(None), compare=False)
 
 
 @dataclass(frozen=True)
@@ -80,8 +85,14 @@ class Serial:
 
     def submit(self, job: Job) -> None:
         """Carry the job out now; Ctrl-C reaches the run itself."""
-        spent = core_seconds()
-        carry_out(job.root, job.label, job.threads, device=job.device, spent_before=spent)
+        carry_out(
+            job.root,
+            job.label,
+            job.threads,
+            device=job.device,
+            limit=job.limit,
+            spent_before=core_seconds(),
+        )
         self._endings.append(Ending(job.label))
 
     def wait(self, seconds: float) -> list[Ending]:

@@ -71,6 +71,11 @@ class ObjectStore:
                 contents[path] = path.read_bytes()
             except FileNotFoundError:  # gone since it was listed
                 continue
+        seal = f"runs/{label}/DONE"
+        if "DONE" in self._names(f"runs/{label}") and self._read(seal) != contents.get(
+            run / "DONE"
+        ):
+            self._files.delete_file(f"{self._base}/{seal}")  # the run has another length since
         for path in reversed(contents):
             self._put(root, path, contents[path])
         there = {path.relative_to(run).as_posix() for path in contents}
@@ -79,6 +84,8 @@ class ObjectStore:
         for path in _beside(root, label):
             if path.is_file():
                 self._put(root, path, path.read_bytes())
+            elif path.parent.name == "studies" and path.name in self._names("studies"):
+                self._files.delete_file(f"{self._base}/{path.relative_to(root).as_posix()}")
 
     def get_run(self, root: Path, label: str) -> None:
         """Put what is stored of a run into a directory, in place of what is there."""

@@ -32,6 +32,11 @@ class Places:
         return self.root / "code.json"
 
     @property
+    def extension(self) -> Path:
+        """Another plan, while it takes the place of the old one."""
+        return self.root / "extension.json"
+
+    @property
     def ledger(self) -> Path:
         """What the coordinator knows of every run."""
         return self.root / "ledger.sqlite"

@@ -31,6 +31,7 @@ from conevo.runs.directory import as_json, kind_of
 from conevo.runs.durable import replace_file
 from conevo.runs.run import Run, start
 from conevo.runs.shaping import Shaping, start_shaping
+from conevo.runs.time_limit import TimeLimit
 
 __all__ = ["carry_out", "core_seconds", "main", "planned_runs"]
 
@@ -59,7 +60,13 @@ def planned_runs(root: Path) -> dict[str, PlannedRun]:
 
 
 def carry_out(
-    root: Path, label: str, threads: int, *, device: str = CPU, spent_before: float = 0.0
+    root: Path,
+    label: str,
+    threads: int,
+    *,
+    device: str = CPU,
+    limit: TimeLimit | None = None,
+    spent_before: float = 0.0,
 ) -> bool:
     """Carry a run on to its end, study it, and write down how it ended.
 
@@ -68,10 +75,12 @@ def carry_out(
         label: which of its runs.
         threads: CPU threads; no result depends on it.
         device: of a run that has not begun; what has is carried on where it was.
+        limit: the time that is left for evolving, any by default.
         spent_before: core seconds of this process that are not the run's.
 
     Returns:
-        Whether it is finished. If not, ``ended/LABEL.json`` says why, unless another worker has it.
+        Whether it is finished. If not, ``ended/LABEL.json`` says why, unless another worker has it
+        or its time is over.
     """
     began = time.perf_counter()
     ending: dict[str, Any] = {"status": "finished", "origin": "", "message": "", "traceback": ""}
@@ -81,7 +90,9 @@ def carry_out(
         if label not in planned:
             raise UsageError(f"{root} plans no run {label!r}")
         admit_code(places, planned)
-        found = _evolve(places, planned[label], threads, device)
+        found = _evolve(places, planned[label], threads, device, limit or TimeLimit(None))
+        if found.status != "finished":
+            return False  # its time was over
         if planned[label].studies:
             _study(places, planned[label], found, threads)
     except _InUse:
@@ -116,8 +127,10 @@ def _describe(error: Exception) -> dict[str, str]:
     return {"origin": "program", "message": repr(error), "traceback": trace}
 
 
-def _evolve(places: Places, planned: PlannedRun, threads: int, device: str) -> Run | Shaping:
-    """Return the run, finished by now."""
+def _evolve(
+    places: Places, planned: PlannedRun, threads: int, device: str, limit: TimeLimit
+) -> Run | Shaping:
+    """Return the run, finished by now unless its time was over."""
     path = places.run(planned.label)
     if not kind_of(path):
         configs = planned.configs()
@@ -137,15 +150,19 @@ def _evolve(places: Places, planned: PlannedRun, threads: int, device: str) -> R
         else:
             start(configs[0], path, threads=threads, device=device, command=command)
     found = Shaping(path) if kind_of(path) == "shaping" else Run(path)
-    if found.run_ids != planned.run_ids:
+    longer = None if found.run_ids == planned.run_ids else planned.configs()[0]
+    if longer and (isinstance(found, Shaping) or found.provenance.get("stem_id") != longer.stem_id):
         raise UsageError(f"{path} is not the run that was planned; move it away and retry")
     deadline = time.monotonic() + PATIENCE
     while found.status == "running" and time.monotonic() < deadline:
         time.sleep(0.2)
     if found.status == "running":
         raise _InUse
+    if longer and isinstance(found, Run):
+        places.study(planned.label).unlink(missing_ok=True)  # of a team that may not stay
+        found.extend_as(longer, threads=threads, accept_other_code=True)
     if found.status != "finished":
-        found.resume(threads=threads, accept_other_code=True)  # it is admitted to the campaign
+        found.resume(time_limit=limit, threads=threads, accept_other_code=True)  # it is admitted
     return found
 
 

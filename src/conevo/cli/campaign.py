@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from conevo.cli.carry import accept_option
+from conevo.cli.carry import accept_option, time_limit_option
+from conevo.errors import UsageError
 
 if TYPE_CHECKING:
-    from conevo.campaigns.campaign import Campaign
+    from conevo.campaigns.plan import Plan
 
 __all__ = ["campaign"]
 
@@ -36,6 +38,7 @@ EXECUTION = (
         "--store", metavar="URI",
         help="With ray: object store for nodes that do not see the campaign's directory.",
     ),
+    time_limit_option,
     click.option("--json", "as_json", is_flag=True, help="One JSON object per run that ends."),
     click.option("--quiet", is_flag=True, help="Print only the campaign's directory."),
 )  # fmt: skip
@@ -103,18 +106,22 @@ def start(
 ) -> int:
     """Carry out NAME (see: conevo campaign list), a plan in a TOML FILE, or go on in DIR.
 
-    Starting it again finishes only what is missing. Ctrl-C and conevo campaign stop leave runs that
-    go on where they were.
+    Starting it again finishes only what is missing. More seeds or levels add runs, more generations
+    or a larger budget extend those that are there: conevo campaign start DIR
+    --set run.budget_evaluations=50000. Ctrl-C and conevo campaign stop leave runs that go on where
+    they were.
     """
+    from conevo.campaigns.campaign import Campaign, check, create
     from conevo.cli.campaign_run import carry_on, ready
     from conevo.cli.campaign_text import print_plan
 
     execute = ready(**execution)
-    found, plan = _planned(name, preset, seeds, settings, out)
+    path, plan = _planned(name, preset, seeds, settings, out)
     if dry_run:
-        print_plan(found.planned.values() if found else plan.write_out(), execution["as_json"])
+        runs = check(plan, path) if plan else Campaign(path).planned.values()
+        print_plan(runs, execution["as_json"])
         return 0
-    found = found or _create(plan, name, out, accept_other_code)
+    found = create(plan, path, accept_other_code) if plan else Campaign(path)
     found.admit_code(accept_other_code)
     return carry_on(found, execute)
 
@@ -159,16 +166,17 @@ def slurm(
     All nodes must see the campaign's directory. conevo campaign status shows how far it is, and
     conevo campaign start finishes what is missing.
     """
+    from conevo.campaigns.campaign import Campaign, create
     from conevo.campaigns.slurm import check_request, write_array
 
     options = [f"--{key}={value}" for key, value in named.items() if value is not None]
     options += others
     check_request(hours, options, device)
-    found, plan = _planned(name, preset, seeds, settings, out)
-    found = found or _create(plan, name, out, accept_other_code)
+    path, plan = _planned(name, preset, seeds, settings, out)
+    found = create(plan, path, accept_other_code) if plan else Campaign(path)
     found.admit_code(accept_other_code)
     left = [label for label in found.planned if not found.is_finished(label)]
-    path = write_array(
+    script = write_array(
         found.path,
         left,
         threads=threads,
@@ -177,7 +185,7 @@ def slurm(
         options=options,
         device=device,
     )
-    click.echo(f"{len(left)} runs; submit them with: sbatch {path}")
+    click.echo(f"{len(left)} runs; submit them with: sbatch {script}")
     if device != "cpu" and not any(option.startswith(("--gres", "--gpus")) for option in options):
         click.echo("conevo: note: the tasks ask SLURM for no GPU; add --gres gpu:1", err=True)
 
@@ -226,34 +234,29 @@ def retry(name: str, accept_other_code: bool, **execution: Any) -> int:
 
 def _planned(
     name: str, preset: str | None, seeds: int | None, settings: tuple[str, ...], out: str | None
-) -> tuple[Campaign | None, Any]:
-    """Return the campaign that is meant, or else the plan to begin one with."""
-    from pathlib import Path
+) -> tuple[Path, Plan | None]:
+    """Return where the campaign is or will be, and its plan; None if it goes on as it is planned.
 
-    from conevo.campaigns.plan_file import read_plan, read_preset
+    A plan that is named is always the one that counts, whatever is in DIR.
+    """
+    from conevo.campaigns.campaign import CAMPAIGNS
+    from conevo.campaigns.plan_file import preset_names, read_plan, read_preset
     from conevo.cli.find import campaign_at
     from conevo.runs.config import parse_assignments
 
+    there = campaign_at(name)
+    if there is not None and out is not None and Path(out).resolve() != there.path.resolve():
+        if name not in preset_names():
+            raise UsageError(f"--out {out}: the campaign {there.path} goes on where it is")
+        there = None
     wanted = preset is not None or seeds is not None or bool(settings)
-    there = campaign_at(out or name)
     if there is not None and not wanted:
-        return there, there.plan
-    if there is not None and out is None:
+        return there.path, None
+    if there is not None:
         plan = there.plan
     elif name.endswith(".toml"):
         plan = read_plan(Path(name))
     else:
         plan = read_preset(name)
-    return None, plan.at(preset, seeds, parse_assignments(settings))
-
-
-def _create(plan: Any, name: str, out: str | None, accept_other_code: bool) -> Campaign:
-    """Write the campaign out where it belongs."""
-    from pathlib import Path
-
-    from conevo.campaigns.campaign import CAMPAIGNS, create
-    from conevo.cli.find import campaign_at
-
-    there = campaign_at(name) if out is None else None
-    path = Path(out) if out else there.path if there else CAMPAIGNS / plan.name
-    return create(plan, path, accept_other_code)
+    path = there.path if there else Path(out) if out else CAMPAIGNS / plan.name
+    return path, plan.at(preset, seeds, parse_assignments(settings))

@@ -20,6 +20,7 @@ from conevo.cli.campaign_text import counts, grid
 from conevo.cli.carry import style_of
 from conevo.cli.text import duration
 from conevo.errors import EnvironmentFailure, UsageError
+from conevo.runs.time_limit import TimeLimit
 
 __all__ = ["Execution", "carry_on", "ready"]
 
@@ -34,6 +35,7 @@ class Execution:
     threads: int
     devices: tuple[str, ...]
     style: str
+    limit: TimeLimit
 
 
 def ready(
@@ -43,6 +45,7 @@ def ready(
     device: str,
     address: str | None,
     store: str | None,
+    limit: TimeLimit,
     as_json: bool,
     quiet: bool,
 ) -> Execution:
@@ -58,7 +61,7 @@ def ready(
         raise UsageError(f"--threads {threads}: there are only {made.cores} cores to use")
     if executor == "serial":
         threads = made.cores  # of the only run at work
-    return Execution(made, threads, devices, style_of(as_json, quiet, False))
+    return Execution(made, threads, devices, style_of(as_json, quiet, False), limit)
 
 
 def carry_on(campaign: Campaign, execution: Execution) -> int:
@@ -72,9 +75,10 @@ def carry_on(campaign: Campaign, execution: Execution) -> int:
                 threads=execution.threads,
                 devices=execution.devices,
                 watch=view.watch,
+                time_limit=execution.limit,
             )
     except (KeyboardInterrupt, Stopped) as error:
-        word = "stopped" if isinstance(error, Stopped) else "interrupted"
+        word = str(error) if isinstance(error, Stopped) else "interrupted"
         done = counts(campaign.standings())
         click.echo(f"{word} with {done}; go on with: {advice}", err=True)
         sys.exit(0 if isinstance(error, Stopped) else 130)

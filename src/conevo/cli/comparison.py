@@ -72,6 +72,7 @@ def compare(order: Order, plan: Plan, dry_run: bool) -> int:
         device=order.device,
         address=None,
         store=None,
+        limit=order.limit,
         as_json=order.as_json,
         quiet=order.quiet,
     )

@@ -1,0 +1,111 @@
+"""Another plan for a campaign that is there: more runs, or longer ones.
+
+Runs are extended by their workers, each as ``conevo resume RUN --generations N`` does. The new plan
+takes the place of the old one in one step: ``extension.json`` holds it until both files say so.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from conevo.campaigns.inputs import keep_files, renamed
+from conevo.campaigns.places import Places
+from conevo.campaigns.plan import Plan, PlannedRun
+from conevo.errors import UsageError
+from conevo.reading import read_json
+from conevo.runs.config import RunConfig
+from conevo.runs.directory import as_json
+from conevo.runs.durable import replace_file, writing
+
+if TYPE_CHECKING:
+    from conevo.campaigns.campaign import Campaign
+
+__all__ = ["check_plan", "settle", "texts_of", "write_plan"]
+
+
+def texts_of(plan: Plan, runs: Iterable[PlannedRun], directory: Path) -> dict[str, str]:
+    """Return the text of a plan and of its runs, after copying the files that they name.
+
+    Args:
+        plan, runs: to be written.
+        directory: the campaign's.
+
+    Returns:
+        Those of ``plan.toml`` and ``runs.jsonl``, as "plan" and "runs".
+    """
+    root = directory.resolve()
+    names = keep_files([*plan.values, *(value for run in runs for value in run.values)], root)
+
+    def rename(value: Any) -> Any:
+        return renamed(value, names)
+
+    rows = [dataclasses.asdict(run.mapped(rename)) for run in runs]
+    lines = "".join(f"{json.dumps(row)}\n" for row in rows)
+    return {"plan": plan.mapped(rename).to_toml(), "runs": lines}
+
+
+def check_plan(campaign: Campaign, runs: Mapping[str, PlannedRun]) -> None:
+    """Raise UsageError unless these are the campaign's runs, as long or longer, and perhaps more.
+
+    Args:
+        campaign: that is there.
+        runs: of the new plan, by label.
+    """
+    advice = f"continue it with 'conevo campaign start {campaign.path}', or choose another --out"
+    cells: dict[str, str] = {}
+    for label, planned in campaign.planned.items():
+        if label not in runs:
+            raise UsageError(
+                f"{campaign.path} holds another campaign: its run {label} is one that this plan "
+                f"does not have; {advice}"
+            )
+        if runs[label].run_ids == planned.run_ids:
+            continue
+        key = json.dumps([_cell(planned), _cell(runs[label])])
+        if key not in cells:
+            cells[key] = _why_not(planned.configs(), runs[label].configs())
+        if why := cells[key]:
+            raise UsageError(f"{campaign.path} holds another campaign: run {label} {why}; {advice}")
+        if planned.shape and campaign.places.run(label).exists():
+            raise UsageError(
+                f"{campaign.path}: {label} is a shaping that has begun, and stages keep their "
+                f"length; {advice}"
+            )
+
+
+def write_plan(campaign: Campaign, plan: Plan, runs: list[PlannedRun]) -> None:
+    """Put a plan in place of the campaign's, in one step; its lock is held."""
+    replace_file(campaign.places.extension, as_json(texts_of(plan, runs, campaign.path)))
+    settle(campaign.places)
+
+
+def settle(places: Places) -> None:
+    """Carry out what an interrupted ``write_plan`` left to do; the campaign's lock is held."""
+    if places.extension.is_file():
+        extension = read_json(places.extension)
+        replace_file(places.runs, extension["runs"].encode())
+        replace_file(places.plan, extension["plan"].encode())
+        with writing(places.extension):
+            places.extension.unlink()
+
+
+def _cell(planned: PlannedRun) -> list[object]:
+    """Return all of a run but its seed."""
+    return [planned.tasks, planned.method, planned.preset, planned.overrides]
+
+
+def _why_not(old: list[RunConfig], new: list[RunConfig]) -> str:
+    """Return why runs of one cell cannot go on as those of another, "" if they can."""
+    for one, other in zip(old, new, strict=True):
+        if one.stem_id != other.stem_id:
+            return "has other settings in this plan"
+        for name in ("generations", "budget_evaluations"):
+            was, will = getattr(one.run, name), getattr(other.run, name)
+            if 0 < will < (was or float("inf")):
+                planned = was or "no limit"
+                return f"would be shorter in this plan (run.{name} = {will}, planned: {planned})"
+    return ""
