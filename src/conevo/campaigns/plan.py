@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+import math
 import re
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -22,7 +24,10 @@ from conevo.runs.config import PRESETS, RunConfig, resolve
 from conevo.runs.shaping import tasks_up_to
 from conevo.worlds.registry import resolve as resolve_world
 
-__all__ = ["Plan", "PlannedRun", "Where"]
+__all__ = ["MOST_SEEDS", "Plan", "PlannedRun", "Where"]
+
+MOST_RUNS = 100_000
+MOST_SEEDS = 10_000
 
 
 @dataclass(frozen=True)
@@ -163,8 +168,8 @@ class Plan:
         """
         if preset is not None and preset not in PRESETS:
             raise unknown_name("preset", preset, PRESETS)
-        if seeds is not None and seeds < 1:
-            raise UsageError(f"--seeds {seeds}: a campaign needs at least 1 seed")
+        if seeds is not None and not 1 <= seeds <= MOST_SEEDS:
+            raise UsageError(f"--seeds {seeds}: a campaign has 1 to {MOST_SEEDS:,} seeds")
         given = {key: located(value, Path.cwd()) for key, value in (settings or {}).items()}
         forced = () if not given else (Where({}, given),)
         return dataclasses.replace(
@@ -181,14 +186,23 @@ class Plan:
 
     def _cells(self) -> list[dict[str, Any]]:
         """Return every combination of levels, those of some runs' own factors among them."""
-        found = []
+        found: list[dict[str, Any]] = []
+        self._refuse_many(self.factors)
         for levels in _combinations(self.factors):
             names = {"world": levels["world"], "method": levels["method"], "preset": self.preset}
             own: dict[str, tuple[Any, ...]] = {}
             for one in self.where:
                 own |= one.factors if one.holds(names) else {}
+            self._refuse_many(own)
             found += [levels | more for more in _combinations(own)]
+            self._refuse_many({"": tuple(found)})
         return found
+
+    def _refuse_many(self, factors: Mapping[str, tuple[Any, ...]]) -> None:
+        """Raise UsageError before more runs are written out than a campaign may have."""
+        n = math.prod(map(len, factors.values())) * len(self.seeds)
+        if n > MOST_RUNS:
+            raise UsageError(f"{n:,} runs {self.place}: a campaign has {MOST_RUNS:,} at most")
 
     def write_out(self) -> list[PlannedRun]:
         """Return every run, checked: seed by seed, so that an early stop leaves equal cells.
@@ -201,7 +215,7 @@ class Plan:
         written = [self._write_cell(levels) for levels in cells]
         runs = [run for same_seed in zip(*written, strict=True) for run in same_seed]
         labels = [run.label for run in runs]
-        if twice := sorted({label for label in labels if labels.count(label) > 1}):
+        if twice := sorted(label for label, n in Counter(labels).items() if n > 1):
             raise UsageError(f"{twice[0]} {self.place} is planned twice: duplicate level or seed")
         return runs
 

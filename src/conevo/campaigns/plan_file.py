@@ -39,7 +39,7 @@ from pathlib import Path
 from typing import Any
 
 from conevo.campaigns.inputs import located
-from conevo.campaigns.plan import Plan, Where
+from conevo.campaigns.plan import MOST_SEEDS, Plan, Where
 from conevo.errors import UsageError, shown, unknown_name
 from conevo.reading import parse_toml, read_toml
 from conevo.runs.config import PRESETS
@@ -160,12 +160,13 @@ def _texts(value: Any, key: str, place: str) -> tuple[str, ...]:
 
 
 def _seeds(value: Any, place: str) -> tuple[int, ...]:
-    if isinstance(value, int) and not isinstance(value, bool) and value >= 1:
+    if type(value) is int and 1 <= value <= MOST_SEEDS:
         return tuple(range(1, value + 1))
-    is_list = isinstance(value, list) and value
-    if not is_list or any(type(seed) is not int or seed < 0 for seed in value):
+    is_list = isinstance(value, list) and 1 <= len(value) <= MOST_SEEDS
+    if not is_list or any(type(seed) is not int or not 0 <= seed < 2**63 for seed in value):
         raise UsageError(
-            f"campaign.seeds = {shown(value)} {place}: must be a number from 1, or a list of seeds"
+            f"campaign.seeds = {shown(value)} {place}: must be a number from 1 to {MOST_SEEDS:,}, "
+            f"or a list of as many seeds"
         )
     return tuple(value)
 
@@ -189,6 +190,8 @@ def _expand(names: Iterable[str]) -> list[str]:
     for name in names:
         if match := RANGE.fullmatch(name):
             stem, first, last = match.groups()
+            if max(len(first), len(last)) > 3:
+                raise UsageError(f"{shown(name)}: the numbers of a range have three digits at most")
             found += [f"{stem}{k}" for k in range(int(first), int(last) + 1)]
         else:
             found.append(name)

@@ -13,11 +13,13 @@ __all__ = ["behaviours"]
 @click.command(short_help="Classify predators: pursuer, blocker, flanker, knocker, idle.")
 @click.argument("run")
 @click.option(
-    "--scenarios", type=click.IntRange(1), default=20, show_default=True, help="How many."
+    "--scenarios", type=click.IntRange(1, 10_000), default=20, show_default=True, help="How many."
 )
-@click.option("--seed", type=click.IntRange(0), help="Draw other scenarios (default: the run's).")
 @click.option(
-    "--threads", type=click.IntRange(1), help="CPU threads (default all); changes no result."
+    "--seed", type=click.IntRange(0, 2**63 - 1), help="Draw other scenarios (default: the run's)."
+)
+@click.option(
+    "--threads", type=click.IntRange(1, 4096), help="CPU threads (default all); changes no result."
 )
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def behaviours(

@@ -24,9 +24,9 @@ EXECUTION = (
         "--executor", default="processes", show_default=True, metavar="NAME",
         help="processes, serial or ray.",
     ),
-    click.option("--cores", type=click.IntRange(1), help="CPU cores to use together (all)."),
+    click.option("--cores", type=click.IntRange(1, 4096), help="CPU cores to use together (all)."),
     click.option(
-        "--threads", type=click.IntRange(1), default=1, show_default=True,
+        "--threads", type=click.IntRange(1, 4096), default=1, show_default=True,
         help="CPU threads of a run; changes no result.",
     ),
     click.option(
@@ -129,14 +129,16 @@ def start(
 @campaign.command(short_help="Write a campaign's runs as a SLURM job array.")
 @plan_options
 @click.option(
-    "--threads", type=click.IntRange(1), default=1, show_default=True,
+    "--threads", type=click.IntRange(1, 4096), default=1, show_default=True,
     help="CPU threads of a run; changes no result.",
 )  # fmt: skip
 @click.option(
     "--hours", type=float, default=24.0, show_default=True,
     help="Time limit per task; unfinished runs are requeued.",
 )  # fmt: skip
-@click.option("--at-once", type=click.IntRange(1), help="Tasks running together (default: any).")
+@click.option(
+    "--at-once", type=click.IntRange(1, 100_000), help="Tasks running together (default: any)."
+)
 @click.option("--partition", metavar="NAME", help="SLURM partition.")
 @click.option("--account", metavar="NAME", help="SLURM account.")
 @click.option("--gres", metavar="GRES", help="Resources of a task, for example gpu:1.")

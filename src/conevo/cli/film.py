@@ -19,14 +19,20 @@ __all__ = ["film"]
 @click.option("--gif", is_flag=True, help="A GIF, for pages and slides.")
 @click.option("--mp4", is_flag=True, help="An MP4 (ffmpeg, or: pip install 'conevo[video]').")
 @click.option("--out", metavar="FILE", help="The film (default: a new one in replays/).")
-@click.option("--every", type=click.IntRange(1), metavar="N", help="Iterations between two frames.")
+@click.option(
+    "--every", type=click.IntRange(1, 2**31 - 1), metavar="N", help="Iterations between two frames."
+)
 @click.option("--fps", type=click.IntRange(1, 100), help="Frames per second.")
 @click.option("--size", type=click.IntRange(200, 2160), help="Height and width of a world, pixels.")
-@click.option("--from", "first", type=click.IntRange(0), metavar="T", help="First iteration.")
-@click.option("--to", "last", type=click.IntRange(0), metavar="T", help="Last iteration.")
+@click.option(
+    "--from", "first", type=click.IntRange(0, 2**31 - 1), metavar="T", help="First iteration."
+)
+@click.option(
+    "--to", "last", type=click.IntRange(0, 2**31 - 1), metavar="T", help="Last iteration."
+)
 @click.option(
     "--poster",
-    type=click.IntRange(0),
+    type=click.IntRange(0, 2**31 - 1),
     metavar="T",
     help="No film, but a picture (PNG) of iteration T.",
 )

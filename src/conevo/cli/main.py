@@ -124,6 +124,12 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
         fail(error.format_message(), 2)
     except (KeyboardInterrupt, click.Abort):
         fail("interrupted", 130)
+    except MemoryError:
+        fail(
+            "not enough memory: ask for less, as with method.genotypes, method.rounds, run.epochs "
+            "or --scenarios",
+            3,
+        )
     except OSError as error:
         if error.errno == errno.EPIPE:  # the reader of our output has gone
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -29,7 +29,8 @@ OPTIONS = (
     click.option(
         "--preset", metavar="NAME", help="smoke (seconds), desk (minutes, default), night, thesis."
     ),
-    click.option("--seed", type=int, help="Root of all randomness (default 1)."),
+    click.option("--seed", type=click.IntRange(0, 2**63 - 1),
+        help="Root of all randomness (default 1)."),
     click.option(
         "--set", "settings", metavar="KEY=VALUE", multiple=True,
         help="One setting, for example run.generations=5; may be repeated.",
@@ -38,10 +39,12 @@ OPTIONS = (
         "--config", metavar="FILE", help="TOML file with settings, such as a run's config.toml."
     ),
     click.option(
-        "--budget-evaluations", type=int, help="Spend at most this many team evaluations."
+        "--budget-evaluations", type=click.IntRange(0, 2**63 - 1),
+        help="Spend at most this many team evaluations."
     ),
     click.option(
-        "--threads", type=click.IntRange(1), help="CPU threads (default all); changes no result."
+        "--threads", type=click.IntRange(1, 4096),
+        help="CPU threads (default all); changes no result."
     ),
     click.option("--device", default="cpu", show_default=True, help="cpu or cuda."),
     click.option("--out", metavar="DIR", help="Output directory (default: a new one under runs/)."),

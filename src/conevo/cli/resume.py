@@ -24,16 +24,18 @@ __all__ = ["resume"]
 @click.command(short_help="Continue an interrupted run, or a finished one.")
 @click.argument("run")
 @click.option(
-    "--generations", type=click.IntRange(1), help="Where it is to end instead: all generations."
+    "--generations",
+    type=click.IntRange(1, 10_000_000),
+    help="Where it is to end instead: all generations.",
 )
 @click.option(
-    "--budget-evaluations", type=click.IntRange(0),
+    "--budget-evaluations", type=click.IntRange(0, 2**63 - 1),
     help="All team evaluations that it may now spend; 0: no limit.",
 )  # fmt: skip
 @click.option("--target", metavar="VALUE|none", help="Task performance at which it is to end now.")
 @time_limit_option
 @click.option(
-    "--threads", type=click.IntRange(1), help="CPU threads (default all); changes no result."
+    "--threads", type=click.IntRange(1, 4096), help="CPU threads (default all); changes no result."
 )
 @accept_option
 @output_options

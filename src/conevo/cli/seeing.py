@@ -26,19 +26,20 @@ OPTIONS = (
         "--beside", metavar="RUN|FILE", help="A second team, in the same scenario, side by side."
     ),
     click.option(
-        "--generation", type=click.IntRange(0), metavar="G",
+        "--generation", type=click.IntRange(0, 2**31 - 1), metavar="G",
         help="Its fittest team (default: the champion).",
     ),
     click.option(
-        "--beside-generation", type=click.IntRange(0), metavar="G",
+        "--beside-generation", type=click.IntRange(0, 2**31 - 1), metavar="G",
         help="The same for the second team; RUN may be the same run.",
     ),
     click.option(
-        "--epoch", type=click.IntRange(0), metavar="K",
+        "--epoch", type=click.IntRange(0, 2**31 - 1), metavar="K",
         help="Which of the scenarios of its testing phase, from 0 (default).",
     ),
     click.option(
-        "--threads", type=click.IntRange(1), help="CPU threads (default all); changes no result."
+        "--threads", type=click.IntRange(1, 4096),
+        help="CPU threads (default all); changes no result."
     ),
 )  # fmt: skip
 

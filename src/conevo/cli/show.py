@@ -15,7 +15,9 @@ __all__ = ["show"]
 
 @click.command(short_help="Print a finished or running run.")
 @click.argument("run")
-@click.option("--rows", type=click.IntRange(2), default=12, show_default=True, help="Generations.")
+@click.option(
+    "--rows", type=click.IntRange(2, 1_000_000), default=12, show_default=True, help="Generations."
+)
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def show(run: str, rows: int, as_json: bool) -> None:
     """Print RUN: state, generations, castes, thresholds and testing phase.

@@ -12,13 +12,15 @@ __all__ = ["test"]
 @click.command(short_help="Re-execute a run's fittest team in fresh scenarios.")
 @click.argument("run")
 @click.option(
-    "--scenarios", type=click.IntRange(1), help="How many (default: as the run's own test)."
+    "--scenarios", type=click.IntRange(1, 10_000), help="How many (default: as the run's own test)."
 )
 @click.option(
-    "--seed", type=click.IntRange(0), help="Draw other scenarios than the run's own test."
+    "--seed",
+    type=click.IntRange(0, 2**63 - 1),
+    help="Draw other scenarios than the run's own test.",
 )
 @click.option(
-    "--threads", type=click.IntRange(1), help="CPU threads (default all); changes no result."
+    "--threads", type=click.IntRange(1, 4096), help="CPU threads (default all); changes no result."
 )
 @click.option("--stages", is_flag=True, help="Of a shaping: in the environment of every stage.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON value.")

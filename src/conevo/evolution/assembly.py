@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Annotated, Literal
 
 import numpy as np
-from annotated_types import Ge
+from annotated_types import Ge, Le
 
 from conevo.evolution.protocol import BoolArray, IntArray
 
@@ -45,7 +45,7 @@ class SchemeConfig:
     """
 
     evaluation: Literal["systematic", "shared"] = "systematic"
-    rounds: Annotated[int, Ge(1)] = 10
+    rounds: Annotated[int, Ge(1), Le(10_000)] = 10
     fresh_rounds: bool = True
 
     @property

@@ -33,8 +33,8 @@ class VariationConfig:
 
     elite_portion: Annotated[float, Gt(0), Le(1)] = 0.5
     mutation_probability: Annotated[float, Ge(0), Le(1)] = 0.05
-    mutation_scale: Annotated[float, Ge(0)] = 0.1
-    n_elitist: Annotated[int, Ge(0)] = 0
+    mutation_scale: Annotated[float, Ge(0), Le(1000)] = 0.1
+    n_elitist: Annotated[int, Ge(0), Le(1_000_000)] = 0
 
 
 def crossover(

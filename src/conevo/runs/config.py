@@ -102,16 +102,16 @@ class RunSettings:
     """
 
     seed: Annotated[int, Ge(0), Le(2**63 - 1)] = 1
-    generations: Annotated[int, Ge(1)] = 250
-    epochs: Annotated[int, Ge(1)] = 10
-    fittest_epochs: Annotated[int, Ge(1)] = 10
+    generations: Annotated[int, Ge(1), Le(10_000_000)] = 250
+    epochs: Annotated[int, Ge(1), Le(10_000)] = 10
+    fittest_epochs: Annotated[int, Ge(1), Le(10_000)] = 10
     credit: Literal["robot", "team"] = "robot"
-    budget_evaluations: Annotated[int, Ge(0)] = 0
+    budget_evaluations: Annotated[int, Ge(0), Le(2**63 - 1)] = 0
     target: float | None = None
-    checkpoint_every: Annotated[int, Ge(1)] = 1
+    checkpoint_every: Annotated[int, Ge(1), Le(10_000_000)] = 1
     n_finalists: Annotated[int, Ge(1), Le(1000)] = 10
-    n_validations: Annotated[int, Ge(1)] = 20
-    n_tests: Annotated[int, Ge(1)] = 20
+    n_validations: Annotated[int, Ge(1), Le(10_000)] = 20
+    n_tests: Annotated[int, Ge(1), Le(10_000)] = 20
 
 
 @dataclass(frozen=True)

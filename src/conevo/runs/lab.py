@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass, fields
 from pathlib import Path
 
 import numpy as np
 
+from conevo.errors import EnvironmentFailure
 from conevo.evolution.inheritance import hand_on
 from conevo.evolution.methods.registry import METHODS
 from conevo.evolution.protocol import Layout, Method, State
@@ -18,7 +20,7 @@ from conevo.runs.loop import check_budget, price
 from conevo.worlds.protocol import World
 from conevo.worlds.rollout import Rollout
 
-__all__ = ["Lab", "Price", "layout_of", "price_of"]
+__all__ = ["Lab", "Price", "check_memory", "layout_of", "price_of"]
 
 
 def layout_of(world: World) -> Layout:
@@ -52,6 +54,7 @@ def price_of(config: RunConfig) -> Price:
     """
     world, run = config.build_world(), config.run
     method = METHODS[config.method].build(config.method_config)
+    check_memory(config, layout_of(world))
     state = method.init(layout_of(world), run.seed)
     check_budget(method, state, run.budget_evaluations)
     first = price(method, state)
@@ -60,6 +63,32 @@ def price_of(config: RunConfig) -> Price:
         generations = min(generations, run.budget_evaluations // first)
     epochs = (first - 1) * run.epochs + run.fittest_epochs
     return Price(first, generations, generations * epochs * world.params.iterations)
+
+
+def check_memory(config: RunConfig, layout: Layout) -> None:
+    """Refuse a run that asks for more memory than this machine has, before any of it is taken.
+
+    Raises:
+        EnvironmentFailure: it does; the settings that ask for it are named.
+    """
+    method, run = config.method_config, config.run
+    robots, genotypes = layout.n_robots, getattr(method, "genotypes", 1)
+    is_shared = getattr(method, "evaluation", "") == "shared"
+    teams = genotypes * (getattr(method, "rounds", 1) if is_shared else robots)
+    genes = 4 * robots * layout.max_hidden * layout.n_genes * genotypes
+    team = 4 * robots * layout.max_hidden * (1 + layout.n_genes)
+    needs = {
+        f"method.genotypes = {genotypes:,}": 3 * genes,  # parents, children, partners
+        f"method.genotypes = {genotypes:,} in {teams:,} teams": teams * team,
+        f"{teams:,} teams and run.epochs = {run.epochs:,}": teams * run.epochs * 40 * robots,
+    }
+    there = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    if sum(needs.values()) > there:
+        what = max(needs, key=lambda name: needs[name])
+        raise EnvironmentFailure(
+            f"this run needs about {sum(needs.values()) / 2**30:,.0f} GiB of memory and the "
+            f"machine has {there / 2**30:,.0f}: {what} ask for most of it"
+        )
 
 
 @dataclass(frozen=True)
@@ -142,6 +171,7 @@ class Lab:
                 the world has no room for what belongs in it.
         """
         layout, seed = layout_of(self.world), self.config.run.seed
+        check_memory(self.config, layout)
         if ancestor is None:
             state = self.method.init(layout, seed)
         else:

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from typing import Annotated
 
 import numpy as np
-from annotated_types import Ge
+from annotated_types import Ge, Le
 
 from conevo.evolution import credit
 from conevo.evolution.assembly import SchemeConfig, best_team, rows, shared
@@ -43,7 +43,7 @@ class CcgaConfig(VariationConfig, SchemeConfig):
         genotypes: M, whole networks per population (table 5.5: 500; 600 in all for pursuit).
     """
 
-    genotypes: Annotated[int, Ge(2)] = 500
+    genotypes: Annotated[int, Ge(2), Le(1_000_000)] = 500
 
 
 @dataclass(frozen=True)

@@ -57,14 +57,14 @@ class ConeConfig(MespConfig):
         use_sdm: ask for similar behaviour (the specialization difference metric).
     """
 
-    stagnation_v: Annotated[int, Ge(1)] = 15
-    stagnation_w: Annotated[int, Ge(1)] = 10
+    stagnation_v: Annotated[int, Ge(1), Le(100_000)] = 15
+    stagnation_w: Annotated[int, Ge(1), Le(100_000)] = 10
     sst: Annotated[float, Ge(0), Le(1)] = 0.5
     gst: Annotated[float, Ge(0), Le(1)] = 0.2
     gd_aggregate: Literal["mean", "sum"] = "mean"
     threshold_step: Annotated[float, Ge(0), Le(1)] = 0.01
     type_c: Literal["own", "team", "off"] = "own"
-    type_c_rounds: Annotated[int, Ge(0)] = 0
+    type_c_rounds: Annotated[int, Ge(0), Le(10_000)] = 0
     use_gdm: bool = True
     use_sdm: bool = True
 

@@ -19,7 +19,7 @@ from dataclasses import dataclass, field
 from typing import Annotated
 
 import numpy as np
-from annotated_types import Ge
+from annotated_types import Ge, Le
 
 from conevo.errors import UsageError
 from conevo.evolution import credit
@@ -51,7 +51,7 @@ class HetCneConfig(VariationConfig):
             team evaluation. Choice: 10000, as for HomCNE.
     """
 
-    genotypes: Annotated[int, Ge(2)] = 10_000
+    genotypes: Annotated[int, Ge(2), Le(1_000_000)] = 10_000
 
 
 @dataclass(frozen=True)

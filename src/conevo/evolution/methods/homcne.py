@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from typing import Annotated
 
 import numpy as np
-from annotated_types import Ge
+from annotated_types import Ge, Le
 
 from conevo.evolution import credit
 from conevo.evolution.assembly import rows
@@ -40,7 +40,7 @@ class HomCneConfig(VariationConfig):
             is lost), so that all methods spend the same team evaluations per generation.
     """
 
-    genotypes: Annotated[int, Ge(2)] = 10_000
+    genotypes: Annotated[int, Ge(2), Le(1_000_000)] = 10_000
 
 
 @dataclass(frozen=True)

@@ -51,8 +51,8 @@ class MespConfig(VariationConfig, SchemeConfig):
             neuron for that neuron to go. Lower removes more. Choice: 0.9, the thesis gives none.
     """
 
-    genotypes: Annotated[int, Ge(2)] = 50
-    stagnation_y: Annotated[int, Ge(1)] = 15
+    genotypes: Annotated[int, Ge(2), Le(1_000_000)] = 50
+    stagnation_y: Annotated[int, Ge(1), Le(100_000)] = 15
     lesion_ratio: Annotated[float, Gt(0), Le(1)] = 0.9
 
 
