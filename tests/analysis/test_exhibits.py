@@ -14,7 +14,6 @@ from conevo.analysis.exhibits import (
     p_value,
     plain,
     slug,
-    to_latex,
 )
 
 
@@ -49,13 +48,17 @@ def test_csv_has_all_numbers_unrounded_and_pairs_in_two_columns() -> None:
     assert lines[1] == "a_0,0.3333333333,0.5,,0"
 
 
-def test_latex_is_escaped_and_split_into_pages() -> None:
-    text = to_latex(table(81))
-    assert text.count(r"\begin{tabular}{lrr}") == text.count(r"\end{table}") == 3
-    assert r"\caption{A table. n: runs; p $<$ 0.05, $\pm$1}" in text
-    assert r"name & p \& q & 95 \% interval \\" in text
-    assert r"a\_80 & 0.333 & -- \\" in text
-    assert text.count(r"\label{tab:own}") == 1
+def test_a_column_has_the_same_decimals_unless_sizes_are_far_apart() -> None:
+    def texts(*values: object) -> list[str]:
+        return Column("x", "x").texts(values)
+
+    assert texts(0.98, 1.02, 1.1, 0.0, None) == ["0.98", "1.02", "1.10", "0.00", "–"]
+    assert texts(0.012, 0.5, 1234.0) == ["0.012", "0.500", "1,234"]
+    assert texts(0.0123, 1.5, 2.5) == ["0.012", "1.50", "2.50"]
+    assert texts(-0.001, 0.95) == ["-0.001", "0.950"]
+    assert Column("x", "x", interval).texts([(0.9, 1.2), (1.0, None), (9.0, 11.0)]) == [
+        "0.90 to 1.20", "–", "9.00 to 11.00"
+    ]  # fmt: skip
 
 
 def test_names_of_files_are_plain() -> None:

@@ -60,10 +60,11 @@ LONG = re.compile(r"-?\d+\.\d{4,}")
 
 
 class Drawing(NamedTuple):
-    """One figure in two formats."""
+    """One figure in two formats, and whether it is as wide as a page."""
 
     svg: bytes
     pdf: bytes
+    is_wide: bool = False
 
 
 def style() -> Any:
@@ -104,7 +105,7 @@ def saved(figure: Figure) -> Drawing:
     nothing = {"CreationDate": None, "Creator": None, "Producer": None}
     figure.savefig(pdf, format="pdf", metadata=nothing)
     text = PLACES.sub(lambda found: LONG.sub(_shorter, found[0]), svg.getvalue().decode())
-    return Drawing(text.encode(), pdf.getvalue())
+    return Drawing(text.encode(), pdf.getvalue(), float(figure.get_figwidth()) > COLUMN)
 
 
 def _shorter(number: re.Match[str]) -> str:

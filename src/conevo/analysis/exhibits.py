@@ -1,4 +1,4 @@
-"""Tables and figures of a report, each with its numbers: as CSV, as LaTeX, as rows of text.
+"""Tables and figures of a report, each with its numbers: as CSV and as rows of text.
 
 A number is formatted in one place, its column, so that page, LaTeX and CSV cannot disagree.
 """
@@ -26,47 +26,34 @@ __all__ = [
     "p_value",
     "plain",
     "slug",
-    "to_latex",
     "with_values",
 ]
 
 Row = Mapping[str, Any]
 NOTHING = "–"
-LATEX_ROWS = 40  # that fit on a page
-LATEX = {
-    "\\": r"\textbackslash{}",
-    "&": r"\&",
-    "%": r"\%",
-    "$": r"\$",
-    "#": r"\#",
-    "_": r"\_",
-    "{": r"\{",
-    "}": r"\}",
-    "~": r"\textasciitilde{}",
-    "^": r"\textasciicircum{}",
-    "<": "$<$",
-    ">": "$>$",
-    "±": r"$\pm$",
-    "–": "--",
-    "−": "$-$",
-    "≤": r"$\le$",
-    "≥": r"$\ge$",
-    "×": r"$\times$",
-    "·": r"$\cdot$",
-}
 
 
-def number(value: Any) -> str:
-    """Return a number as people read it: about four digits; "–" for None and NaN."""
+def number(value: Any, digits: int | None = None) -> str:
+    """Return a number as people read it: about four digits, or so many decimals.
+
+    "–" for None and NaN.
+    """
     if value is None or (isinstance(value, float) and not math.isfinite(value)):
         return NOTHING
     if isinstance(value, int):
         return f"{value:,}"
-    if value == 0:
-        return "0"
+    if digits is None:
+        if value == 0:
+            return "0"
+        digits = decimals(value)
+    text = f"{value:,.{digits}f}"
+    return text.removeprefix("-") if not text.strip("-0.,") else text
+
+
+def decimals(value: float) -> int:
+    """Return the decimals that leave about four digits of a number."""
     size = abs(value)
-    digits = 0 if size >= 1000 else 1 if size >= 100 else 2 if size >= 1 else 3
-    return f"{value:,.{digits}f}"
+    return 0 if size >= 1000 else 1 if size >= 100 else 2 if size >= 1 else 3
 
 
 def p_value(value: float | None) -> str:
@@ -76,11 +63,11 @@ def p_value(value: float | None) -> str:
     return "<0.001" if value < 0.001 else f"{value:.3f}"
 
 
-def interval(value: Sequence[float | None] | None) -> str:
+def interval(value: Sequence[float | None] | None, digits: int | None = None) -> str:
     """Return a pair as "low to high"."""
     if value is None or value[0] is None or value[1] is None:
         return NOTHING
-    return f"{number(value[0])} to {number(value[1])}"
+    return f"{number(value[0], digits)} to {number(value[1], digits)}"
 
 
 def plain(value: Any) -> str:
@@ -109,6 +96,22 @@ class Column:
         """Whether it is set to the left."""
         return self.show is plain
 
+    def texts(self, values: Sequence[Any]) -> list[str]:
+        """Return the texts of all cells: numbers with the same decimals unless sizes are far apart.
+
+        Zeros do not count, and no number is left with less than its first two digits.
+        """
+        show = self.show
+        flat = [x for value in values for x in (value if isinstance(value, tuple) else (value,))]
+        sizes = [abs(x) for x in flat if isinstance(x, float) and math.isfinite(x) and x != 0]
+        own = sorted(map(decimals, sizes))
+        digits = own[len(own) // 2] if own else 0
+        if not own or own[-1] - own[0] > 2 or min(sizes) < 10 ** (1 - digits):
+            return [show(value) for value in values]
+        if show is number:
+            return [number(value, digits) for value in values]
+        return [interval(v, digits) if show is interval else show(v) for v in values]
+
 
 @dataclass(frozen=True)
 class Exhibit:
@@ -132,7 +135,10 @@ class Exhibit:
 
     def cells(self) -> list[list[str]]:
         """Return the text of every cell."""
-        return [[column.show(row.get(column.key)) for column in self.columns] for row in self.rows]
+        shown = [
+            column.texts([row.get(column.key) for row in self.rows]) for column in self.columns
+        ]
+        return [list(row) for row in zip(*shown, strict=True)]
 
     def to_csv(self) -> str:
         """Return all numbers, unrounded."""
@@ -209,42 +215,6 @@ def with_values(columns: Sequence[Column], rows: Sequence[Row]) -> list[Column]:
 def slug(text: str) -> str:
     """Return a name for files and links: small letters, digits, "-"."""
     return re.sub(r"[^a-z0-9]+", "-", text.lower()).strip("-")
-
-
-def to_latex(table: Table) -> str:
-    """Return a table for LaTeX without packages, in parts that fit on a page."""
-    cells = table.cells()
-    parts = [cells[k : k + LATEX_ROWS] for k in range(0, max(len(cells), 1), LATEX_ROWS)]
-    wide = min(0.3, 0.7 / max(sum(column.is_wide for column in table.columns), 1))
-    spec = "".join(
-        rf"p{{{wide:.2f}\textwidth}}" if column.is_wide else "l" if column.is_text else "r"
-        for column in table.columns
-    )
-    head = " & ".join(_escaped(column.title) for column in table.columns)
-    size = r"\footnotesize" if len(table.columns) <= 8 else r"\scriptsize"
-    lines = []
-    for k, part in enumerate(parts):
-        caption = f"{table.title}. {table.note}" if k == 0 else f"{table.title}, continued."
-        lines += [
-            r"\begin{table}[htbp]",
-            rf"\caption{{{_escaped(caption)}}}",
-            *([rf"\label{{tab:{table.name}}}"] if k == 0 else []),
-            rf"\centering{size}\setlength{{\tabcolsep}}{{{3 if len(table.columns) <= 8 else 2}pt}}",
-            rf"\begin{{tabular}}{{{spec}}}",
-            r"\hline",
-            rf"{head} \\",
-            r"\hline",
-            *(" & ".join(map(_escaped, row)) + r" \\" for row in part),
-            r"\hline",
-            r"\end{tabular}",
-            r"\end{table}",
-            "",
-        ]
-    return "\n".join(lines)
-
-
-def _escaped(text: str) -> str:
-    return "".join(LATEX.get(letter, letter) for letter in text)
 
 
 def _flat(row: Row) -> list[tuple[str, Any]]:

@@ -3,8 +3,10 @@
 ::
 
     index.html            one self-contained page: no script, no network
-    tables/NAME.tex       every table, for LaTeX without packages
+    tables/NAME.tex       every table, for LaTeX with array and booktabs
     figures/NAME.svg|pdf  every figure
+    figures.tex           all of them with their captions, for LaTeX with graphicx
+    all.tex               a document of all tables and figures
     numbers/NAME.csv      the numbers behind each of them, unrounded
     marl-eval.json        raw results for marl-eval
     manifest.json         digest of every file
@@ -24,8 +26,9 @@ from importlib import resources
 from pathlib import Path
 
 from conevo.analysis.courses import read_histories
-from conevo.analysis.exhibits import Exhibit, Figure, Section, Table, to_latex
+from conevo.analysis.exhibits import Exhibit, Figure, Section, Table
 from conevo.analysis.frames import Tables
+from conevo.analysis.latex import document, figures_to_latex, to_latex
 from conevo.analysis.marl_eval import export
 from conevo.analysis.sections.behaviours import behaviours
 from conevo.analysis.sections.budgets import Spent, headings, spent_by
@@ -128,6 +131,9 @@ def _files(campaign: Campaign, sections: list[Section]) -> Iterator[tuple[str, b
         if isinstance(one, Figure):
             yield f"figures/{one.name}.svg", one.drawing.svg
             yield f"figures/{one.name}.pdf", one.drawing.pdf
+    drawn = [one for one in exhibits if isinstance(one, Figure)]
+    yield "figures.tex", figures_to_latex(drawn).encode()
+    yield "all.tex", document(campaign.title, exhibits).encode()
     yield "index.html", _page(campaign, sections).encode()
 
 

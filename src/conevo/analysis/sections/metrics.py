@@ -15,6 +15,7 @@ from conevo.specialization.team import METRICS
 
 __all__ = ["definitions", "metrics"]
 
+MOST_COLUMNS = 5  # of treatments next to each other; more are below each other
 DIVERSITY = "hierarchic_social_entropy"
 PAYS = "diversity that pays"
 
@@ -65,6 +66,19 @@ def metrics(scope: Scope) -> Section:
         Column("metric", "measure", plain),
         *(Column(t.title, name, plain) for t, name in treatments.items()),
     ]
+    if len(treatments) > MOST_COLUMNS:
+        columns = [
+            *columns[:2],
+            Column("treatment", "method", plain),
+            Column("value", "value", plain),
+        ]
+        rows = [
+            {"environment": row["environment"], "metric": row["metric"]}
+            | {"treatment": name, "value": row[treatment.title]}
+            for row in rows
+            for treatment, name in treatments.items()
+            if treatment.title in row
+        ]
     table = Table(
         f"{scope.stem}-specialization-measures",
         "Measures of specialization of the champions",
