@@ -119,6 +119,7 @@ class Pair:
         p_holm: Mann-Whitney's p, corrected for all ``n_tests`` pairs of the group.
         n_tests: pairs in the family.
         larger_is_better: direction of the measure.
+        samples: the runs of a and of b.
     """
 
     environment: str
@@ -128,6 +129,7 @@ class Pair:
     p_holm: float | None
     n_tests: int
     larger_is_better: bool = True
+    samples: tuple[tuple[float, ...], tuple[float, ...]] = ((), ())
 
     @property
     def gain(self) -> float:
@@ -227,17 +229,26 @@ def compare_all(cells: Mapping[Cell, Sequence[Value]]) -> list[Pair]:
     registry's order comes first, so that a difference is what the newer method gains. Choice: the
     family of Holm's correction is all pairs of the cells given.
     """
-    direction = _larger_is_better(cells)
+    direction, found = _larger_is_better(cells), _by_environment(cells)
     made = [
         (environment, a, b, compare(samples[a], samples[b]))
-        for environment, samples in _by_environment(cells).items()
+        for environment, samples in found.items()
         for b, a in combinations(samples, 2)
         if a.method == b.method or agree(a.variant, b.variant)
     ]
     corrected = holm([result.p_mann_whitney for *_, result in made])
     tests = sum(result.p_mann_whitney is not None for *_, result in made)
     return [
-        Pair(environment, a, b, result, p, tests, direction)
+        Pair(
+            environment,
+            a,
+            b,
+            result,
+            p,
+            tests,
+            direction,
+            (tuple(found[environment][a]), tuple(found[environment][b])),
+        )
         for (environment, a, b, result), p in zip(made, corrected, strict=True)
     ]
 

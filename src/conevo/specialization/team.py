@@ -21,6 +21,7 @@ from conevo.specialization.diversity import (
 from conevo.specialization.entropy import activity_entropy, division_of_labour, mutual_information
 from conevo.specialization.individual import NON_SPECIALIZED
 from conevo.specialization.switching import switching_index
+from conevo.terms import S_SCALE
 
 __all__ = ["METRICS", "Activity", "Metric", "measure"]
 
@@ -61,7 +62,7 @@ METRICS: dict[str, Metric] = {
     "specialization": Metric(
         lambda team: float(np.mean(team.specialization)),
         "0 to 1",
-        "mean S, switches over possible ones; 0: all are perfect specialists",
+        f"mean degree of specialization S, switches over possible ones; {S_SCALE}",
         "Nitschke 2009, eq. 3.4",
     ),
     "specialized": Metric(

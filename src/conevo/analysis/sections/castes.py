@@ -15,7 +15,7 @@ from conevo.analysis.exhibits import Column, Exhibit, Figure, Section, Table, nu
 from conevo.analysis.sections.arrangement import Arrangement
 from conevo.analysis.sections.scope import KEYS, Scope, sizes
 from conevo.palette import caste_colours
-from conevo.specialization.individual import NON_SPECIALIZED
+from conevo.terms import NON_SPECIALIZED, S_SCALE
 
 __all__ = ["castes"]
 
@@ -63,7 +63,7 @@ def _over_generations(
         f"{scope.stem}-castes",
         "Castes of the fittest team over the generations",
         "Share of the robots in each caste, mean over runs, at equal numbers of team evaluations; "
-        f"a robot is in the caste of what it does most if S < 0.5. {size} per panel.",
+        f"a robot is in the caste of what it does most if S < 0.5 ({S_SCALE}). {size} per panel.",
         (),
         rows,
         drawing=curves.stacks(

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Any
 
 from conevo.analysis import tiles
 from conevo.analysis.comparison import (
+    Cell,
     Pair,
     compare_all,
 )
+from conevo.analysis.exchange import is_idle, per_generation
 from conevo.analysis.exhibits import (
     Column,
     Exhibit,
@@ -20,6 +22,7 @@ from conevo.analysis.exhibits import (
     p_value,
     plain,
 )
+from conevo.analysis.power import power_of_pair
 from conevo.analysis.ranks import EXACT_RUNS
 from conevo.analysis.sections.scope import Scope, place_names, sizes
 from conevo.analysis.statistics import ALPHA
@@ -51,15 +54,23 @@ def comparisons(scope: Scope) -> Section | None:
             f"Too few runs: with these sizes Mann-Whitney with Holm's correction over {len(pairs)} "
             f"pairs could not fall below {ALPHA} in {len(few)} of them, whatever the runs were."
         )
+    made = scope.exchanges()
+    idle = {cell for cell, one in made.items() if is_idle(*one)}
+    if idle:
+        names = " and ".join(sorted({cell.treatment.title for cell in idle}))
+        most = per_generation(*max(made[cell] for cell in idle))
+        text.append(
+            f"{names} exchanged next to nothing between populations in {len(idle)} of {len(made)} "
+            f"cells, at most {most} in a generation: without it CONE is Multi-Agent ESP with type "
+            "C fitness. Comparisons of these cells do not test what exchange is good for."
+        )
     exhibits: list[Exhibit] = [
         *_map(scope, pairs),
-        _pair_table(scope, pairs, scope.stem, scope.main, is_open=len(pairs) <= 12),
+        _pair_table(scope, pairs, scope.stem, scope.main, idle, is_open=len(pairs) <= 12),
     ]
     for measure, others in scope.others.items():
-        made = compare_all(others)
-        exhibits.append(
-            _pair_table(scope, made, f"{scope.stem}-{measure.name}", measure, is_open=False)
-        )
+        stem, of = f"{scope.stem}-{measure.name}", compare_all(others)
+        exhibits.append(_pair_table(scope, of, stem, measure, idle, is_open=False))
     return Section("Comparisons", text, exhibits)
 
 
@@ -123,8 +134,23 @@ def _pair_row(scope: Scope, pair: Pair) -> dict[str, Any]:
     }
 
 
+def _judged(pair: Pair, idle: Collection[Cell]) -> dict[str, Any]:
+    """Return a pair's verdict, with what it does not test, and the power of "alike"."""
+    is_untested = any(Cell(pair.environment, one) in idle for one in (pair.a, pair.b))
+    return {
+        "verdict": f"{pair.verdict}, no exchange" if is_untested else pair.verdict,
+        "power": power_of_pair(pair.samples[0], pair.samples[1]),
+    }
+
+
 def _pair_table(
-    scope: Scope, pairs: Sequence[Pair], stem: str, measure: Measure, *, is_open: bool
+    scope: Scope,
+    pairs: Sequence[Pair],
+    stem: str,
+    measure: Measure,
+    idle: Collection[Cell],
+    *,
+    is_open: bool,
 ) -> Table:
     columns = [
         Column("environment", "environment", plain),
@@ -139,14 +165,18 @@ def _pair_table(
         Column("p_holm", "p (MW, Holm)", p_value),
         Column("a12", "A12"),
         Column("verdict", "tests say", plain),
+        Column("power", "power"),
     ]
     tests = TESTS.format(n=pairs[0].n_tests if pairs else 0, exact=EXACT_RUNS)
     note = (
         f"{measure.direction.capitalize()}. Difference: mean of the first less that of the second; "
         f"95 % interval: Welch; {tests} "
-        "Alike: no test below 0.05 and the interval inside ±15 % of the larger mean."
+        "Alike: no test below 0.05 and the interval inside ±15 % of the larger mean; power: "
+        "probability that two methods that are exactly alike, with so many runs that scatter so, "
+        "are found alike."
+        + (" No exchange: CONE hardly recombined between populations there." if idle else "")
     )
-    rows = [_pair_row(scope, pair) for pair in pairs]
+    rows = [_pair_row(scope, pair) | _judged(pair, idle) for pair in pairs]
     return Table(
         f"{stem}-comparisons",
         f"Every two methods compared: {measure.axis}",

@@ -41,15 +41,12 @@ class _Team(NamedTuple):
 
     @property
     def scale(self) -> float:
-        """The larger of the two, whatever their signs."""
-        return max(abs(self.whole), abs(self.value))
+        """The larger of the two, whatever their signs; their distance if these differ."""
+        return max(abs(self.whole), abs(self.value), abs(self.whole - self.value))
 
     @property
     def lost(self) -> float:
-        """What is lost, in percent of the larger of the two, below 0 if the team gained.
-
-        Between -100 and 100 unless the two have different signs.
-        """
+        """What is lost, in percent of the larger of the two: -100 to 100, below 0 if it gained."""
         lost = self.whole - self.value if self.larger_is_better else self.value - self.whole
         return 100 * lost / self.scale
 

@@ -10,6 +10,7 @@ from conevo.analysis.comparison import Cell
 from conevo.analysis.courses import Course, Histories, courses
 from conevo.analysis.exhibits import Column, Exhibit, Figure, Section, Table, plain
 from conevo.analysis.sections.scope import KEYS, Scope, named, sizes
+from conevo.terms import S_SCALE
 
 __all__ = ["learning"]
 
@@ -22,8 +23,9 @@ def learning(scope: Scope, histories: Histories) -> Section:
     exhibits: list[Exhibit] = []
     at = "of the fittest team of each generation"
     drawn = (
-        ("learning", f"Task performance ({scope.unit}) {at}", {"": "value"}, None),
-        ("specialization", f"Degree of specialization S {at}, mean over its robots",
+        ("learning", f"Task performance ({scope.unit}; {scope.main.direction}) {at}",
+         {"": "value"}, None),
+        ("specialization", f"Degree of specialization S ({S_SCALE}) {at}, mean over its robots",
          {"": "specialization"}, (0.0, 1.0)),
         ("thresholds", "Thresholds SST and GST of CONE", {"SST": "sst", "GST": "gst"},
          (0.0, 1.0)),

@@ -12,12 +12,14 @@ from conevo.analysis.exhibits import Column, Section, Table, number, plain
 from conevo.analysis.sections.scope import Scope, span
 from conevo.specialization.diversity import task_specialization
 from conevo.specialization.team import METRICS
+from conevo.terms import S_SCALE
 
 __all__ = ["definitions", "metrics"]
 
 MOST_COLUMNS = 5  # of treatments next to each other; more are below each other
 DIVERSITY = "hierarchic_social_entropy"
 PAYS = "diversity that pays"
+TITLES = {"specialization": f"S ({S_SCALE})"}
 
 
 def metrics(scope: Scope) -> Section:
@@ -47,7 +49,10 @@ def metrics(scope: Scope) -> Section:
     numbers: list[dict[str, object]] = []
     for environment in scope.environments:
         for metric in names:
-            row: dict[str, str] = {"environment": environment, "metric": metric.replace("_", " ")}
+            row: dict[str, str] = {
+                "environment": environment,
+                "metric": TITLES.get(metric, metric.replace("_", " ")),
+            }
             for treatment in treatments:
                 values = found.get((metric, Cell(environment, treatment)))
                 if values:
@@ -105,7 +110,9 @@ def _what_pays(
     for treatment in treatments:
         ran = scope.cells.get(Cell(environment, treatment), ())
         of = [one for one in ran if one.run in diversity]
-        part = task_specialization([diversity[one.run] for one in of], [one.value for one in of])
+        sign = 1 if scope.main.larger_is_better else -1
+        reached = [sign * one.value for one in of]
+        part = task_specialization([diversity[one.run] for one in of], reached)
         row[treatment.title] = number(part)
         about = {"metric": PAYS, "n": len(of), "mean": part, "sd": None}
         numbers.append(scope.key(environment, treatment) | about)
@@ -116,7 +123,7 @@ def definitions() -> Section:
     """Return what each measure is, its range, and where it is from."""
     rows = [
         {
-            "name": name.replace("_", " "),
+            "name": "S" if name == "specialization" else name.replace("_", " "),
             "span": metric.span,
             "what": metric.what,
             "source": metric.source,

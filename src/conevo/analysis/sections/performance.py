@@ -34,7 +34,11 @@ __all__ = ["performance"]
 def performance(scope: Scope) -> Section:
     """Return what every cell reached."""
     found = {Cell(one.environment, one.treatment): one for one in summarize(scope.cells)}
-    rows = [scope.key(*cell) | _summary_row(one, scope) for cell, one in found.items()]
+    exchanges = scope.exchanges()
+    rows = [
+        scope.key(*cell) | _summary_row(one, scope) | _exchange_row(exchanges.get(cell))
+        for cell, one in found.items()
+    ]
     exhibits = [*_drawn(scope, found, rows), _table(scope, rows), *_pooled(scope), *_others(scope)]
     return Section(f"Task performance: {scope.main.heading}", _warnings(scope), exhibits)
 
@@ -102,6 +106,8 @@ def _table(scope: Scope, rows: Sequence[Mapping[str, Any]]) -> Table:
         "interval": "95 % interval: Student's t",
         "generation_0": "generation 0: the fittest team of the first generation in the same "
         "scenarios",
+        "exchanges": "exchange: pairs of sub-populations that recombined between populations in a "
+        "generation, and percent of those that could have",
         "p_ks": "p (KS): Kolmogorov-Smirnov against the normal fitted to the runs, as in the "
         "thesis, which is too large",
         "p_lilliefors": "p (Lilliefors): the same distance with the corrected null distribution",
@@ -150,6 +156,11 @@ def _summary_row(one: Summary, scope: Scope) -> dict[str, Any]:
     }
 
 
+def _exchange_row(made: tuple[float, float] | None) -> dict[str, Any]:
+    pairs, share = made or (None, None)
+    return {"exchanges": pairs, "exchange_share": None if share is None else 100 * share}
+
+
 def _performance_columns(rows: Sequence[Mapping[str, Any]]) -> list[Column]:
     columns = [
         *KEYS,
@@ -160,6 +171,8 @@ def _performance_columns(rows: Sequence[Mapping[str, Any]]) -> list[Column]:
         Column("range", "lowest to highest", interval),
         Column("generation_0", "generation 0"),
         Column("share", "share of optimum"),
+        Column("exchanges", "exchange, pairs"),
+        Column("exchange_share", "exchange, %"),
         Column("p_ks", "p (KS)", p_value),
         Column("p_lilliefors", "p (Lilliefors)", p_value),
     ]

@@ -98,6 +98,24 @@ class Scope:
             by_environment=by_environment,
         )
 
+    def exchanges(self) -> dict[Cell, tuple[float, float]]:
+        """Return what the populations of each cell exchanged, if its method's ever do.
+
+        Pairs of sub-populations that recombined between populations in a generation, and their
+        share of those that could have, in the mean of the runs.
+        """
+        rows = self.tables.query(
+            "SELECT run, exchanges, exchange_share FROM runs WHERE exchanges IS NOT NULL"
+        )[1]
+        made = {run: (exchanges, share) for run, exchanges, share in rows}
+        found = {}
+        for cell, values in self.cells.items():
+            own = [made[one.run] for one in values if one.run in made]
+            if own:
+                pairs, shares = zip(*own, strict=True)
+                found[cell] = (sum(pairs) / len(own), sum(shares) / len(own))
+        return found
+
     def key(self, environment: str, treatment: Treatment) -> dict[str, str]:
         """Return how rows of numbers name a cell."""
         return {
