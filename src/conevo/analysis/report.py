@@ -53,7 +53,7 @@ MANIFEST = "manifest.json"
 TEMPLATE = "report.html.j2"
 
 
-def write_report(campaign: Path, out: Path) -> Path:
+def write_report(campaign: Path, out: Path, tables: Path | None = None) -> Path:
     """Write the report of a campaign and return its page.
 
     A report that is there already is replaced as a whole, once the new one is complete.
@@ -61,17 +61,19 @@ def write_report(campaign: Path, out: Path) -> Path:
     Args:
         campaign: its directory, with sealed tables.
         out: directory of the report.
+        tables: the folder of the sealed tables, if not the campaign's own.
 
     Raises:
         UsageError: no tables; or ``out`` holds something else than an unchanged report.
         EnvironmentFailure: it cannot be written.
     """
     _refuse_changed(out)
-    about = read_campaign(campaign)
-    with Tables(campaign / "tables") as tables:
-        sections = sections_of(tables, about)
+    folder = tables or campaign / "tables"
+    about = read_campaign(campaign, folder)
+    with Tables(folder) as opened:
+        sections = sections_of(opened, about)
         files = dict(_files(about, sections))
-        files["marl-eval.json"] = _json(export(tables))
+        files["marl-eval.json"] = _json(export(opened))
     digests = {name: _digest(content) for name, content in sorted(files.items())}
     files[MANIFEST] = _json({"files": digests})
     with writing(out):

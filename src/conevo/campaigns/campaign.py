@@ -36,7 +36,7 @@ from conevo.campaigns.places import Places
 from conevo.campaigns.plan import Plan, PlannedRun
 from conevo.campaigns.plan_file import read_plan
 from conevo.campaigns.progress import is_held
-from conevo.campaigns.tables import seal_tables
+from conevo.campaigns.tables import is_sealed, seal_tables
 from conevo.campaigns.work import planned_runs
 from conevo.errors import UsageError
 from conevo.reading import read_json
@@ -266,12 +266,24 @@ class Campaign:
             self.seal()
         return self.standings()
 
-    def seal(self) -> None:
-        """Make the tables of all that is finished, unless they are those already."""
-        finished = [run for label, run in self.planned.items() if self.is_finished(label)]
-        if finished:
+    @property
+    def is_sealed(self) -> bool:
+        """Whether its tables are those of all that is finished."""
+        return is_sealed(self.places, self._finished)
+
+    @property
+    def _finished(self) -> list[PlannedRun]:
+        return [run for label, run in self.planned.items() if self.is_finished(label)]
+
+    def seal(self, into: Path | None = None) -> None:
+        """Make the tables of all that is finished, unless they are those already.
+
+        Args:
+            into: a folder to make them in, if not the campaign's own.
+        """
+        if finished := self._finished:
             spent = {entry.label: entry.core_seconds for entry in self.ledger.entries()}
-            seal_tables(self.places, finished, spent)
+            seal_tables(self.places, finished, spent, into)
 
     def _reconcile(self) -> None:
         """Make the ledger say what the directories say."""

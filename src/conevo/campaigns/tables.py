@@ -44,7 +44,12 @@ def is_sealed(places: Places, finished: Sequence[PlannedRun]) -> bool:
         return False
 
 
-def seal_tables(places: Places, finished: Sequence[PlannedRun], spent: Mapping[str, float]) -> None:
+def seal_tables(
+    places: Places,
+    finished: Sequence[PlannedRun],
+    spent: Mapping[str, float],
+    into: Path | None = None,
+) -> None:
     """Make the tables of these runs, unless they are there.
 
     A run whose files are damaged is left out, and the manifest shows which and why; it is looked at
@@ -54,16 +59,18 @@ def seal_tables(places: Places, finished: Sequence[PlannedRun], spent: Mapping[s
         places: of the campaign.
         finished: its finished runs.
         spent: core seconds by label, as far as the ledger knows them.
+        into: the folder to make, by default that of the campaign.
 
     Raises:
         UsageError: every run is damaged.
         EnvironmentFailure: they cannot be written.
     """
-    if is_sealed(places, finished):
+    folder = into or places.tables
+    if into is None and is_sealed(places, finished):
         return
     import duckdb
 
-    with writing(places.tables), draft_of(places.tables) as draft:
+    with writing(folder), draft_of(folder) as draft:
         draft.mkdir()
         files = {name: (draft / f"{name}.jsonl").open("w", encoding="utf-8") for name in SCHEMA}
         left_out: dict[str, str] = {}
@@ -88,9 +95,9 @@ def seal_tables(places: Places, finished: Sequence[PlannedRun], spent: Mapping[s
             )
             source.unlink()
         replace_file(draft / MANIFEST, as_json(_manifest(finished) | {"left_out": left_out}))
-        shutil.rmtree(places.tables, ignore_errors=True)
-        draft.rename(places.tables)
-        sync_directory(places.root)
+        shutil.rmtree(folder, ignore_errors=True)
+        draft.rename(folder)
+        sync_directory(folder.parent)
 
 
 def _manifest(finished: Sequence[PlannedRun]) -> Row:

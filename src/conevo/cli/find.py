@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from conevo.errors import UsageError, unknown_name
+import click
+
+from conevo.errors import EnvironmentFailure, UsageError, unknown_name
 from conevo.runs.directory import CAMPAIGN, kind_of
 from conevo.runs.run import RUNS, Run
 from conevo.runs.shaping import Shaping
@@ -128,20 +132,37 @@ def only_campaign() -> Campaign:
     )
 
 
-def sealed(campaign: Campaign) -> Campaign:
-    """Return the campaign with tables of all that is finished.
+@contextmanager
+def sealed(campaign: Campaign) -> Iterator[Path]:
+    """Yield the folder with the tables of all that is finished.
 
-    While it runs they are as its coordinator last made them.
+    While the campaign runs they are as its coordinator last made them. Where they are out of date
+    and cannot be written, as on a read-only file system, they are made for this command only.
 
     Raises:
         UsageError: no run is finished yet.
+        EnvironmentFailure: they cannot be made anywhere.
     """
-    if not campaign.is_running:
-        with campaign.locked():
-            campaign.seal()
-    if not (campaign.places.tables / "runs.parquet").is_file():
-        raise UsageError(f"{campaign.path} has no finished run yet, so there is nothing to show")
-    return campaign
+    import tempfile
+
+    with ExitStack() as stack:
+        tables = campaign.places.tables
+        if not (campaign.is_running or campaign.is_sealed):
+            try:
+                with campaign.locked():
+                    campaign.seal()
+            except EnvironmentFailure as error:
+                folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="conevo-"))
+                tables = Path(folder) / "tables"
+                campaign.seal(tables)
+                if tables.is_dir():
+                    note = f"conevo: note: {error}; its tables are made for this command only"
+                    click.echo(note, err=True)
+        if not (tables / "runs.parquet").is_file():
+            raise UsageError(
+                f"{campaign.path} has no finished run yet, so there is nothing to show"
+            )
+        yield tables
 
 
 def _open(path: Path) -> Run | Shaping:

@@ -31,7 +31,8 @@ def query(arguments: tuple[str, ...], as_csv: bool, as_json: bool) -> None:
     if len(arguments) > 2:
         raise UsageError('query takes a campaign and one SQL text: conevo query NAME "SELECT ..."')
     found = find_campaign(arguments[0]) if len(arguments) == 2 else only_campaign()
-    columns, rows = Tables(sealed(found).places.tables).query(arguments[-1])
+    with sealed(found) as folder, Tables(folder) as tables:
+        columns, rows = tables.query(arguments[-1])
     if as_json:
         for row in rows:
             click.echo(json.dumps(dict(zip(columns, row, strict=True)), default=str))

@@ -20,7 +20,13 @@ def report(name: str, out: str | None) -> None:
     """
     from conevo.analysis.report import write_report
     from conevo.cli.find import find_campaign, sealed
+    from conevo.errors import EnvironmentFailure
 
-    found = sealed(find_campaign(name))
-    page = write_report(found.path, Path(out) if out else found.places.report)
+    found = find_campaign(name)
+    with sealed(found) as tables:
+        try:
+            page = write_report(found.path, Path(out) if out else found.places.report, tables)
+        except EnvironmentFailure as error:
+            advice = "" if out else "; choose another place with --out"
+            raise EnvironmentFailure(f"{error}{advice}") from error
     click.echo(f"open in a browser: {page}")

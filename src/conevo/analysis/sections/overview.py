@@ -47,13 +47,18 @@ class Ending(TypedDict):
     message: str
 
 
-def read_campaign(root: Path) -> Campaign:
-    """Return what a campaign's directory says beside its tables; missing files say nothing."""
+def read_campaign(root: Path, tables: Path | None = None) -> Campaign:
+    """Return what a campaign's directory says next to its tables; missing files say nothing.
+
+    Args:
+        root: the directory.
+        tables: the folder of its tables, by default in the directory.
+    """
     plan, listed = root / "plan.toml", root / "runs.jsonl"
     text = read_text(plan) if plan.is_file() else ""
     head = parse_toml(text, str(plan)).get("campaign", {})
     lines = read_json_lines(listed) if listed.is_file() else []
-    manifest = root / "tables" / "tables.json"
+    manifest = (tables or root / "tables") / "tables.json"
     sealed = read_json(manifest) if manifest.is_file() else {}
     left_out = {f"runs/{label}": why for label, why in sealed.get("left_out", {}).items()}
     endings: dict[str, dict[str, Any]] = {}
