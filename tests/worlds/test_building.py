@@ -12,6 +12,8 @@ import pytest
 import warp as wp
 
 import conevo
+from conevo.campaigns.campaign import create
+from conevo.campaigns.plan import Plan
 from conevo.cli.main import main
 from conevo.errors import EnvironmentFailure, UsageError
 from conevo.kernels import engine
@@ -52,6 +54,15 @@ def test_a_mistake_in_a_world_is_one_line_with_its_place_and_no_run(
         assert (caught.value.code, out, err.count("\n")) == (2, "", 1)
         assert err.startswith(f"conevo: error: {file}:{line_with(old.splitlines()[0])}: ")
         assert words in err
+    assert [p.name for p in tmp_path.iterdir()] == ["light.py"]
+
+
+def test_no_campaign_appears_with_a_world_that_cannot_be_built(tmp_path: Path) -> None:
+    file = written(tmp_path / "light.py", (SCORE, "third_name"))
+    factors = {"world": (f"{file}:dark-1",), "method": ("homcne",)}
+    plan = Plan("mine", "Mine", (), (1,), "smoke", False, (), factors, {})
+    with pytest.raises(UsageError, match="Referencing undefined symbol: third_name"):
+        create(plan, tmp_path / "campaign")
     assert [p.name for p in tmp_path.iterdir()] == ["light.py"]
 
 

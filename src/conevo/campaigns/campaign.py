@@ -23,7 +23,7 @@ from __future__ import annotations
 import dataclasses
 import time
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 from conevo.campaigns.admission import admit_code
@@ -43,6 +43,7 @@ from conevo.reading import read_json
 from conevo.runs.directory import Directory, appearing
 from conevo.runs.durable import replace_file
 from conevo.runs.time_limit import TimeLimit
+from conevo.worlds.registry import resolve as resolve_world
 
 __all__ = ["ATTEMPTS", "CAMPAIGNS", "Campaign", "Stopped", "check", "create"]
 
@@ -83,11 +84,12 @@ def create(plan: Plan, path: Path, accept_other_code: bool = False) -> Campaign:
         accept_other_code: extend a campaign although other code has begun it.
 
     Raises:
-        UsageError: a run that cannot be, ``path`` holds something else, or other code has begun
-            the campaign there; nothing was written.
+        UsageError: a run that cannot be, a world whose kernel cannot be built, ``path`` holds
+            something else, or other code has begun the campaign there; nothing was written.
         EnvironmentFailure: it cannot be written.
     """
     runs = check(plan, path)
+    _build_worlds(runs)
     if not Places(path).plan.is_file():
         with appearing(path) as draft:
             places, texts = Places(draft), texts_of(plan, runs, draft)
@@ -102,6 +104,15 @@ def create(plan: Plan, path: Path, accept_other_code: bool = False) -> Campaign:
         write_plan(campaign, plan, runs)
         campaign.settle()
     return campaign
+
+
+def _build_worlds(runs: Iterable[PlannedRun]) -> None:
+    """Build the kernels of worlds in files of their own, whose authors may have made mistakes."""
+    for address in sorted({run.world for run in runs if ".py:" in run.world}):
+        from conevo.worlds.rollout import Rollout
+
+        entry, environment = resolve_world(address)
+        Rollout(entry.build(environment, entry.params_class())).build()
 
 
 class Campaign:
