@@ -55,7 +55,9 @@ def test_a_moved_campaign_goes_on_without_the_files_of_its_plan(tmp_path: Path) 
     assert all((run.path / "inputs" / "light.py").is_file() for run in runs)
 
 
-def test_tables_and_reports_run_no_world_file(tmp_path: Path) -> None:
+def test_tables_and_reports_run_no_world_file(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     made = create(read_plan(light_plan(tmp_path / "plans")).at(seeds=1), tmp_path / "made")
     carried_out(made)
     shutil.rmtree(made.places.tables)
@@ -70,8 +72,10 @@ def test_tables_and_reports_run_no_world_file(tmp_path: Path) -> None:
     assert rows == [("light-v1/dark-1", 3, "nearness", code, "")] * 2
     with pytest.raises(SystemExit, match="0"):
         main(["report", str(made.path)])
+    capsys.readouterr()
     with pytest.raises(SystemExit, match="0"):
         main(["campaign", "status", str(made.path)])
+    assert "\nlight.py:dark-1  " in capsys.readouterr().out
 
 
 def test_a_factor_of_prey_files_is_kept_by_their_names(tmp_path: Path) -> None:
@@ -92,6 +96,19 @@ def test_a_factor_of_prey_files_is_kept_by_their_names(tmp_path: Path) -> None:
     ]
     assert carried_out(moved) == ["finished", "finished"]
     assert create(moved.plan.at(seeds=2), moved.path).planned.keys() > moved.planned.keys()
+
+
+def test_a_plan_made_in_python_names_files_from_where_it_is(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plan = read_plan(light_plan(tmp_path / "plans")).at(seeds=1)
+    monkeypatch.chdir(tmp_path / "plans")
+    here = plan.mapped(lambda v: v.replace(f"{tmp_path}/plans/", "") if isinstance(v, str) else v)
+    assert here.factors["world"] == ("light.py:dark-1",)
+    made = create(here.at(), tmp_path / "made")
+    shutil.rmtree(tmp_path / "plans")
+    assert made.plan.factors["world"] == (f"{made.path}/inputs/light.py:dark-1",)
+    assert Campaign(made.path).plan.write_out() == list(made.planned.values())
 
 
 def begun_by_another(folder: Path) -> Campaign:

@@ -24,7 +24,7 @@ from runs.tiny import TASK, evolve_tiny, tiny_settings
 # config.toml, and files keep what they are given.
 NOT_DECIDING = {
     f"conevo{name}"
-    for name in ("", ".errors", ".reading", ".runs", ".runs.config", ".runs.outline")
+    for name in ("", ".errors", ".reading", ".runs", ".runs.config", ".runs.outline", ".terms")
 }
 
 

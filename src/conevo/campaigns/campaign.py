@@ -31,6 +31,7 @@ from conevo.campaigns.devices import CPU, next_device
 from conevo.campaigns.ended import read_ended
 from conevo.campaigns.executors import Ending, Executor, Job
 from conevo.campaigns.extension import check_plan, settle, texts_of, write_plan
+from conevo.campaigns.inputs import located
 from conevo.campaigns.ledger import Entry, Ledger
 from conevo.campaigns.places import Places
 from conevo.campaigns.plan import Plan, PlannedRun
@@ -88,6 +89,7 @@ def create(plan: Plan, path: Path, accept_other_code: bool = False) -> Campaign:
             something else, or other code has begun the campaign there; nothing was written.
         EnvironmentFailure: it cannot be written.
     """
+    plan = plan.mapped(lambda value: located(value, Path.cwd()))
     runs = check(plan, path)
     _build_worlds(runs)
     if not Places(path).plan.is_file():

@@ -13,6 +13,7 @@ import click
 from conevo.campaigns.campaign import CAMPAIGNS, Campaign
 from conevo.campaigns.estimate import remaining_seconds
 from conevo.campaigns.executors import usable_cores
+from conevo.campaigns.inputs import shown_as
 from conevo.campaigns.ledger import STATES, Entry
 from conevo.campaigns.plan import PlannedRun
 from conevo.campaigns.plan_file import preset_names, read_preset
@@ -177,7 +178,7 @@ def grid(
     cells: dict[tuple[str, str], dict[str, list[Entry]]] = {}
     for run in planned:
         if run.label in entries:
-            row = cells.setdefault((run.world, run.variant), {})
+            row = cells.setdefault((shown_as(run.world), run.variant), {})
             row.setdefault(run.method, []).append(entries[run.label])
     methods = list(dict.fromkeys(method for row in cells.values() for method in row))
     lines = [

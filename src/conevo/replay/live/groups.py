@@ -12,6 +12,7 @@ from typing import Any
 from conevo.campaigns.campaign import Campaign
 from conevo.campaigns.estimate import remaining_seconds
 from conevo.campaigns.executors import usable_cores
+from conevo.campaigns.inputs import shown_as
 from conevo.campaigns.ledger import Entry
 from conevo.errors import ConevoError, UsageError
 from conevo.replay.live.files import Stamp, is_locked, readable, stamp
@@ -199,7 +200,7 @@ class Experiment(Group):
             path = folder / Path(label).name
             about = {
                 name: getattr(run, name) for name in ("method", "preset", "seed", "variant")
-            } | {"task": run.world}
+            } | {"task": shown_as(run.world)}
             name = f"{self._prefix}/{label}" if self._prefix else label
             self._by_label[label] = known.get(label) or Subject(
                 self._names.of(path, name), path, about
