@@ -95,6 +95,17 @@ def test_whoever_takes_the_lock_removes_what_killed_processes_left_inside(tmp_pa
     assert alive.poll() is None
 
 
+def test_whoever_takes_the_lock_removes_the_draft_that_the_directory_was(tmp_path, writer):
+    path = tmp_path / "run"
+    process = writer("directory", path)
+    (hidden,) = tmp_path.iterdir()
+    process.kill()
+    process.wait()
+    (hidden / "run").rename(path)  # killed just after it had appeared
+    with Directory(path, "run").locked():
+        assert names(tmp_path) == ["run"]
+
+
 @pytest.mark.parametrize(
     "files",
     [

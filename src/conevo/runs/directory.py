@@ -147,6 +147,7 @@ class Directory:
 
     def _tidy(self) -> None:
         """Remove what killed processes have left here; a campaign's runs are their workers'."""
+        remove_abandoned(self.path.resolve().parent)  # of one killed just when this had appeared
         remove_abandoned(self.path)
         for folder in (self.path, self.path / "teams", self.path / "inputs"):
             remove_torn(folder)
