@@ -281,6 +281,19 @@ def test_odd_campaigns_have_a_report_too(of, tmp_path) -> None:
     assert "95 % interval" not in re.sub(r"(?s)<section id=.section-claims.*?</section>", "", text)
 
 
+def test_many_variants_are_tables_where_drawings_could_not_be_read(tmp_path) -> None:
+    of = [
+        Cell("rover", f"complex-{n}", "cone", variant=f"gst=0.{k}")
+        for n in (1, 2)
+        for k in range(1, 10)
+    ]
+    out = write_report(write_campaign(tmp_path / "c", of, 2, 2), tmp_path / "out").parent
+    assert sorted(path.name for path in (out / "figures").glob("*")) == []
+    for name in ("runs", "learning", "specialization", "lesion", "clones", "performance"):
+        assert (out / f"tables/rover-complex-{name}.tex").is_file(), name
+    assert len(rows_of(out / "numbers/rover-complex-runs.csv")) == 36
+
+
 def test_a_world_where_nothing_was_achieved_has_no_losses(tmp_path) -> None:
     of = cells(["rover/complex-1"], ["mesp", "cone"])
     root = write_campaign(tmp_path / "c", of, 2, 3, mean=lambda cell: -1e6)

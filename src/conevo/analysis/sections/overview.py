@@ -16,6 +16,9 @@ from conevo.reading import parse_toml, read_json, read_json_lines, read_text
 __all__ = ["Campaign", "overview", "read_campaign", "repetition"]
 
 
+MOST_NAMES = 12  # of runs that a sentence may list
+
+
 @dataclass(frozen=True)
 class Campaign:
     """What the directory of a campaign says beside its tables.
@@ -95,8 +98,11 @@ def overview(tables: Tables, campaign: Campaign) -> Section:
     text.append(
         f"{len(finished):,}{planned} runs are finished{stages}, {len(failed):,} failed, "
         f"{len(waiting):,} have not ended. Only finished runs count below. Runs of different "
-        "presets or budgets never stand in one table or figure."
+        "presets or budgets are never in one table or figure."
     )
+    if waiting:
+        more = f" and {len(waiting) - MOST_NAMES:,} more" if len(waiting) > MOST_NAMES else ""
+        text.append(f"Not ended: {', '.join(waiting[:MOST_NAMES])}{more}.")
     text += _warnings(tables)
     exhibits = [_cost(tables), _versions(tables)]
     if failed:

@@ -27,8 +27,11 @@ from conevo.analysis.exhibits import (
     with_values,
 )
 from conevo.analysis.sections.scope import KEYS, Scope, named, sizes, span
+from conevo.worlds.registry import WORLDS
 
 __all__ = ["performance"]
+
+MOST_COLUMNS = 5  # of treatments that a table compares with each other
 
 
 def performance(scope: Scope) -> Section:
@@ -64,7 +67,7 @@ def _drawn(
     bars = Figure(
         f"{scope.stem}-bars",
         f"Task performance ({scope.unit}) by {at.axis_name} and method",
-        "Mean over runs of the fittest team in fresh scenarios"
+        f"{scope.about} Mean over runs of the fittest team in fresh scenarios"
         + ("; error bars: standard deviation of the runs" if several else "")
         + f". {size} per bar.",
         (),
@@ -83,11 +86,12 @@ def _drawn(
     points = Figure(
         f"{scope.stem}-runs",
         title,
-        f"A point per run; next to them the mean with Student's 95 % interval. {size} per cell.",
+        f"{scope.about} A point per run; next to them the mean with Student's 95 % interval. "
+        f"{size} per cell.",
         (),
         runs,
         drawing=figures.points(
-            at.grid(found, lambda one: figures.Runs(one.values, _ends(one))),
+            at.grid(found, lambda one: figures.Runs(one.values, _ends(one, scope))),
             at.places,
             names,
             x_label=at.axis,
@@ -103,7 +107,8 @@ def _table(scope: Scope, rows: Sequence[Mapping[str, Any]]) -> Table:
     shown = _performance_columns(rows)
     keys = {column.key for column in shown}
     notes = {
-        "interval": "95 % interval: Student's t",
+        "interval": "95 % interval: Student's t"
+        + (", ends where values do" if any(map(math.isfinite, scope.within)) else ""),
         "generation_0": "generation 0: the fittest team of the first generation in the same "
         "scenarios",
         "exchanges": "exchange: pairs of sub-populations that recombined between populations in a "
@@ -117,8 +122,7 @@ def _table(scope: Scope, rows: Sequence[Mapping[str, Any]]) -> Table:
         f"Task performance ({scope.unit}) by environment and method",
         "; ".join(
             [
-                f"{scope.main.direction.capitalize()}. Mean over runs of the mean over fresh "
-                "scenarios",
+                f"{scope.about} Mean over runs of the mean over fresh scenarios",
                 "n: runs",
             ]
             + [note for key, note in notes.items() if key in keys]
@@ -130,11 +134,12 @@ def _table(scope: Scope, rows: Sequence[Mapping[str, Any]]) -> Table:
     )
 
 
-def _ends(one: Summary) -> tuple[float, float, float] | None:
-    mean = one.mean
+def _ends(one: Summary, scope: Scope) -> tuple[float, float, float] | None:
+    """Return mean and interval, which ends where values do; None if there is no interval."""
+    mean, (least, most) = one.mean, scope.within
     if mean.value is None or mean.low is None or mean.high is None:
         return None
-    return mean.value, mean.low, mean.high
+    return mean.value, max(mean.low, least), min(mean.high, most)
 
 
 def _summary_row(one: Summary, scope: Scope) -> dict[str, Any]:
@@ -143,11 +148,12 @@ def _summary_row(one: Summary, scope: Scope) -> dict[str, Any]:
     optima = {value.optimum for value in scope.cells[cell]}
     optimum = optima.pop() if len(optima) == 1 else None
     mean = one.mean.value
+    interval_of = _ends(one, scope)
     return {
         "n": len(one.values),
         "mean": mean,
         "sd": one.sd,
-        "interval": (one.mean.low, one.mean.high),
+        "interval": interval_of[1:] if interval_of else (None, None),
         "range": (min(one.values), max(one.values)),
         "generation_0": sum(begun) / len(begun) if begun else None,
         "share": mean / optimum if optimum and mean is not None else None,
@@ -186,7 +192,7 @@ def _warnings(scope: Scope) -> list[str]:
         text.append("There is one run per cell: no deviation, no interval, and nothing is tested.")
     elif min(counts) < 2:
         text.append("Cells with a single run have no deviation, no interval and no t-test.")
-    if max(counts) < 20:
+    if max(counts) < 20 and scope.group.world in WORLDS:
         text.append(
             f"The thesis has 20 runs per cell; here are {span(counts).removeprefix('n = ')}."
         )
@@ -205,7 +211,12 @@ def _pooled(scope: Scope) -> list[Exhibit]:
         return []
     optima = {one.optimum for of in scope.cells.values() for one in of}
     scale = scope.unit if None in optima else f"share of the optimal {scope.unit}"
-    others = [one.treatment for one in found[:-1]]
+    others = [one.treatment for one in found[:-1]] if len(found) <= MOST_COLUMNS else []
+    improvement = (
+        "P(better than X): probability of improvement, that a run is better than one of X in the "
+        f"same environment ({scope.main.direction}); "
+    )
+    several = found[0].environments > 1
     columns = [
         Column("treatment", "method", plain),
         Column("n", "n"),
@@ -216,11 +227,10 @@ def _pooled(scope: Scope) -> list[Exhibit]:
     return [
         Table(
             f"{scope.stem}-aggregate",
-            f"All environments together: {scale}",
-            f"Environments: {found[0].environments}; n: runs; IQM: "
-            "interquartile mean of the runs; P(better than X): probability of improvement, that a "
-            f"run is better than one of X in the same environment ({scope.main.direction}); 95 % "
-            "intervals: stratified bootstrap, 2000 resamples.",
+            f"{'All environments together' if several else 'Interquartile means'}: {scale}",
+            f"Environments: {found[0].environments}; n: runs; IQM: interquartile mean of the runs; "
+            f"{improvement if others else ''}95 % intervals: stratified bootstrap, 2000 "
+            "resamples.",
             columns,
             [_aggregate_row(one) for one in found],
         )

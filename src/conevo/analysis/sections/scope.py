@@ -7,7 +7,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from conevo.analysis.comparison import Cell, Group, Treatment, group_values, treatments_of
-from conevo.analysis.exhibits import Column, plain, slug
+from conevo.analysis.exhibits import Column, number, plain, slug
 from conevo.analysis.frames import Tables, Value
 from conevo.analysis.sections.arrangement import Arrangement, arrange
 from conevo.worlds.measures import Measure
@@ -76,6 +76,14 @@ class Scope:
             -math.inf if low is None else low,
             high if high is not None else math.inf if None in optima else most,
         )
+
+    @property
+    def about(self) -> str:
+        """Direction and optimum of the main measure, as captions begin."""
+        optima = {one.optimum for values in self.cells.values() for one in values}
+        optimum = optima.pop() if len(optima) == 1 else None
+        most = "" if optimum is None else f", {number(optimum)} at most"
+        return f"{self.main.direction.capitalize()}{most}."
 
     @property
     def axis(self) -> str:
