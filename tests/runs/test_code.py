@@ -132,6 +132,8 @@ def test_other_code_is_refused_or_recorded(
 ) -> None:
     run = interrupted(tmp_path / "run")
     change(run.path, edit)
+    if edit is of_first_release:
+        (run.path / "finalists.npz").unlink()
     before = run.provenance
     asks = f"made by conevo {name}, and this is .*{code_digest()}.*--accept-other-code'"
     with pytest.raises(UsageError, match=asks):

@@ -131,6 +131,8 @@ def finish(store: Store, lab: Lab, stopped_by: str) -> None:
 def _best_so_far(store: Store) -> list[Team]:
     """Return the finalists of a run that has at least one generation."""
     teams = store.load_finalists()
+    if not teams and "code" not in store.read_provenance():  # conevo 0.1.0 kept the champion alone
+        teams = [team for team in [store.load_champion()] if team is not None]
     if not teams:
         raise UsageError(f"{store.path} has lost its finalists.npz: it cannot be resumed")
     return teams
