@@ -285,3 +285,24 @@ def test_public_names_are_few_and_there() -> None:
         assert getattr(conevo, name) is not None
     with pytest.raises(AttributeError, match="has no attribute 'evolv'"):
         _ = conevo.evolv  # type: ignore[attr-defined]
+
+
+def test_a_run_begins_with_what_another_one_ended_with(say) -> None:
+    assert say(*tiny("--out", "first", "--quiet")).code == 0
+    same = ("--config", "first/config.toml", "--threads", "1", "--quiet")
+    for option, words in (
+        ("--from", "Begun with the populations of first, generation 5"),
+        ("--from-champion", "Bred from the champion of first, generation"),
+    ):
+        said = say("run", "rover/complex-2", *same, option, "first", "--out", option[2:])
+        assert (said.code, said.err) == (0, "")
+        assert words in say("show", option[2:]).out
+    both = say("run", "rover/complex-2", *same, "--from", "first", "--from-champion", "first")
+    assert (both.code, "mutually exclusive" in both.err) == (2, True)
+    smaller = say("run", "rover/complex-2", *same, "--from", "first", "--set", "genotypes=6")
+    assert (smaller.code, "4 genotypes per slot became 6" in smaller.err) == (2, True)
+    say(*tiny("--out", "part", "--time-limit", "0.001s", "--quiet"))
+    part = say("run", "rover/complex-2", *same, "--from", "part")
+    assert part.code == 2
+    assert "part is not finished" in part.err
+    assert "finish it with 'conevo resume part'" in part.err

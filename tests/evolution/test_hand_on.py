@@ -9,7 +9,7 @@ import pytest
 
 from conevo.errors import UsageError
 from conevo.evolution import METHODS, Layout, Scores, State, method
-from conevo.evolution.inheritance import hand_on
+from conevo.evolution.inheritance import breed_from, hand_on
 
 LAYOUT = Layout(n_robots=2, n_hidden=3, max_hidden=5, n_genes=4)
 TAKEN = {"genes", "active", "n_hidden"}
@@ -108,3 +108,38 @@ def test_neurons_are_no_networks() -> None:
     mesp, ccga = build("mesp"), build("ccga")
     with pytest.raises(UsageError, match="single neurons and whole networks"):
         hand_on(ccga, LAYOUT, 3, mesp.init(LAYOUT, 3))
+
+
+@every_method
+def test_populations_bred_from_a_team_have_it_whole_and_vary_around_it(name: str) -> None:
+    learner = build(name)
+    fresh = learner.init(LAYOUT, 3)
+    active = np.zeros((2, 5), dtype=bool)
+    active[:, :3] = True
+    genes = np.linspace(-0.9, 0.9, 2 * 5 * 4, dtype=np.float32).reshape(2, 5, 4)
+    genes = np.where(active[..., None], genes, np.float32(0))
+    state = breed_from(learner, LAYOUT, 3, genes, active)
+    same(state, fresh, {field.name for field in fields(State)} - TAKEN)
+    one_population = len(state.genes) == 1
+    for p, m in ((0, 0), (0, 1)) if one_population else ((0, 0), (1, 0)):
+        np.testing.assert_array_equal(state.genes[p, :, m], genes[m if one_population else p])
+    for p in range(len(state.genes)):
+        for m in range(1 if not one_population else 2, 6):
+            source = genes[m % 2 if one_population else p]
+            changed = state.genes[p, :, m] != source
+            assert not changed[3:].any()
+            assert changed.mean() < 0.5
+    assert (state.genes != breed_from(learner, LAYOUT, 4, genes, active).genes).any()
+    assert np.unique(state.genes[0].swapaxes(0, 1).reshape(6, -1), axis=0).shape[0] > 2
+    same(breed_from(learner, LAYOUT, 3, genes, active), state, {"genes", "active", "n_hidden"})
+    assert learner.ask(state).teams.shape == learner.ask(fresh).teams.shape
+
+
+def test_a_team_of_other_sizes_is_refused() -> None:
+    genes, active = np.zeros((2, 5, 3), dtype=np.float32), np.ones((2, 5), dtype=bool)
+    with pytest.raises(UsageError, match="3 genes per neuron became 4"):
+        breed_from(build("mesp"), LAYOUT, 3, genes, active)
+    genes = np.zeros((2, 5, 4), dtype=np.float32)
+    assert breed_from(build("mesp"), LAYOUT, 3, genes, active).n_hidden.tolist() == [5, 5]
+    with pytest.raises(UsageError, match="has networks of 3 neurons, which never grow"):
+        breed_from(build("ccga"), LAYOUT, 3, genes, active)

@@ -5,11 +5,13 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import conevo
 from conevo.errors import UsageError
 from conevo.runs.config import resolve
+from conevo.runs.lab import Lab
 from conevo.runs.run import start
 from runs.tiny import TASK, content, evolve_tiny, tiny_settings
 
@@ -61,4 +63,42 @@ def test_an_unfinished_or_changed_origin_is_refused(tmp_path: Path) -> None:
     (changed.path / "test.json").write_text("{}")
     with pytest.raises(UsageError, match=r"was changed since it was finished \(test\.json\)"):
         descend(changed, tmp_path / "run")
+    assert not (tmp_path / "run").exists()
+
+
+def test_a_run_may_be_bred_from_the_champion_of_another(tmp_path: Path) -> None:
+    origin = evolve_tiny(tmp_path / "origin", world__max_hidden=2)
+    run = conevo.evolve(
+        "rover/complex-2",
+        "mesp",
+        "smoke",
+        out=tmp_path / "run",
+        overrides=tiny_settings("mesp", world__max_hidden=2),
+        threads=1,
+        origin=origin.path,
+        of_champion=True,
+    )
+    about, champion = run.provenance["origin"], origin.champion
+    assert champion is not None
+    assert about["of"] == "champion"
+    assert about["generation"] == champion.generation
+    with np.load(run.path / "origin.npz") as first:
+        np.testing.assert_array_equal(first["field.genes"][:, :, 0], champion.genes)
+    again = run.team_again(0, Lab.equip(run.config, 1, "cpu"))
+    assert again.fitness.tolist() == run.team(0).fitness.tolist()  # type: ignore[union-attr]
+    longer = conevo.Run(run.path).resume(generations=7, threads=1)
+    assert longer.status == "finished"
+
+
+@pytest.mark.parametrize("of_champion", [True, False])
+def test_controllers_of_other_sizes_are_refused(of_champion: bool, tmp_path: Path) -> None:
+    origin = evolve_tiny(tmp_path / "origin")
+    for task, changes, words in (
+        ("gacc/complex-1", {}, r"sensors became \d+"),
+        (TASK, {"world__n_hidden": 3}, "2 context inputs became 3"),
+        (TASK, {"world__max_hidden": 5}, "4 slots for neurons became 5"),
+    ):
+        config = resolve(task, "cone", "smoke", overrides=tiny_settings("cone", task, **changes))
+        with pytest.raises(UsageError, match=f"do not fit this world: .*{words}"):
+            start(config, tmp_path / "run", threads=1, origin=origin, of_champion=of_champion)
     assert not (tmp_path / "run").exists()

@@ -23,6 +23,7 @@ __all__ = [
     "directories",
     "find",
     "find_campaign",
+    "find_last",
     "find_run",
     "find_shaping",
     "only_campaign",
@@ -60,6 +61,23 @@ def find_run(text: str) -> Run:
     if not stages:
         raise UsageError(f"{found.path} has no finished generation yet")
     return stages[-1]
+
+
+def find_last(text: str) -> Run:
+    """Return the run that is meant; of a shaping its last stage.
+
+    Raises:
+        UsageError: there is no such run, more than one, or the shaping is not finished.
+    """
+    found = find(text)
+    if isinstance(found, Run):
+        return found
+    if found.status != "finished":
+        raise UsageError(
+            f"{found.path} is not finished, so no run can begin with its populations; "
+            f"finish it with 'conevo resume {found.path}'"
+        )
+    return found.stages[-1]
 
 
 def find_shaping(text: str) -> Shaping:

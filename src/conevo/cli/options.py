@@ -151,12 +151,25 @@ class Order:
         refuse_existing(path)
         print_dry_run(configs, path, self.as_json)
 
-    def run(self, config: RunConfig) -> None:
-        """Start a run and carry it on to its end."""
+    def run(self, config: RunConfig, origin: str | None = None, of_champion: bool = False) -> None:
+        """Start a run and carry it on to its end.
+
+        Args:
+            config: what to run.
+            origin: names the run whose populations it begins with, or a shaping whose last stage's.
+            of_champion: they are bred from its champion.
+        """
+        from conevo.cli.find import find_last
         from conevo.runs.run import start
 
         begun = start(
-            config, self.out, threads=self.threads, device=self.device, command=self.command
+            config,
+            self.out,
+            threads=self.threads,
+            device=self.device,
+            command=self.command,
+            origin=None if origin is None else find_last(origin),
+            of_champion=of_champion,
         )
         carry_on(begun, self.threads, self.style, self.limit)
 

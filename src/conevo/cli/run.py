@@ -25,6 +25,13 @@ __all__ = ["run"]
     help="In stages: the environments of the same name from number 1 up to this one.",
 )  # fmt: skip
 @click.option(
+    "--from", "origin", metavar="RUN", help="Begin with the populations that RUN ended with."
+)
+@click.option(
+    "--from-champion", "champion", metavar="RUN",
+    help="Begin with populations bred from the champion of RUN.",
+)  # fmt: skip
+@click.option(
     "--dry-run", is_flag=True, help="Print all settings and what they cost; start nothing."
 )
 @click.option(
@@ -36,6 +43,8 @@ def run(
     world: str | None,
     prey: str | None,
     shape: bool,
+    origin: str | None,
+    champion: str | None,
     dry_run: bool,
     seeds: int | None,
     **options: Any,
@@ -48,6 +57,10 @@ def run(
 
     Try: conevo run rover/complex-1 --preset smoke --method cone,homcne --seeds 3
     """
+    if origin is not None and champion is not None:
+        raise UsageError("--from and --from-champion are mutually exclusive")
+    if (origin or champion) and (shape or seeds is not None):
+        raise UsageError("--from and --from-champion begin one run, without --shape and --seeds")
     order = Order(**options, comparing=seeds is not None)
     config = order.resolve(world)
     if prey is not None:
@@ -70,5 +83,5 @@ def run(
     elif dry_run:
         order.print_only([config])
     else:
-        order.run(config)
+        order.run(config, origin or champion, of_champion=champion is not None)
     return None

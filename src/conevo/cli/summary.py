@@ -80,6 +80,9 @@ def run_text(run: Run, n_rows: int) -> str:
         parts += ["", generations_table(spaced(records, n_rows))]
     if run.test_result:
         parts += ["", test_text(run.test_result)]
+    if origin := run.provenance.get("origin"):
+        what = "Bred from the champion" if origin.get("of") else "Begun with the populations"
+        parts += ["", f"{what} of {origin['path']}, generation {origin['generation']}"]
     if lines := _former_ends(run):
         parts += ["", *lines]
     if run.status == "interrupted":

@@ -7,9 +7,11 @@ from dataclasses import replace
 import numpy as np
 
 from conevo.errors import UsageError
-from conevo.evolution.protocol import Layout, Method, State
+from conevo.evolution.protocol import BoolArray, FloatArray, Layout, Method, State
+from conevo.evolution.variation import VariationConfig, mutate
+from conevo.rng import stream
 
-__all__ = ["hand_on"]
+__all__ = ["breed_from", "hand_on"]
 
 AXES = {"slots": 1, "genotypes per slot": 2, "genes per neuron": 3}  # of State.genes
 
@@ -44,7 +46,63 @@ def hand_on(method: Method, layout: Layout, root: int, state: State) -> State:
     if state.fitness.ndim != fresh.fitness.ndim:
         different.append("single neurons and whole networks are no genotypes of one kind")
     if different:
-        raise UsageError(f"these populations cannot be handed on: {'; '.join(different)}")
+        raise UsageError(
+            f"these populations cannot be handed on: {'; '.join(different)}; sizes are the same "
+            f"with the settings of the run that they come from"
+        )
     source = np.arange(new[0]) % old[0]
     active = state.active[source]
     return replace(fresh, genes=state.genes[source], active=active, n_hidden=active.sum(axis=1))
+
+
+def breed_from(
+    method: Method, layout: Layout, root: int, genes: FloatArray, active: BoolArray
+) -> State:
+    """Return generation 0 of a task, all its genotypes bred from one team.
+
+    Choice: population p is of copies of the team's controller p mod R, all but the first of them
+    mutated as children are, so that there is something to select from and nothing is lost. A
+    method with one population takes the R controllers in turn.
+
+    Args:
+        method: the method of the task.
+        layout: the size of the task.
+        root: the seed of every random decision.
+        genes: [R, U, G] the team's.
+        active: [R, U] its slots in use.
+
+    Raises:
+        UsageError: slots or genes are not as many as in the task, or the method's networks, which
+            keep their size, have another one.
+    """
+    fresh = method.init(layout, root)
+    n_populations, n_slots, n_genotypes, n_genes = fresh.genes.shape
+    n_robots = len(genes)
+    different = [
+        f"{found} {name} became {wanted}"
+        for name, found, wanted in (
+            ("slots", genes.shape[1], n_slots),
+            ("genes per neuron", genes.shape[2], n_genes),
+        )
+        if found != wanted
+    ]
+    is_whole = fresh.fitness.ndim == 2
+    if not different and is_whole and not (active == fresh.active[0]).all():
+        different = [f"{method.title} has networks of {layout.n_hidden} neurons, which never grow"]
+    if different:
+        raise UsageError(f"no population can be bred from this team: {'; '.join(different)}")
+    source = np.arange(n_populations)[:, None] + np.zeros(n_genotypes, dtype=np.int64)
+    n_kept = 1
+    if n_populations == 1:
+        source, n_kept = np.arange(n_genotypes)[None], min(n_robots, n_genotypes)
+    copies = genes[source % n_robots].swapaxes(1, 2)
+    probability, scale = (
+        getattr(method.config, name, getattr(VariationConfig, name))
+        for name in ("mutation_probability", "mutation_scale")
+    )
+    bred = mutate(copies, probability, scale, stream(root, "champion"))
+    bred[:, :, :n_kept] = copies[:, :, :n_kept]
+    kept = fresh.active if is_whole else active[source[:, 0] % n_robots]
+    return replace(
+        fresh, genes=bred * kept[:, :, None, None], active=kept, n_hidden=kept.sum(axis=1)
+    )

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from conevo.errors import EnvironmentFailure
-from conevo.evolution.inheritance import hand_on
+from conevo.evolution.inheritance import breed_from, hand_on
 from conevo.evolution.methods.registry import METHODS
 from conevo.evolution.protocol import Layout, Method, State
 from conevo.reading import DamagedFile
@@ -160,11 +160,12 @@ class Lab:
         if not ((state.elite >= 0) & (state.elite < state.genes.shape[2])).all():
             raise DamagedFile(f"{path}: elite of its checkpoint names genotypes that are not there")
 
-    def first_state(self, ancestor: State | None = None) -> State:
+    def first_state(self, ancestor: State | Team | None = None) -> State:
         """Return the state before generation 0, after checking that it can be paid.
 
         Args:
-            ancestor: whose populations to begin with; random ones by default.
+            ancestor: whose populations to begin with, or the team that they are to be bred from;
+                random ones by default.
 
         Raises:
             UsageError: the budget does not pay for one generation, the ancestor does not fit, or
@@ -174,6 +175,8 @@ class Lab:
         check_memory(self.config, layout)
         if ancestor is None:
             state = self.method.init(layout, seed)
+        elif isinstance(ancestor, Team):
+            state = breed_from(self.method, layout, seed, ancestor.genes, ancestor.active)
         else:
             state = hand_on(self.method, layout, seed, ancestor)
         check_budget(self.method, state, self.config.run.budget_evaluations)

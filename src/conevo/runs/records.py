@@ -7,7 +7,7 @@ is what an earlier one did not write. None stands for a number that was not fini
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any, NotRequired
+from typing import Annotated, Any, Literal, NotRequired
 
 from annotated_types import Ge, Le, MinLen
 from pydantic import AllowInfNan, StringConstraints
@@ -72,6 +72,27 @@ class Origin(TypedDict):
     run_id: RunId
     generation: Count
     checkpoint: Digest
+    of: NotRequired[Literal["champion"]]
+
+
+class Length(TypedDict):
+    """What ends a run, see ``RunSettings``."""
+
+    generations: Annotated[int, Ge(1)]
+    budget_evaluations: Count
+    target: Finite
+
+
+class FormerEnd(TypedDict):
+    """The end that a run had, or was to have, before it was given another length."""
+
+    at: str
+    run_id: RunId
+    planned: Length
+    generations: Count
+    team_evaluations: Count
+    stopped_by: str | None
+    finished: str | None
 
 
 class Provenance(TypedDict):
@@ -91,18 +112,12 @@ class Provenance(TypedDict):
     cpu: str
     sessions: list[Session]
     code: NotRequired[str]
+    stem_id: NotRequired[RunId]
     world: NotRequired[WorldHeader]
     origin: NotRequired[Origin]
+    extended: NotRequired[list[FormerEnd]]
     finished: NotRequired[str]
     stopped_by: NotRequired[str]
-
-
-class Length(TypedDict):
-    """What ends a run, see ``RunSettings``."""
-
-    generations: Annotated[int, Ge(1)]
-    budget_evaluations: Count
-    target: Finite
 
 
 class Extension(TypedDict):
@@ -112,7 +127,7 @@ class Extension(TypedDict):
     length: Length
     config: str
     changed: list[str]
-    former: dict[str, object]
+    former: FormerEnd
 
 
 class Generation(TypedDict):

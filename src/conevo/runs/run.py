@@ -42,6 +42,8 @@ def evolve(
     threads: int | None = None,
     device: str = "cpu",
     progress: bool = False,
+    origin: Run | str | Path | None = None,
+    of_champion: bool = False,
 ) -> Run:
     """Evolve a team and test it; everything is kept in one directory.
 
@@ -56,6 +58,9 @@ def evolve(
         threads: CPU threads, all by default; results do not depend on it.
         device: "cpu" or "cuda".
         progress: print a line per generation.
+        origin: a finished run, with whose populations this one begins, in any environment whose
+            controllers have the same inputs and outputs.
+        of_champion: breed the populations from the origin's champion instead.
 
     Raises:
         UsageError: a name or value that is not allowed, or ``out`` exists; nothing was written.
@@ -64,7 +69,11 @@ def evolve(
     from conevo.runs.config import resolve
 
     settings = resolve(world, method, preset, seed, config, overrides)
-    run = start(settings, out, threads=threads, device=device)
+    if origin is not None and not isinstance(origin, Run):
+        origin = Run(origin)
+    run = start(
+        settings, out, threads=threads, device=device, origin=origin, of_champion=of_champion
+    )
     return run.resume(threads=threads, watch=_print_line if progress else None)
 
 
@@ -76,6 +85,7 @@ def start(
     device: str = "cpu",
     command: str = "conevo.evolve",
     origin: Run | None = None,
+    of_champion: bool = False,
 ) -> Run:
     """Create the directory of a run that is then carried on by ``Run.resume``.
 
@@ -87,18 +97,25 @@ def start(
         command: what the provenance says the run was started with.
         origin: a finished run; the new one begins with the populations that it ended with, which
             are copied into the new directory, and is otherwise as any other.
+        of_champion: its populations are bred from the origin's champion instead.
 
     Raises:
         UsageError: the directory exists, the budget does not pay for one generation, or the
             origin is unfinished, was changed since, or its populations do not fit.
         EnvironmentFailure: no such device, full disk, no permission; nothing was written.
     """
+    from conevo.runs.ancestry import ancestor_of, refuse_other_controllers
     from conevo.runs.lab import Lab
 
-    ancestor, ancestry = (None, {}) if origin is None else origin.ancestry()
+    ancestor: State | Team | None = None
+    ancestry: Record = {}
+    if origin is not None:
+        ancestor, ancestry = ancestor_of(origin._store, origin.outline.method, of_champion)
     suffix = f"-from-{ancestry['origin']['checkpoint'][:6]}" if ancestry else ""
     path = Path(out) if out is not None else RUNS / f"{config.label}{suffix}"
     refuse_existing(path)
+    if origin is not None:
+        refuse_other_controllers(origin, config.build_world())
     lab = Lab.equip(config, threads, device)
     first = lab.first_state(ancestor)
     about = {
@@ -254,31 +271,6 @@ class Run:
             on_generation=keep,
         )
         return teams[0]
-
-    def ancestry(self) -> tuple[State, Record]:
-        """Return the state this finished run ended with, and what its descendants say about it.
-
-        Raises:
-            UsageError: it is not finished, or not as it was when it was sealed.
-        """
-        if not self._store.is_finished:
-            raise UsageError(
-                f"{self.path} is not finished, so no run can begin with its populations; "
-                f"finish it with 'conevo resume {self.path}'"
-            )
-        if changed := self.changed_files:
-            raise UsageError(
-                f"{self.path} was changed since it was finished ({', '.join(changed)}): "
-                f"no run can begin with its populations"
-            )
-        state, digest = self._store.load_final(self.outline.method)
-        about = {
-            "path": str(self.path),
-            "run_id": self.provenance["run_id"],
-            "generation": state.generation,
-            "checkpoint": digest,
-        }
-        return state, {"origin": about}
 
     def resume(
         self,

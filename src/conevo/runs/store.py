@@ -382,6 +382,17 @@ class Store(Directory):
         file = self.path / CHECKPOINTS[1 - self._next_checkpoint]
         return state, checkpoint.content_digest(file)
 
+    def load_final_champion(self) -> tuple[Team, str]:
+        """Return the champion of a finished run, and the digest of its file.
+
+        Raises:
+            UsageError: the file is lost or unusable.
+        """
+        team = self.load_champion()
+        if team is None:
+            raise UsageError(f"{self.path} has lost its {CHAMPION}")
+        return team, checkpoint.content_digest(self.path / CHAMPION)
+
     def _identity(self) -> dict[str, str]:
         return _identity(self.read_provenance())
 
