@@ -1,5 +1,6 @@
 """Stages: what they say of an epoch is what happened in it, in all worlds."""
 
+import dataclasses
 import json
 import math
 from collections import Counter
@@ -89,8 +90,16 @@ def test_words():
     assert stage.subtitle == "Multi-Agent ESP, seed 4, fittest team of generation 12, epoch 2"
     facts = dict(stage.facts)
     performance = epoch(TASKS[0]).about["performance"]
-    assert facts["value"] == f"{performance['value']:.0f}"
-    assert facts["area"] == f"{performance['area']:.3g}"
+    assert facts["value"] == f"{performance['value']:.0f} points"
+    assert facts["area"] == f"{performance['area']:.3g} share of the square"
+    hunt = epoch(next(task for task in TASKS if task.startswith("pursuit")))
+    collisions = hunt.about["performance"]["collisions"]
+    assert dict(stage_of(hunt).facts)["collisions"] == (
+        f"{number(collisions)} refused moves (smaller is better)"
+    )
+    about = {k: v for k, v in epoch(TASKS[0]).about.items() if k != "units"}  # conevo 0.1.0
+    old = dataclasses.replace(epoch(TASKS[0]), about=about)
+    assert dict(stage_of(old).facts)["value"] == f"{performance['value']:.0f}"
     assert (facts["run"], facts["method"], facts["seed"]) == ("here", "Multi-Agent ESP", "4")
     assert facts["hidden neurons"] == "10 to 11"  # one has a hole among its neurons
     mean = np.mean(epoch(TASKS[0]).about["fitness"])

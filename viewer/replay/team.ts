@@ -17,7 +17,7 @@ const STACKED = "(max-width: 900px)";
 const BESIDE = 250;
 /** What the column of S says. */
 const DEGREE =
-  "S: switches to another action, out of those that could be; S = 0 is a perfect specialist";
+  "S: degree of specialization (0 = always the same action, 1 = switches all the time)";
 
 export class Team {
   readonly element: HTMLElement;

@@ -10,7 +10,7 @@ from typing import Any
 
 import click
 
-from conevo.cli.summary import declared, title
+from conevo.cli.summary import declared, measures_text, title
 from conevo.cli.text import bars, castes, count, duration, neurons, number
 from conevo.runs.run import Run
 from conevo.terms import S_MEANS
@@ -43,7 +43,7 @@ def watching(
         with Live(get_renderable=display.render, refresh_per_second=4):
             yield display.add
     elif style in ("plain", "verbose"):
-        click.echo(f"{heading}\n{run.path}")
+        click.echo("\n".join([heading, str(run.path), *measures_text(run.provenance)]))
         yield Lines(run, pause=PAUSE if style == "plain" else 0.0).add
     else:
 

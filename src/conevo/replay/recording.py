@@ -18,7 +18,7 @@ from conevo.replay.trajectory import FORMAT, About, Trajectory
 from conevo.rng import fold
 from conevo.runs.evaluation import describe
 from conevo.runs.run import Run
-from conevo.worlds.measures import measures_of
+from conevo.worlds.measures import Measure, measures_of
 from conevo.worlds.protocol import World
 from conevo.worlds.rollout import Rollout
 
@@ -165,8 +165,14 @@ def record_epoch(
         "heuristic": [names[mode + 1] for mode in modes],
         "neurons": [np.flatnonzero(slots >= 0).tolist() for slots in team],
         "performance": portrait.performance,
+        "units": {one.name: _worth(one) for one in measures_of(world)},
     }
     return about, channels
+
+
+def _worth(measure: Measure) -> str:
+    """Return what follows a value of a measure: its unit, and that smaller is better if it is."""
+    return f"{measure.unit}{'' if measure.larger_is_better else ' (smaller is better)'}".strip()
 
 
 def hidden_activations(

@@ -32,7 +32,7 @@ import math
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, NotRequired
 
 import numpy as np
 from typing_extensions import TypedDict  # pydantic reads typing's own from Python 3.12 on only
@@ -68,7 +68,8 @@ class About(TypedDict):
     epoch: number of the scenario among those that the seed draws; scenario: its key. labels [R]:
     caste of each robot in this epoch. specialization, fitness [R]: S and fitness in it. heuristic
     [R]: name of a robot's heuristic controller, "" for its network. neurons [R]: slots in which a
-    robot has hidden neurons.
+    robot has hidden neurons. units: what follows a value of each measure of performance, its unit
+    and that smaller is better if it is; conevo 0.1.0 wrote none.
     """
 
     format: int
@@ -96,6 +97,7 @@ class About(TypedDict):
     heuristic: list[str]
     neurons: list[list[int]]
     performance: dict[str, float]
+    units: NotRequired[dict[str, str]]
 
 
 @dataclass(frozen=True)

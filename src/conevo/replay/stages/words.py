@@ -36,7 +36,11 @@ def facts(about: About) -> tuple[tuple[str, str], ...]:
             ("generation", str(about["generation"])),
             ("epoch", str(about["epoch"])),
         ]
-    found += [(name.replace("_", " "), number(v)) for name, v in about["performance"].items()]
+    units = about.get("units", {})
+    found += [
+        (name.replace("_", " "), f"{number(value)} {units.get(name, '')}".rstrip())
+        for name, value in about["performance"].items()
+    ]
     found.append(("team fitness (mean)", number(sum(about["fitness"]) / about["n_robots"])))
     by_hand = [name for name in about["heuristic"] if name]
     if by_hand:
