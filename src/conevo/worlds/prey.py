@@ -11,6 +11,7 @@ sensors        8 infrared
 actions        stop, forward, left, right, reverse (motor primitives)
 controller     8-5-2 feed-forward network
 performance    ``path`` in cm, see below; ``collided``, share of the prey that did
+               (smaller is better)
 =============  =========================================================================
 
 **Fitness.** The way a prey has come, the straighter the more: the sum over iterations of the

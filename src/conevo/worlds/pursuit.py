@@ -10,7 +10,8 @@ sensors        8 infrared (everything), 8 light (prey only)
 actions        stop, forward, left, right, reverse: motor primitives, see below
 controller     22-6-2 simple recurrent network (16 sensors, 6 context units)
 performance    ``capture_time`` in iterations; ``first_capture``, its iteration (or the
-               epoch's length); ``captures``, how often; ``collisions`` of the predators
+               epoch's length; smaller is better); ``captures``, how often; ``collisions`` of
+               the predators, refused moves (smaller is better)
 =============  =========================================================================
 
 **Capture.** A prey is captured in an iteration if it is immobilized and at least two predators are
