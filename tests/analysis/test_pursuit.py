@@ -31,6 +31,7 @@ from conevo.cli.main import main
 from conevo.errors import UsageError
 from conevo.rng import fold, stream
 from conevo.runs.champions import Team
+from conevo.runs.shrinkage import shrinkage
 from conevo.worlds.pursuit import PursuitParams, PursuitWorld
 from conevo.worlds.rollout import Rollout
 from runs.tiny import evolve_tiny
@@ -39,6 +40,7 @@ TINY = {
     "run.generations": 2,
     "run.epochs": 1,
     "run.fittest_epochs": 2,
+    "run.n_validations": 20,
     "run.n_tests": 2,
     "world.iterations": 200,
     "world.arena_cm": 60.0,
@@ -63,8 +65,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> list[conevo.Run]:
     folder = tmp_path_factory.mktemp("runs")
     return [
         evolve(folder / f"{method}-{seed}", method, seed)
-        for method in ("cone", "homcne")
-        for seed in (1, 2)
+        for method, seed in (("cone", 1), ("cone", 4), ("homcne", 1), ("homcne", 2))
     ]
 
 
@@ -322,15 +323,25 @@ def test_composition_without_captures() -> None:
     }
 
 
-def fake(method: str, fitness: float | None) -> Any:
+def fake(method: str, fitness: float | None, validated: float | None = None) -> Any:
     zeros = np.zeros(2)
     champion = None if fitness is None else Team(0, zeros, zeros > 0, zeros + fitness, zeros)
-    return SimpleNamespace(config=SimpleNamespace(method=method), champion=champion, path="here")
+    result = None
+    if validated is not None:
+        part = {"fitness": {"mean": validated}, "performance": {}}
+        one = {"generation": 0, "selection": {"fitness": fitness, "performance": {}}}
+        about = {"chosen": 0, "finalists": [one | {"validation": part}]}
+        result = {"champion": part, "validation": about}
+    config = SimpleNamespace(method=method)
+    return SimpleNamespace(config=config, champion=champion, path="here", test_result=result)
 
 
 def test_the_fittest_run_of_each_method() -> None:
     some = [fake("cone", 1), fake("mesp", 5), fake("cone", 3), fake("cone", 3), fake("mesp", 4)]
     assert list(fittest_runs(some).values()) == [some[2], some[1]]
+    lucky = [fake("cone", 9, 1), fake("cone", 4, 3), fake("cone", 2, 3)]
+    assert fittest_runs(lucky) == {"cone": lucky[1]}
+    assert fittest_runs([*lucky, fake("cone", 5)]) == {"cone": lucky[0]}  # one was not validated
     with pytest.raises(UsageError, match="no finished generation"):
         fittest_runs([fake("cone", None)])
     for table in (composition_table, lesion_table):
@@ -345,7 +356,7 @@ def test_table_4_4_of_runs(runs) -> None:
         counts = [row[name] for name in (*COLLECTIVES[:-1], "non-specialized")]
         assert sum(n for n in counts if n is not None) == row["predators"] == 3
         assert row["non-specialized"] >= row["labels"].count("non-specialized")
-    best = max(runs[2:], key=lambda run: run.champion.mean_fitness)
+    best = max(runs[2:], key=lambda run: shrinkage(run.test_result)[0]["validation"]["mean"])
     assert rows[1]["run"] == str(best.path)
     json.dumps(rows)
 

@@ -204,15 +204,10 @@ def test_values_that_are_not_finite_keep_their_place(
     assert spread(np.array(values, np.float32)) == expected
 
 
-def test_only_a_fitter_finite_team_becomes_champion() -> None:
+def test_teams_are_ranked_by_their_mean_and_those_that_are_not_finite_last() -> None:
     first, same, better = make_team(0, 1, 3), make_team(1, 3, 1), make_team(2, 2, 3)
     broken = make_team(3, math.inf, 1)
-    assert first.is_fitter_than(None)
-    assert not same.is_fitter_than(first)
-    assert better.is_fitter_than(first)
-    assert not broken.is_fitter_than(first)
-    assert broken.is_fitter_than(None)
-    assert first.is_fitter_than(broken)
+    assert better.rank < first.rank == same.rank < broken.rank
 
 
 def test_a_team_as_a_trial_uses_exactly_its_active_slots() -> None:

@@ -18,8 +18,8 @@ from conevo.analysis.lesions import WHOLE, lesion
 from conevo.analysis.pursuit import lab_of, observe
 from conevo.errors import UsageError
 from conevo.rng import fold
-from conevo.runs.champions import Team
 from conevo.runs.run import Run
+from conevo.runs.shrinkage import shrinkage
 from conevo.specialization.individual import NON_SPECIALIZED
 
 __all__ = ["composition", "composition_table", "fittest_runs", "lesion_table"]
@@ -121,18 +121,28 @@ def lesion_table(
 def fittest_runs(runs: Iterable[Run]) -> dict[str, Run]:
     """Return each method's run with the fittest champion, the earlier given one if equal.
 
+    Champions are compared by their validation, which did not make them finalists; if a run of the
+    method has none, by the fitness that selected them.
+
     Raises:
         UsageError: no runs, or one without a team.
     """
-    best: dict[str, Run] = {}
-    teams: dict[str, Team] = {}
+    by_method: dict[str, list[Run]] = {}
     for run in runs:
-        team = run.champion
-        if team is None:
+        if run.champion is None:
             raise UsageError(f"{run.path} has no finished generation yet, so no team to observe")
-        method = run.config.method
-        if team.is_fitter_than(teams.get(method)):
-            best[method], teams[method] = run, team
-    if not best:
+        by_method.setdefault(run.config.method, []).append(run)
+    if not by_method:
         raise UsageError("no runs were given, so there is no table")
-    return best
+    return {method: _fittest(some) for method, some in by_method.items()}
+
+
+def _fittest(runs: Sequence[Run]) -> Run:
+    """Return the first of the runs whose champion has the highest fitness."""
+    results = [run.test_result or {} for run in runs]
+    if all("validation" in result for result in results):
+        found = [shrinkage(result)[0]["validation"]["mean"] for result in results]
+        fitness = [-np.inf if mean is None else mean for mean in found]
+    else:
+        fitness = [-run.champion.rank if run.champion else -np.inf for run in runs]
+    return runs[int(np.argmax(fitness))]

@@ -73,10 +73,6 @@ class Team:
         pool = self.genes.reshape(-1, self.genes.shape[-1])
         return pool, np.where(self.active, rows, np.int32(-1))[None]
 
-    def is_fitter_than(self, other: Team | None) -> bool:
-        """Whether this team is fitter than an earlier one, or there is none."""
-        return other is None or self.rank < other.rank
-
 
 @dataclass(frozen=True)
 class Finalists:
