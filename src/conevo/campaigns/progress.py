@@ -44,7 +44,7 @@ class Progress:
 
 
 def is_held(places: Places, label: str) -> bool:
-    """Whether a process that this machine knows of is at work on a run."""
+    """Whether a process that this machine knows of holds a run."""
     return locks.is_held(places.run(label) / LOCK)
 
 

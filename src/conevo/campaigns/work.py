@@ -39,7 +39,7 @@ PATIENCE = 600.0  # seconds to wait for another worker that is just about to lea
 
 
 class _InUse(Exception):
-    """Another worker is at work on the run, and stays."""
+    """Another worker has the run, and keeps it."""
 
 
 def planned_runs(root: Path) -> dict[str, PlannedRun]:

@@ -65,7 +65,7 @@ def serve(
         port: of the server; any that is free for None or 0.
         replay: gives the page with the replay of a label's fittest team so far; called for one
             label at a time.
-        on_ready: told the page's address when it can be opened.
+        on_ready: called with the page's address when it can be opened.
 
     Raises:
         EnvironmentFailure: the port is in use, or may not be used.
