@@ -68,7 +68,7 @@ def lines(
         panels: title of each panel -> line -> its course.
         names: line -> what the legend says.
         x_label: under the lowest panels.
-        y_label: beside the panels on the left.
+        y_label: left of the panels.
         limits: of the vertical axis; from the data if not given.
         within: lowest and highest value that there can be; bands end there.
     """
@@ -150,7 +150,7 @@ def stacks(
         x: [X].
         colours: name -> colour, from below.
         x_label: under the panels.
-        y_label: beside them.
+        y_label: left of them.
     """
     with style():
         from matplotlib.collections import PolyCollection

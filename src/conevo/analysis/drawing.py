@@ -113,7 +113,7 @@ def _shorter(number: re.Match[str]) -> str:
 
 
 def name_axes(figure: Figure, x_label: str, y_label: str = "") -> None:
-    """Write what the axes of all panels are below and beside them, in lines that fit."""
+    """Write what the axes of all panels are, below and left of them, in lines that fit."""
     width, height = map(float, figure.get_size_inches())
     figure.supxlabel(fitted(x_label, 0.9 * width, 2), fontsize=SIZE)
     if y_label:
@@ -211,7 +211,7 @@ def spread_of(i: int, n: int) -> float:
 
 
 def marker_size(cells: int) -> float:
-    """Return the size of points for a number of cells beside each other."""
+    """Return the size of points for a number of cells next to each other."""
     return 4.0 if cells <= 10 else 3.0 if cells <= 30 else 2.2
 
 

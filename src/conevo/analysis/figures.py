@@ -79,7 +79,7 @@ def bars(
         places: P names under the groups.
         names: method -> what the legend says.
         x_label: under the axes.
-        y_label: beside the axes.
+        y_label: left of the axes.
         within: lowest and highest value that there can be; deviations end there.
     """
     with style():
@@ -123,14 +123,14 @@ def points(
     reference: float | None = None,
     within: tuple[float, float] = EVERYTHING,
 ) -> Drawing:
-    """Draw every run as a point, and beside the runs of a cell their mean with its interval.
+    """Draw every run as a point, and next to the runs of a cell their mean with its interval.
 
     Args:
         panels: title of each panel -> method -> P cells; None: no runs.
         places: P names.
         names: method -> what the legend says.
         x_label: under the axes.
-        y_label: beside the axes.
+        y_label: left of the axes.
         reference: a height with a line across.
         within: lowest and highest value that there can be; intervals end there.
     """

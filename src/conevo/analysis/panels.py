@@ -68,7 +68,7 @@ class Panels:
         self.axes.text(left + 0.5, foot + 1.02, text, ha="center", va="bottom")
 
     def side(self, row: int, text: str) -> None:
-        """Write beside a row."""
+        """Write left of a row."""
         foot = self.corner(row, 0)[1]
         self.axes.text(-0.04, foot + 0.5, text, ha="right", va="center")
 

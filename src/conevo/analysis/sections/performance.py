@@ -251,7 +251,7 @@ def _aggregate_row(one: Aggregate) -> dict[str, Any]:
 
 
 def _others(scope: Scope) -> list[Exhibit]:
-    """Return a table of the measures beside the main one."""
+    """Return a table of the measures other than the main one."""
     rows = [
         scope.key(environment, treatment)
         | {
