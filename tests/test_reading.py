@@ -5,10 +5,8 @@ from __future__ import annotations
 import io
 import os
 import socket
-import struct
 import tracemalloc
 import zipfile
-import zlib
 from pathlib import Path
 
 import numpy as np
@@ -27,6 +25,7 @@ from conevo.reading import (
     read_text,
     read_toml,
 )
+from fuzz.damages import packed_zeros
 
 
 def refused(read, path: Path, data: bytes) -> str:
@@ -296,25 +295,6 @@ def test_archives_that_are_none_are_one_line(content: bytes, tmp_path: Path) -> 
         assert ARRAYS[content] in line
 
 
-def bomb(says: int) -> bytes:
-    """Return a small npz file that unpacks to 300 MB, whatever its records say."""
-    out = io.BytesIO()
-    with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as archive:
-        archive.writestr("a.npy", b"")
-    size = 300 * 2**20
-    packer = zlib.compressobj(9, zlib.DEFLATED, -15)
-    packed = b"".join(packer.compress(bytes(2**20)) for _ in range(size // 2**20))
-    packed += packer.flush()
-    name = b"a.npy"
-    sizes = struct.pack("<III", 0, len(packed), says)
-    local = b"PK\x03\x04" + struct.pack("<5H", 20, 0, 8, 0, 33) + sizes
-    local += struct.pack("<HH", len(name), 0) + name + packed
-    central = b"PK\x01\x02" + struct.pack("<6H", 20, 20, 0, 8, 0, 33) + sizes
-    central += struct.pack("<HHHHHII", len(name), 0, 0, 0, 0, 0, 0) + name
-    end = b"PK\x05\x06" + struct.pack("<4HIIH", 0, 0, 1, 1, len(central), len(local), 0)
-    return local + central + end
-
-
 @pytest.mark.parametrize(
     ("says", "words"),
     [(300 * 2**20, "unpacked it would have 314,572,800 bytes"), (100, "damaged or not an npz")],
@@ -322,7 +302,7 @@ def bomb(says: int) -> bytes:
 def test_a_small_file_that_unpacks_to_a_large_one_costs_nothing(
     says: int, words: str, tmp_path: Path
 ) -> None:
-    path, data = tmp_path / "a.npz", bomb(says)
+    path, data = tmp_path / "a.npz", packed_zeros(300 * 2**20, says)
     assert len(data) < 2**20
     tracemalloc.start()
     try:

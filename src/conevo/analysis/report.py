@@ -25,6 +25,8 @@ from collections.abc import Iterator, Mapping
 from importlib import resources
 from pathlib import Path
 
+from typing_extensions import TypedDict
+
 from conevo.analysis.courses import read_histories
 from conevo.analysis.exhibits import Exhibit, Figure, Section, Table
 from conevo.analysis.frames import Tables
@@ -51,6 +53,12 @@ __all__ = ["sections_of", "write_report"]
 
 MANIFEST = "manifest.json"
 TEMPLATE = "report.html.j2"
+
+
+class Manifest(TypedDict):
+    """``manifest.json``: the digest of every file of a report."""
+
+    files: dict[str, str]
 
 
 def write_report(campaign: Path, out: Path, tables: Path | None = None) -> Path:
@@ -221,8 +229,8 @@ def _refuse_changed(out: Path) -> None:
     if not manifest.is_file():
         raise UsageError(f"{out} is no report, so it is not replaced; choose another --out")
     try:
-        written = read_json(manifest)["files"]
-    except (DamagedFile, KeyError) as error:
+        written = read_json(manifest, Manifest)["files"]
+    except DamagedFile as error:
         raise UsageError(f"{manifest} was changed; move the report away first") from error
     found = {
         path.relative_to(out).as_posix(): _digest(read_bytes(path))

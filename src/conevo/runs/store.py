@@ -215,8 +215,10 @@ class Store(Directory):
         """
         from conevo.runs.records import Generation
 
-        path = self.path / GENERATIONS
+        path, is_finished = self.path / GENERATIONS, self.is_finished
         records = read_json_lines(path, Generation, is_log=True) if os.path.lexists(path) else []
+        if is_finished and not records:
+            raise DamagedFile(f"{path} is damaged: it has lost its generations")
         for number, record in enumerate(records):
             if record["generation"] != number:
                 raise DamagedFile(
