@@ -132,8 +132,9 @@ def draw_world(ax, run, looks):
 def title(run):
     """Return two lines: what was run at what cost, and what the testing phase found."""
     config, last, tested = run.config, run.generations()[-1], run.test_result
-    values = {name: result["performance"]["value"] for name, result in tested.items()}
-    champion, first = values["champion"], values["generation_0"]
+    champion, first = (
+        tested[team]["performance"]["value"] for team in ("champion", "generation_0")
+    )
     return (
         f"{config.task}, {config.method}, preset {config.preset}, seed {config.run.seed}, "
         f"{last['team_evaluations']:,} team evaluations\n"
