@@ -37,7 +37,6 @@ from conevo.campaigns.places import Places
 from conevo.campaigns.plan import Plan, PlannedRun
 from conevo.campaigns.plan_file import read_plan
 from conevo.campaigns.progress import is_held
-from conevo.campaigns.tables import is_sealed, seal_tables
 from conevo.campaigns.work import planned_runs
 from conevo.errors import UsageError
 from conevo.reading import read_json
@@ -282,6 +281,8 @@ class Campaign:
     @property
     def is_sealed(self) -> bool:
         """Whether its tables are those of all that is finished."""
+        from conevo.campaigns.tables import is_sealed
+
         return is_sealed(self.places, self._finished)
 
     @property
@@ -295,6 +296,8 @@ class Campaign:
             into: a folder to make them in, if not the campaign's own.
         """
         if finished := self._finished:
+            from conevo.campaigns.tables import seal_tables  # loads numpy
+
             spent = {entry.label: entry.core_seconds for entry in self.ledger.entries()}
             seal_tables(self.places, finished, spent, into)
 

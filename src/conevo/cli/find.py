@@ -27,6 +27,7 @@ __all__ = [
     "find_run",
     "find_shaping",
     "only_campaign",
+    "open_directory",
     "sealed",
 ]
 
@@ -38,11 +39,11 @@ def find(text: str) -> Run | Shaping:
         UsageError: there is no such run or shaping, or more than one.
     """
     if Path(text).exists():
-        return _open(Path(text))
+        return open_directory(Path(text))
     names = {path.name: path for path in directories(RUNS)}
     matches = [name for name in names if name.startswith(text.removeprefix(f"{RUNS}/"))]
     if len(matches) == 1:
-        return _open(names[matches[0]])
+        return open_directory(names[matches[0]])
     if matches:
         raise UsageError(f"{text!r} is ambiguous; it matches: {', '.join(matches)}")
     raise unknown_name("run", text, names, f"in {RUNS}/")
@@ -183,7 +184,12 @@ def sealed(campaign: Campaign) -> Iterator[Path]:
         yield tables
 
 
-def _open(path: Path) -> Run | Shaping:
+def open_directory(path: Path) -> Run | Shaping:
+    """Return the run or shaping in a directory.
+
+    Raises:
+        UsageError: it holds none, or it is damaged.
+    """
     if kind_of(path) == "campaign":
         raise UsageError(
             f"{path} is a campaign; see its runs with 'conevo campaign status {path} --runs'"

@@ -87,7 +87,7 @@ def _methods() -> Rows:
 
 
 def _runs(folder: str | None) -> Rows:
-    from conevo.cli.find import directories, find
+    from conevo.cli.find import directories, open_directory
     from conevo.cli.stages import span
     from conevo.runs.run import RUNS, Run
 
@@ -97,7 +97,7 @@ def _runs(folder: str | None) -> Rows:
     rows = []
     for path in directories(place):
         try:
-            found = find(str(path))
+            found = open_directory(path)
             runs = [found] if isinstance(found, Run) else found.stages
             outlines = [found.outline] if isinstance(found, Run) else found.outlines
             count = _progress(runs, outlines)
@@ -114,10 +114,11 @@ def _runs(folder: str | None) -> Rows:
 def _progress(runs: Sequence[Run], outlines: Sequence[Outline]) -> str:
     """Return how far a run, or all stages of a shaping are."""
     budgets = [outline.budget_evaluations for outline in outlines]
+    done = [run.done() for run in runs]
     return progress(
-        sum(run.n_generations for run in runs),
+        sum(generations for generations, _ in done),
         sum(outline.generations for outline in outlines),
-        sum(run.n_evaluations for run in runs),
+        sum(evaluations for _, evaluations in done),
         sum(budgets) if all(budgets) else 0,
     )
 

@@ -202,15 +202,9 @@ class Run:
         """Its id, alone; a shaping has one for every stage."""
         return (self.provenance["run_id"],)
 
-    @property
-    def n_generations(self) -> int:
-        """Number of finished generations."""
+    def done(self) -> tuple[int, int]:
+        """Return the number of finished generations, and of the team evaluations they took."""
         return self._store.count_generations()
-
-    @property
-    def n_evaluations(self) -> int:
-        """Number of team evaluations of the finished generations."""
-        return self._store.count_evaluations()
 
     def tables(self) -> dict[str, Any]:
         """Return the three tables of its configuration as they are written; loads no world."""
@@ -451,7 +445,7 @@ class Run:
         if self._store.is_finished:
             raise UsageError(
                 f"{self.path} is finished; continue it with 'conevo resume {self.path} "
-                f"--generations N', N above {self.n_generations}, or see it with "
+                f"--generations N', N above {self.done()[0]}, or see it with "
                 f"'conevo show {self.path}'"
             )
 

@@ -42,7 +42,6 @@ from conevo.reading import (
     read_bytes,
     read_json,
     read_json_lines,
-    read_last_line,
     read_toml,
     whole_lines,
 )
@@ -195,7 +194,7 @@ class Store(Directory):
     def _read_extension(self) -> Record | None:
         """Return the extension that counts but is not in all files yet, None if there is none."""
         path = self.path / EXTENSION
-        if not path.is_file() or self.is_finished:
+        if not os.path.lexists(path) or self.is_finished:
             return None
         from conevo.runs.records import Extension
 
@@ -226,28 +225,23 @@ class Store(Directory):
                 )
         return records
 
-    def count_generations(self) -> int:
-        """Return the number of finished generations; only a line that looks wrong is parsed.
+    def count_generations(self) -> tuple[int, int]:
+        """Return the number of finished generations, and of the team evaluations that they took.
+
+        The last line is parsed, and all of them only if one looks wrong.
 
         Raises:
-            UsageError: a line is cut, or is not the one that belongs there.
+            UsageError: a line is cut or damaged, or is not the one that belongs there.
         """
+        from conevo.runs.records import Generation
+
         path = self.path / GENERATIONS
         lines = whole_lines(read_bytes(path, MOST_LOG)) if os.path.lexists(path) else []
         for number, line in enumerate(lines):
             if not (line.startswith(b'{"generation": %d,' % number) and line.endswith(b"}")):
-                return len(self.read_generations())
-        return len(lines)
-
-    def count_evaluations(self) -> int:
-        """Return the number of team evaluations that the finished generations took.
-
-        Raises:
-            UsageError: the last line is damaged.
-        """
-        path = self.path / GENERATIONS
-        line = read_last_line(path) if os.path.lexists(path) else b""
-        return int(parse_json(line, str(path))["team_evaluations"]) if line else 0
+                self.read_generations()
+        last = parse_json(lines[-1], str(path), Generation) if lines else {"team_evaluations": 0}
+        return len(lines), last["team_evaluations"]
 
     def cut_generations(self, count: int) -> list[Record]:
         """Keep the log's first ``count`` lines and return them.
