@@ -306,3 +306,14 @@ def test_a_run_begins_with_what_another_one_ended_with(say) -> None:
     assert part.code == 2
     assert "part is not finished" in part.err
     assert "finish it with 'conevo resume part'" in part.err
+
+
+def test_a_champion_is_tested_under_changed_conditions(say) -> None:
+    assert say(*tiny("--out", "first", "--quiet")).code == 0
+    words = ("test", "first", "--on", "complex-2", "--set", "world.iterations=20", "--robots", "2")
+    said = say(*words)
+    assert (said.code, said.err) == (0, "")
+    assert "changed conditions: rover-v1/complex-2, 2 robots, world.iterations=20" in said.out
+    assert re.search(r"^change ", said.out, flags=re.MULTILINE)
+    assert set(json.loads(say(*words, "--json").out)) == {"own", "changed", "conditions", "change"}
+    assert say("test", "first", "--set", "run.seed=3").code == 2

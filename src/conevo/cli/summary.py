@@ -32,6 +32,7 @@ from conevo.terms import S_SCALE
 from conevo.worlds.measures import Measure
 
 __all__ = [
+    "conditions_text",
     "declared",
     "exchange_text",
     "generations_table",
@@ -176,6 +177,32 @@ def test_text(result: dict[str, Any]) -> str:
     if "validation" in result:
         lines += ["", shrinkage_text(result)]
     return "\n".join(lines)
+
+
+def conditions_text(run: Run, both: dict[str, Any]) -> str:
+    """Return the test of one team under its own and under changed conditions as a table."""
+    n, conditions = both["own"]["scenarios"], both["conditions"]
+    measures = list(dict.fromkeys([*both["own"]["performance"], *both["changed"]["performance"]]))
+    rows = []
+    for name in ("own", "changed"):
+        tested = both[name]
+        found = tested["performance"]
+        mean_s = sum(tested["specialization"]) / len(tested["specialization"])
+        cells = [spread(found[one], n) if one in found else "-" for one in measures]
+        rows.append([name, str(len(tested["labels"])), *cells, number(mean_s)])
+    rows.append(["change", "", *(number(both["change"].get(one)) for one in measures), ""])
+    settings = "".join(f", {key}={value}" for key, value in conditions["settings"].items())
+    return "\n".join(
+        [
+            f"Champion of {run.path} (generation {both['own']['generation']}), {n} fresh scenarios "
+            f"(mean +- standard deviation)",
+            f"own conditions: {run.config.task}",
+            f"changed conditions: {conditions['task']}, {conditions['robots']} robots{settings}",
+            table(["conditions", "robots", *measures, "S"], rows),
+            f"castes, own: {castes(both['own']['castes'])}",
+            f"castes, changed: {castes(both['changed']['castes'])}",
+        ]
+    )
 
 
 def shrinkage_text(result: dict[str, Any]) -> str:

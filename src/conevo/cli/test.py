@@ -6,6 +6,8 @@ import json
 
 import click
 
+from conevo.errors import UsageError
+
 __all__ = ["test"]
 
 
@@ -23,6 +25,18 @@ __all__ = ["test"]
     "--threads", type=click.IntRange(1, 4096), help="CPU threads (default all); changes no result."
 )
 @click.option("--stages", is_flag=True, help="Of a shaping: in the environment of every stage.")
+@click.option(
+    "--on", metavar="ENVIRONMENT",
+    help="Also in another environment: of its world, or WORLD/ENVIRONMENT with such controllers.",
+)  # fmt: skip
+@click.option(
+    "--set", "settings", metavar="world.KEY=VALUE", multiple=True,
+    help="Also with another setting of the world; may be repeated.",
+)  # fmt: skip
+@click.option(
+    "--robots", type=click.IntRange(1, 64),
+    help="Also in a team of so many: the first ones, or all of them again.",
+)  # fmt: skip
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON value.")
 def test(
     run: str,
@@ -30,20 +44,36 @@ def test(
     seed: int | None,
     threads: int | None,
     stages: bool,
+    on: str | None,
+    settings: tuple[str, ...],
+    robots: int | None,
     as_json: bool,
 ) -> None:
     """Re-execute the fittest team of RUN (finished or not) in fresh scenarios; writes nothing.
 
     Of a shaping it is the team of the last stage that has one, in that stage's environment.
+    With --on, --set and --robots it is tested under changed conditions, too, and the change is
+    printed: conevo test runs/first --set world.iterations=500 --robots 10
     """
     from conevo.cli.find import find_run, find_shaping
     from conevo.cli.stages import stages_test_text
     from conevo.cli.summary import test_text
 
+    is_changed = on is not None or bool(settings) or robots is not None
     if stages:
+        if is_changed:
+            raise UsageError("--stages is of the stages' own conditions: no --on, --set, --robots")
         results = find_shaping(run).test(scenarios, seed, threads=threads)
         click.echo(json.dumps(results) if as_json else stages_test_text(results))
         return
     found = find_run(run)
+    if is_changed:
+        from conevo.cli.summary import conditions_text
+        from conevo.runs.config import parse_assignments
+
+        world = parse_assignments(settings)
+        both = found.test_under(on, world, robots, scenarios, seed, threads=threads)
+        click.echo(json.dumps(both) if as_json else conditions_text(found, both))
+        return
     result = found.test(scenarios, seed, threads=threads)
     click.echo(json.dumps(result) if as_json else test_text({"champion": result}))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -238,33 +237,9 @@ class Run:
         kept = self.team(generation)
         if kept is not None:
             return kept
-        from conevo.runs.champions import fittest_team
-        from conevo.runs.loop import evolve_generations
-        from conevo.worlds.measures import measures_of
+        from conevo.runs.session import evolve_again
 
-        teams: list[Team] = []
-
-        def keep(state: State, record: Record) -> None:
-            if record["team_fitness"] != records[record["generation"]]["team_fitness"]:
-                raise UsageError(
-                    f"{self.path}: generation {record['generation']} does not come out again as "
-                    f"its log says, so the team of generation {generation} is lost"
-                )
-            teams[:] = [fittest_team(state, record["generation"])]
-            if progress is not None:
-                progress(record["generation"] + 1, generation + 1)
-
-        evolve_generations(
-            lab.method,
-            self._store.load_origin(self.config.method) or lab.first_state(),
-            lab.evaluate,
-            settings=replace(self.config.run, generations=generation + 1, target=None),
-            main=measures_of(lab.world)[0],
-            castes=lab.world.castes,
-            iterations=lab.world.params.iterations,
-            on_generation=keep,
-        )
-        return teams[0]
+        return evolve_again(self._store, lab, generation, progress)
 
     def resume(
         self,
@@ -425,6 +400,28 @@ class Run:
             raise UsageError(f"{self.path} has no finished generation yet, so no team to test")
         lab = self._equip(threads)
         return self._test(lab, champion, scenarios, seed)
+
+    def test_under(
+        self,
+        on: str | None = None,
+        world: Mapping[str, Any] | None = None,
+        robots: int | None = None,
+        scenarios: int | None = None,
+        seed: int | None = None,
+        *,
+        threads: int | None = None,
+    ) -> Record:
+        """Test the champion under changed conditions; see ``conevo.runs.conditions.test_under``.
+
+        Args:
+            on: another environment, of this world or of one with controllers of the same sizes.
+            world: settings of the world, for example ``{"world.iterations": 500}``.
+            robots: in the team.
+            scenarios, seed, threads: as for ``test``.
+        """
+        from conevo.runs.conditions import test_under
+
+        return test_under(self, on, world or {}, robots, scenarios, seed, threads)
 
     def _test(
         self, lab: Lab, team: Team, scenarios: int | None = None, seed: int | None = None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 from conevo.errors import UsageError
@@ -16,7 +17,7 @@ from conevo.runs.testing import test_team, validate
 from conevo.runs.time_limit import TimeLimit
 from conevo.worlds.measures import measures_of
 
-__all__ = ["evolve_on", "finish"]
+__all__ = ["evolve_again", "evolve_on", "finish"]
 
 Record = dict[str, Any]
 
@@ -126,6 +127,49 @@ def finish(store: Store, lab: Lab, stopped_by: str) -> None:
     about = store.read_provenance() | {"finished": provenance.now(), "stopped_by": stopped_by}
     store.write_provenance(about)
     store.seal()
+
+
+def evolve_again(
+    store: Store,
+    lab: Lab,
+    generation: int,
+    progress: Callable[[int, int], None] | None = None,
+) -> Team:
+    """Return the fittest team of a finished generation that was not kept.
+
+    Args:
+        store: of the run.
+        lab: the run's.
+        generation: which is wanted.
+        progress: told the generations done and wanted.
+
+    Raises:
+        UsageError: evolving again does not give what the log says.
+    """
+    records = store.read_generations()
+    teams: list[Team] = []
+
+    def keep(state: State, record: Record) -> None:
+        if record["team_fitness"] != records[record["generation"]]["team_fitness"]:
+            raise UsageError(
+                f"{store.path}: generation {record['generation']} does not come out again as its "
+                f"log says, so the team of generation {generation} is lost"
+            )
+        teams[:] = [fittest_team(state, record["generation"])]
+        if progress is not None:
+            progress(record["generation"] + 1, generation + 1)
+
+    evolve_generations(
+        lab.method,
+        store.load_origin(lab.config.method) or lab.first_state(),
+        lab.evaluate,
+        settings=replace(lab.config.run, generations=generation + 1, target=None),
+        main=measures_of(lab.world)[0],
+        castes=lab.world.castes,
+        iterations=lab.world.params.iterations,
+        on_generation=keep,
+    )
+    return teams[0]
 
 
 def _best_so_far(store: Store) -> list[Team]:

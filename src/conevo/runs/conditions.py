@@ -1,0 +1,113 @@
+"""A champion under other conditions: another environment, other settings, more or fewer robots."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import fields, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from conevo.errors import UsageError, unknown_name
+from conevo.runs.ancestry import refuse_other_controllers
+from conevo.runs.champions import Team
+from conevo.runs.config import RunConfig, resolve
+from conevo.runs.lab import Lab
+from conevo.runs.testing import test_team
+
+if TYPE_CHECKING:
+    from conevo.runs.run import Run
+
+__all__ = ["test_under"]
+
+Record = dict[str, Any]
+
+
+def test_under(
+    run: Run,
+    on: str | None,
+    world: Mapping[str, Any],
+    robots: int | None,
+    scenarios: int | None,
+    seed: int | None,
+    threads: int | None,
+) -> Record:
+    """Test a run's champion in its own world and under changed conditions; writes nothing.
+
+    Choice: in the same world the run's settings hold unless they are changed; another world has
+    those of the run's preset. A smaller team is of the first controllers, a larger one repeats them
+    from the first on.
+
+    Returns:
+        The results of both, "own" and "changed", as ``Run.test`` gives them; "conditions": the
+        task, the robots and the settings that were changed; "change": the difference of the means
+        of each measure that both have, None if one is not finite.
+
+    Raises:
+        UsageError: a name or value that is not allowed, or the team cannot play there.
+    """
+    own = run.test(scenarios, seed, threads=threads)
+    config = _changed(run.config, on, world, robots)
+    refuse_other_controllers(run, config.build_world())
+    lab = Lab.equip(config, threads, run.provenance["device"])
+    champion = run.champion
+    if champion is None:
+        raise RuntimeError("a tested run has a champion")
+    changed = test_team(
+        lab.rollout,
+        lab.world,
+        _resized(champion, lab.world.n_robots),
+        n_scenarios=own["scenarios"],
+        seed=own["seed"],
+    )
+    conditions = {"task": config.task, "robots": lab.world.n_robots, "settings": dict(world)}
+    means = {name: value["mean"] for name, value in own["performance"].items()}
+    now = {name: value["mean"] for name, value in changed["performance"].items()}
+    change = {
+        name: None if means[name] is None or now[name] is None else now[name] - means[name]
+        for name in means
+        if name in now
+    }
+    return {"own": own, "changed": changed, "conditions": conditions, "change": change}
+
+
+def _changed(
+    config: RunConfig, on: str | None, world: Mapping[str, Any], robots: int | None
+) -> RunConfig:
+    """Return the configuration with another environment and other settings of the world."""
+    address = config.address if on is None else on
+    if "/" not in address and ".py:" not in address:
+        address = config.entry.address(address)
+    there = resolve(address, config.method, config.preset)
+    known = [field.name for field in fields(there.world_params)]
+    settings = {}
+    if there.world == config.world:
+        settings = {f"world.{key}": value for key, value in config.tables()["world"].items()}
+    for key, value in world.items():
+        name = key.removeprefix("world.")
+        if name not in known:
+            raise unknown_name(
+                "key", key, [f"world.{one}" for one in known], "(only the world can be changed)"
+            )
+        settings[f"world.{name}"] = value
+    if robots is not None:
+        if "n_robots" in known:
+            settings["world.n_robots"] = robots
+        elif robots != there.build_world().n_robots:
+            raise UsageError(
+                f"--robots {robots}: teams of {there.task} have {there.build_world().n_robots}, "
+                f"which no setting changes; another environment may have others: --on ENVIRONMENT"
+            )
+    return resolve(address, config.method, config.preset, config.run.seed, overrides=settings)
+
+
+def _resized(team: Team, n_robots: int) -> Team:
+    """Return a team of so many robots: the first controllers, or all of them again and again."""
+    robot = np.arange(n_robots) % len(team.genes)
+    return replace(
+        team,
+        genes=team.genes[robot],
+        active=team.active[robot],
+        fitness=team.fitness[robot],
+        specialization=team.specialization[robot],
+    )

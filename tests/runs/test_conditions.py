@@ -1,0 +1,67 @@
+"""A champion tested under other conditions than its own."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+import conevo
+from conevo.errors import UsageError
+from conevo.runs.lab import Lab
+from conevo.runs.testing import test_team as play
+from runs.tiny import evolve_tiny
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> conevo.Run:
+    return evolve_tiny(tmp_path_factory.mktemp("run") / "run", world__iterations=60)
+
+
+def test_unchanged_conditions_change_nothing(run: conevo.Run) -> None:
+    before = {p: p.read_bytes() for p in run.path.rglob("*") if p.is_file()}
+    both = run.test_under(threads=1)
+    assert both["own"] == both["changed"] == run.test(threads=1)
+    assert set(both["change"].values()) == {0.0}
+    assert {p: p.read_bytes() for p in run.path.rglob("*") if p.is_file()} == before
+
+
+def test_settings_and_environment_are_those_asked_for(run: conevo.Run) -> None:
+    both = run.test_under("complex-2", {"world.iterations": 90}, scenarios=4, threads=1)
+    params = replace(run.config.world_params, iterations=90)
+    config = replace(run.config, environment="complex-2", world_params=params)
+    lab = Lab.equip(config, 1, "cpu")
+    assert run.champion is not None
+    expected = play(lab.rollout, lab.world, run.champion, n_scenarios=4, seed=1)
+    assert both["changed"] == expected
+    assert both["own"] == run.test(4, threads=1)
+    assert both["conditions"]["task"] == "rover-v1/complex-2"
+    name = next(iter(both["change"]))
+    means = [both[which]["performance"][name]["mean"] for which in ("changed", "own")]
+    assert both["change"][name] == means[0] - means[1]
+
+
+@pytest.mark.parametrize(("robots", "team"), [(2, [0, 1]), (7, [0, 1, 2, 0, 1, 2, 0])])
+def test_fewer_robots_are_the_first_and_more_repeat_them(
+    robots: int, team: list[int], run: conevo.Run
+) -> None:
+    both = run.test_under(robots=robots, threads=1)
+    champion = run.champion
+    assert champion is not None
+    assert both["changed"]["n_hidden"] == champion.active.sum(axis=1)[team].tolist()
+    assert len(both["changed"]["labels"]) == both["conditions"]["robots"] == robots
+
+
+def test_what_cannot_be_played_is_one_line(run: conevo.Run) -> None:
+    for arguments, words in (
+        ({"on": "gacc/complex-1"}, r"sensors became \d+"),
+        ({"on": "complex-99"}, "complex-99"),
+        ({"world": {"world.n_hidden": 3}}, "2 context inputs became 3"),
+        ({"world": {"run.epochs": 3}}, "only the world can be changed"),
+        ({"world": {"world.itertions": 3}}, "did you mean 'world.iterations'"),
+        ({"world": {"world.iterations": 0}}, "must be"),
+        ({"robots": 10_000}, "n_robots = 10000"),
+    ):
+        with pytest.raises(UsageError, match=words) as caught:
+            run.test_under(**arguments, threads=1)
+        assert "\n" not in str(caught.value)
