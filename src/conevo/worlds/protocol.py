@@ -83,7 +83,8 @@ class World(Protocol):
             apart what for an action was executed has more. Every executed action counts in exactly
             one column.
         performance: the task performance measures, the main one first. A measure is a ``Measure``,
-            with its unit and whether larger is better, or just a name: then larger is better.
+            with its unit, whether larger is better and its range, or just a name: then larger is
+            better.
         heuristics: names of the heuristic controllers, at least one.
 
     A world may have a property ``optimum``: the largest possible value of its main task performance
