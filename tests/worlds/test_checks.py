@@ -8,7 +8,9 @@ from pathlib import Path
 
 import pytest
 
+import conevo
 from conevo.cli.main import main
+from conevo.errors import UsageError
 from conevo.worlds import checking
 from conevo.worlds.checks import findings
 from worlds.test_outside import TEXT, written
@@ -123,9 +125,13 @@ def problems(file: Path) -> list[tuple[str, str]]:
 @pytest.mark.parametrize("name", DECLARED)
 def test_a_mistake_in_what_is_declared_is_one_line(name: str, tmp_path: Path) -> None:
     old, new, topic, words = DECLARED[name]
-    found = problems(written(tmp_path / "bad.py", (old, new)))
+    file = written(tmp_path / "bad.py", (old, new))
+    found = problems(file)
     assert [one for one, _ in found] == [topic]
     assert words in found[0][1]
+    if topic == "structure":  # no run begins with it either
+        with pytest.raises(UsageError, match=re.escape(words)):
+            conevo.Rollout(conevo.world(f"{file}:dark-1"))
 
 
 def faulty(path: Path, name: str) -> Path:
