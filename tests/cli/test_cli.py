@@ -154,7 +154,7 @@ BAD = [
     (["run", TASK, "--set", "world.low_range=9"], "less than or equal to 0.5"),
     (["run", TASK, "--seed", "-1"], "greater than or equal to 0"),
     (["run", TASK, "--seed", "x"], "'x' is not a valid integer"),
-    (["run", TASK, "--threads", "0"], "0 is not in the range x>=1"),
+    (["run", TASK, "--threads", "0"], "0 is not in the range 1<=x<=4096"),
     (["run", TASK, "--budget-evaluations", "-5"], "run.budget_evaluations = -5"),
     (["run", TASK, "--preset", "smoke", "--budget-evaluations", "5"], "does not pay for one"),
     (["run", TASK, "--json", "--quiet"], "are mutually exclusive"),
@@ -193,6 +193,13 @@ def test_bad_input_is_one_line_with_code_2_and_nothing_written(
     assert said.err.count("\n") == 1
     assert words in said.err
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_configuration_without_a_world_is_named(say, tmp_path: Path) -> None:
+    (tmp_path / "empty.toml").write_text("")
+    said = say("run", "--config", "empty.toml")
+    assert (said.code, said.err.count("\n")) == (2, 1)
+    assert "which world? empty.toml names none: give run.world there, or name one as" in said.err
 
 
 def test_what_the_machine_refuses_is_one_line_with_code_3(say, tmp_path: Path) -> None:

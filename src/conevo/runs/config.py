@@ -290,7 +290,10 @@ def resolve(
     own_preset = layers[0].get("run", {}).get("preset") if layers else None
     names = _take_names([*layers, single], {"world": world, "method": method, "preset": preset})
     if not names["world"]:
-        raise UsageError("which world? Name one as WORLD/ENVIRONMENT, for example rover/complex-1")
+        named = "" if file is None else f"{file} names none: give run.world there, or n"
+        raise UsageError(
+            f"which world? {named or 'N'}ame one as WORLD/ENVIRONMENT, for example rover/complex-1"
+        )
     entry, environment = resolve_world(names["world"], names["world_digest"])
     if names["method"] not in METHODS:
         raise unknown_name("method", names["method"], METHODS)
