@@ -78,7 +78,8 @@ def test_show_prints_the_stages_with_what_their_champions_achieved(say, tmp_path
     assert everything["changed_files"] == []
     assert everything["tasks"] == [f"rover-v1/complex-{k}" for k in (1, 2, 3)]
     assert [len(stage["generations"]) for stage in everything["stages"]] == [5, 5, 5]
-    (tmp_path / "here" / "stage-1" / "test.json").write_bytes(b"{}")
+    file = tmp_path / "here" / "stage-1" / "test.json"
+    file.write_text(file.read_text() + "\n")
     assert "modified since the run: stage-1/test.json" in say("show", "here").out
     assert "SST" in say("show", "here/stage-2").out
 
