@@ -7,6 +7,8 @@ import os
 import re
 import shlex
 import sys
+import tomllib
+from importlib import resources
 from pathlib import Path
 
 import pytest
@@ -62,7 +64,10 @@ def test_a_preset_serves_a_world_that_it_does_not_know(light: Path) -> None:
     rover = resolve("rover/complex-1", "cone", "desk")
     config = resolve(f"{light}:dark-1", "cone", "desk")
     assert config.run == rover.run
-    assert config.method_config == rover.method_config
+    presets = resources.files("conevo.runs") / "presets"
+    sizes = tomllib.loads((presets / "desk.toml").read_text())["any"]["method"]["cone"]
+    assert sizes
+    assert {name: getattr(config.method_config, name) for name in sizes} == sizes
     assert config.world_params == config.entry.params_class()
 
 
@@ -270,6 +275,7 @@ def test_a_session_on_the_command_line(
     written(tmp_path / "my worlds" / "light.py", ('"dark-1",', '"dark-1", "dark-2"'))
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("webbrowser.open", lambda address: True)
+    monkeypatch.setattr("webbrowser.get", lambda: object())
     sets = [w for k, v in tiny_settings("homcne").items() if k != "world.n_robots"
             for w in ("--set", f"{k}={v}")]  # fmt: skip
     more = ["--method", "homcne", "--preset", "smoke", "--threads", "1", *sets]
@@ -278,7 +284,9 @@ def test_a_session_on_the_command_line(
     assert "light-v1/dark-1, HomCNE, preset smoke, seed 1" in out
     assert "generation 5/5  nearness" in out
     recommended = re.findall(r"^  (conevo .*)$", out, flags=re.MULTILINE)
-    assert [line.split()[1] for line in recommended] == ["show", "replay", "test", "run", "run"]
+    assert [line.split()[1] for line in recommended] == [
+        *("show", "replay", "test", "resume", "run", "run")
+    ]
     for line in recommended:
         assert say(capsys, *shlex.split(line)[1:])[::2] == (0, "")
     code, out, err = say(capsys, "run", "my worlds/light.py:dark-2", "--shape", "--quiet", *more)
