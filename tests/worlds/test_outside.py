@@ -276,6 +276,7 @@ def test_a_session_on_the_command_line(
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("webbrowser.open", lambda address: True)
     monkeypatch.setattr("webbrowser.get", lambda: object())
+    monkeypatch.setenv("DISPLAY", ":0")
     sets = [w for k, v in tiny_settings("homcne").items() if k != "world.n_robots"
             for w in ("--set", f"{k}={v}")]  # fmt: skip
     more = ["--method", "homcne", "--preset", "smoke", "--threads", "1", *sets]
