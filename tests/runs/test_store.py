@@ -135,6 +135,16 @@ def test_a_damaged_line_in_the_middle_is_named(tmp_path: Path) -> None:
             store.read_generations()
 
 
+def test_a_damaged_log_is_not_cut(tmp_path: Path) -> None:
+    store = fresh_store(tmp_path / "run")
+    content = json.dumps(record(0)) + "\nwhat?\n" + json.dumps(record(2)) + "\n"
+    (store.path / "generations.jsonl").write_text(content)
+    with pytest.raises(UsageError, match="damaged in line 2"):
+        store.cut_generations(2)
+    assert (store.path / "generations.jsonl").read_text() == content
+    assert [one["generation"] for one in store.cut_generations(1)] == [0]  # the rest comes again
+
+
 def test_a_log_shorter_than_the_checkpoint_is_refused(tmp_path: Path) -> None:
     store = fresh_store(tmp_path / "run")
     store.append(record(0))

@@ -41,7 +41,6 @@ from conevo.reading import (
     parse_json,
     read_bytes,
     read_json,
-    read_json_lines,
     read_toml,
     whole_lines,
 )
@@ -212,17 +211,26 @@ class Store(Directory):
         Raises:
             UsageError: a line in the middle is damaged.
         """
-        from conevo.runs.records import Generation
-
         path, is_finished = self.path / GENERATIONS, self.is_finished
-        records = read_json_lines(path, Generation, is_log=True) if os.path.lexists(path) else []
+        records = self._parse_log(self._read_log())
         if is_finished and not records:
             raise DamagedFile(f"{path} is damaged: it has lost its generations")
-        for number, record in enumerate(records):
-            if record["generation"] != number:
-                raise DamagedFile(
-                    f"{path} is damaged in line {number + 1}: generation {number} expected"
-                )
+        return records
+
+    def _read_log(self) -> bytes:
+        path = self.path / GENERATIONS
+        return read_bytes(path, MOST_LOG) if os.path.lexists(path) else b""
+
+    def _parse_log(self, content: bytes) -> list[Record]:
+        from conevo.runs.records import Generation
+
+        path = str(self.path / GENERATIONS)
+        records = []
+        for number, line in enumerate(whole_lines(content)):
+            where = f" in line {number + 1}"
+            records.append(parse_json(line, path, Generation, where))
+            if records[-1]["generation"] != number:
+                raise DamagedFile(f"{path} is damaged{where}: generation {number} expected")
         return records
 
     def count_generations(self) -> tuple[int, int]:
@@ -236,7 +244,7 @@ class Store(Directory):
         from conevo.runs.records import Generation
 
         path = self.path / GENERATIONS
-        lines = whole_lines(read_bytes(path, MOST_LOG)) if os.path.lexists(path) else []
+        lines = whole_lines(self._read_log())
         for number, line in enumerate(lines):
             if not (line.startswith(b'{"generation": %d,' % number) and line.endswith(b"}")):
                 self.read_generations()
@@ -249,17 +257,16 @@ class Store(Directory):
         Raises:
             UsageError: there are fewer.
         """
-        path = self.path / GENERATIONS
-        content = read_bytes(path) if os.path.lexists(path) else b""
+        path, content = self.path / GENERATIONS, self._read_log()
         kept = b"".join(line + b"\n" for line in whole_lines(content)[:count])
-        if content != kept:
-            replace_file(path, kept)
-        records = self.read_generations()
+        records = self._parse_log(kept)  # before anything is cut
         if len(records) != count:
             raise UsageError(
                 f"{path} has {len(records)} generations, the checkpoint is at {count}: "
                 f"the run cannot be resumed"
             )
+        if content != kept:
+            replace_file(path, kept)
         return records
 
     # --- teams ------------------------------------------------------------------------------------
