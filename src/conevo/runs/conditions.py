@@ -98,7 +98,8 @@ def _changed(
                 f"--robots {robots}: teams of {there.task} have {there.build_world().n_robots}, "
                 f"which no setting changes; another environment may have others: --on ENVIRONMENT"
             )
-    return resolve(address, config.method, config.preset, config.run.seed, overrides=settings)
+    seed, place = config.run.seed, "of the changed conditions"
+    return resolve(address, config.method, config.preset, seed, overrides=settings, place=place)
 
 
 def _resized(team: Team, n_robots: int) -> Team:
