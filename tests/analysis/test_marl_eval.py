@@ -87,7 +87,7 @@ def assert_documented(data):
         n = len(every[0])
         assert n > 0
         for runs in every:
-            assert list(runs) == [f"run_{k}" for k in range(1, n + 1)]
+            assert list(runs) == [f"seed_{k}" for k in range(1, n + 1)]
             for steps in runs.values():
                 *points, last = steps
                 assert points == [f"step_{k}" for k in range(1, STEPS + 1)]
@@ -117,8 +117,8 @@ def test_whole_campaign_has_the_documented_form(campaign):
     assert list(data["rover-v1 complex smoke"]) == ["complex-1", "complex-2", "complex-10"]
     assert list(data["pursuit-v1 team smoke"]["team-4"]) == ["ccga", "cone"]
     one = data["pursuit-v1 team smoke"]["team-4"]["cone"]
-    assert list(one) == ["run_1", "run_2", "run_3"]
-    assert one["run_2"]["absolute_metrics"] == {"capture-time": [5.0, 3.0]}
+    assert list(one) == ["seed_1", "seed_2", "seed_3"]
+    assert one["seed_2"]["absolute_metrics"] == {"capture-time": [5.0, 3.0]}
     assert_documented(data)
 
 
@@ -129,7 +129,7 @@ def test_steps_share_the_smallest_budget_and_show_the_last_generation_that_ended
         cells = export(tables)["rover-v1 complex smoke"]["complex-1"]
     curves = {}
     for method in ("ccga", "cone"):
-        steps = list(cells[method]["run_1"].values())[:-1]
+        steps = list(cells[method]["seed_1"].values())[:-1]
         assert [step["step_count"] for step in steps] == [40 * k for k in range(1, 21)]
         curves[method] = [step["main-value"][0] for step in steps]
     # 40, 80: none has ended yet, so the first is shown; it ends between 80 and 120.
@@ -137,14 +137,21 @@ def test_steps_share_the_smallest_budget_and_show_the_last_generation_that_ended
     assert curves["cone"] == [0] * 9 + [1] * 5 + [2] * 5 + [3]
 
 
-def test_runs_beyond_the_scarcest_cell_are_left_out_by_seed(campaign):
-    late = [campaign.run("cone", 1, seed, tests=(float(seed),)) for seed in (17, 3, 5)]
-    for seed in (1, 2):
-        campaign.run("ccga", 1, seed)
+def test_runs_are_named_by_seeds_and_those_that_a_cell_lacks_are_left_out(campaign):
+    runs = [campaign.run("cone", 1, seed, tests=(float(seed),)) for seed in (17, 3, 5)]
+    other = [campaign.run("ccga", 1, seed) for seed in (5, 17, 6)]
     with campaign.tables() as tables:
         cone = export(tables)["rover-v1 complex smoke"]["complex-1"]["cone"]
-        assert left_out(tables) == [late[0]]
-    assert [run["absolute_metrics"]["main-value"] for run in cone.values()] == [[3.0], [5.0]]
+        assert left_out(tables) == sorted([runs[1], other[2]])
+    values = {name: run["absolute_metrics"]["main-value"] for name, run in cone.items()}
+    assert values == {"seed_5": [5.0], "seed_17": [17.0]}
+
+
+def test_cells_without_a_common_seed_have_no_rectangle(campaign):
+    runs = [campaign.run("cone", 1, 1), campaign.run("ccga", 1, 2)]
+    with campaign.tables() as tables:
+        assert export(tables) == {}
+        assert left_out(tables) == sorted(runs)
 
 
 def test_algorithm_that_few_tasks_have_goes(campaign):
@@ -217,8 +224,8 @@ def test_runs_that_lack_something_are_left_out(campaign, flaw):
     gone = campaign.run("cone", 1, 3, **flaw)
     with campaign.tables() as tables:
         assert list(export(tables)["rover-v1 complex smoke"]["complex-1"]["cone"]) == [
-            "run_1",
-            "run_2",
+            "seed_1",
+            "seed_2",
         ]
         assert left_out(tables) == [gone]
 

@@ -2,7 +2,7 @@
 
 ::
 
-    {environment: {task: {algorithm: {"run_1": {
+    {environment: {task: {algorithm: {"seed_1": {
         "step_1": {"step_count": 120, measure: [value]}, ...,
         "absolute_metrics": {measure: [value, ...]}}}}}}
 
@@ -19,11 +19,11 @@ absolute_metrics  the champion in its test, [scenarios]
 ================  ==============================================================================
 
 The library asks for a full rectangle: in an environment the same algorithms in every task, the same
-number of runs of each and of steps in each. Choice: either the tasks that have all algorithms are
-taken, or the algorithms that all tasks have, whichever keeps more runs; of each then as many runs
-as the scarcest has, by seed. ``left_out`` names the rest. Choice: before its first generation has
-ended a run shows that one's value. Choice: "_" becomes "-" in measures and "," becomes ";" in
-algorithms, because the library cuts names there.
+names of runs in each and the same number of steps. Runs are named by their seeds. Choice: either
+the tasks that have all algorithms are taken, or the algorithms that all tasks have, whichever keeps
+more runs; of each then the runs of the seeds that all have, one run per seed. ``left_out`` names
+the rest. Choice: before its first generation has ended a run shows that one's value. Choice: "_"
+becomes "-" in measures and "," becomes ";" in algorithms, because the library cuts names there.
 """
 
 from __future__ import annotations
@@ -45,6 +45,7 @@ class _Run(NamedTuple):
     """What is told about one run: its learning curve and its test."""
 
     run: str
+    seed: int
     measure: str
     team_steps: list[int]
     values: list[float]
@@ -68,7 +69,7 @@ def export(tables: Tables) -> dict[str, Any]:
         counts = [fewest * k // STEPS for k in range(1, STEPS + 1)]
         data[environment] = {
             task: {
-                algorithm: {f"run_{k}": _result(one, counts) for k, one in enumerate(runs, start=1)}
+                algorithm: {f"seed_{one.seed}": _result(one, counts) for one in runs}
                 for algorithm, runs in algorithms.items()
             }
             for task, algorithms in kept.items()
@@ -101,11 +102,11 @@ def _environments(tables: Tables) -> dict[str, Cells]:
         curves[run][1].append(value)
     found: dict[str, Cells] = {}
     rows = tables.query(
-        "SELECT run, world, family, preset, environment, method, variant, measure,"
+        "SELECT run, seed, world, family, preset, environment, method, variant, measure,"
         " coalesce(larger_is_better, true) FROM runs LEFT JOIN measures USING (run, measure)"
         " ORDER BY world, family, preset, number, environment, method, variant, seed, run"
     )[1]
-    for run, world, family, preset, task, method, variant, measure, larger in rows:
+    for run, seed, world, family, preset, task, method, variant, measure, larger in rows:
         if run not in tests or run not in curves:
             continue
         if not np.isfinite(np.array(tests[run] + curves[run][1], dtype=float)).all():
@@ -113,7 +114,7 @@ def _environments(tables: Tables) -> dict[str, Cells]:
         environment = " ".join(part for part in (world, family, preset) if part)
         algorithm = " ".join(part for part in (method, variant) if part).replace(",", ";")
         steps, values = curves[run]
-        one = _Run(run, measure.replace("_", "-"), steps, values, tests[run])
+        one = _Run(run, seed, measure.replace("_", "-"), steps, values, tests[run])
         if not larger:
             one = one._replace(
                 measure=f"negated-{one.measure}",
@@ -138,11 +139,18 @@ def _rectangle(cells: Cells) -> Cells:
 
 
 def _evened(cells: Cells) -> Cells:
-    """Return the first runs of each cell, as many as the smallest has."""
-    n = min((len(runs) for algorithms in cells.values() for runs in algorithms.values()), default=0)
+    """Return one run of each cell for every seed that all cells have."""
+    by_seed = {
+        task: {name: {one.seed: one for one in reversed(runs)} for name, runs in of.items()}
+        for task, of in cells.items()
+    }
+    every = [set(runs) for of in by_seed.values() for runs in of.values()]
+    seeds = sorted(set.intersection(*every)) if every else []
+    if not seeds:
+        return {}
     return {
-        task: {name: runs[:n] for name, runs in algorithms.items()}
-        for task, algorithms in cells.items()
+        task: {name: [runs[seed] for seed in seeds] for name, runs in of.items()}
+        for task, of in by_seed.items()
     }
 
 
