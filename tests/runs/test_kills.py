@@ -8,7 +8,6 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -16,9 +15,10 @@ import pytest
 import conevo
 from campaigns.plans import write_plan
 from conevo.campaigns.campaign import Campaign
-from runs.tiny import TASKS, command, content, tiny_settings
+from runs.tiny import TASKS, command, content, tiny_settings, wait_for
 
 pytestmark = [pytest.mark.slow, pytest.mark.exhaustive]
+KILLS: list[int] = []
 PAIRS = [(method, task) for method in conevo.METHODS for task in TASKS]
 
 
@@ -42,24 +42,30 @@ def to_the_end(words: list[str]) -> float:
     return time.monotonic() - began
 
 
-def kill(
-    words: list[str], again: Callable[[], list[str]], n: int, seconds: float, seed: int
-) -> None:
-    """Kill a command ``n`` times at random moments, and carry on each time."""
-    rng = random.Random(seed)
-    for _ in range(n):
+def kill(words: list[str], again: list[str], path: Path, n: int, rng: random.Random) -> None:
+    """Kill what a command makes at ``path`` ``n`` times while it evolves, and carry on each time.
+
+    The moments are random: so many of 40 generations, and up to a twentieth of a second more.
+    """
+    for generation in sorted(rng.choices(range(36), k=n)):
         process = spawn(*words)
-        try:
-            process.wait(rng.uniform(0.1, seconds))
-        except subprocess.TimeoutExpired:
-            os.killpg(process.pid, signal.SIGKILL)
+        wait_for(lambda: done_at(path) >= generation or process.poll() is not None)  # noqa: B023
+        time.sleep(rng.uniform(0, 0.05))
+        os.killpg(process.pid, signal.SIGKILL)
         _, err = process.communicate()
         assert process.returncode in (0, -signal.SIGKILL), err
-        if process.returncode == 0:
-            break
-        words = again()
-    else:
-        to_the_end(words)
+        if process.returncode:
+            KILLS.append(generation)
+        if (path / "DONE").exists() and done_at(path) == 40:
+            return
+        words = again if (path / "lock").exists() else words
+    to_the_end(words)
+
+
+def done_at(path: Path) -> int:
+    """Return the generations on the disk, of a shaping those of its third stage."""
+    log = path / ("stage-3" if (path / "shaping.toml").exists() else "") / "generations.jsonl"
+    return log.read_bytes().count(b"\n") if log.is_file() and (path / "lock").exists() else -1
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -70,10 +76,9 @@ def test_runs(seed: int, tmp_path: Path) -> None:
         [*command(tmp_path / name, method, task, run__generations=40), *threads]
         for name in ("whole", "killed")
     ]
-    seconds = to_the_end(start[0])
+    to_the_end(start[0])
     path = tmp_path / "killed"
-    resume = ["resume", str(path), *threads]
-    kill(start[1], lambda: resume if path.exists() else start[1], 3, seconds, seed)
+    kill(start[1], ["resume", str(path), *threads], path, 4, random.Random(seed))
     assert content(path) == content(tmp_path / "whole")
 
 
@@ -85,23 +90,16 @@ def test_runs_that_are_given_another_length(seed: int, tmp_path: Path) -> None:
     path = tmp_path / "killed"
     to_the_end([*command(path, method, task, run__generations=5), *threads])
     extend = ["resume", str(path), "--generations", "40", *threads]
-    resume = ["resume", str(path), *threads]
-
-    def again() -> list[str]:
-        return extend if conevo.Run(path).config.run.generations == 5 else resume
-
-    kill(extend, again, 3, 5.0, seed)
+    kill(extend, extend, path, 4, random.Random(seed))
     assert content(path) == content(tmp_path / "whole")
 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_shapings(seed: int, tmp_path: Path) -> None:
     rng = random.Random(200 + seed)
-    method, task = (
-        rng.choice(list(conevo.METHODS)),
-        rng.choice(["rover/complex-3", "gacc/complex-3"]),
-    )
-    settings = tiny_settings(method, task, run__generations=15)
+    method = rng.choice(list(conevo.METHODS))
+    task = rng.choice(["rover/complex-3", "gacc/complex-3"])
+    settings = tiny_settings(method, task, run__generations=40)
     sets = [word for key, value in settings.items() for word in ("--set", f"{key}={value}")]
     threads = ["--threads", "1", "--quiet"]
     start = [
@@ -109,9 +107,9 @@ def test_shapings(seed: int, tmp_path: Path) -> None:
          *threads]
         for out in (tmp_path / "whole", tmp_path / "killed")
     ]  # fmt: skip
-    seconds, path = to_the_end(start[0]), tmp_path / "killed"
-    resume = ["resume", str(path), *threads]
-    kill(start[1], lambda: resume if path.exists() else start[1], 4, seconds, seed)
+    to_the_end(start[0])
+    path = tmp_path / "killed"
+    kill(start[1], ["resume", str(path), *threads], path, 4, rng)
     for stage in ("stage-1", "stage-2", "stage-3"):
         assert content(path / stage) == content(tmp_path / "whole" / stage)
 
@@ -123,11 +121,22 @@ def test_campaigns(seed: int, tmp_path: Path) -> None:
         ["campaign", "start", str(plan), "--out", str(out), "--cores", "2", "--quiet"]
         for out in (tmp_path / "whole", tmp_path / "killed")
     ]
-    seconds, path = to_the_end(start[0]), tmp_path / "killed"
-    kill(start[1], lambda: start[1], 4, seconds, seed)
+    seconds, path, rng = to_the_end(start[0]), tmp_path / "killed", random.Random(300 + seed)
+    for _ in range(4):
+        process = spawn(*start[1])
+        time.sleep(rng.uniform(0.2, 0.6) * seconds)
+        os.killpg(process.pid, signal.SIGKILL)
+        process.communicate()
+        if process.returncode:
+            KILLS.append(0)
+    to_the_end(start[1])
     whole, killed = Campaign(tmp_path / "whole"), Campaign(path)
     assert {entry.state for entry in killed.standings().values()} == {"finished"}
     for label in whole.planned:
         assert content(killed.places.run(label)) == content(whole.places.run(label))
         studies = [one.places.study(label).read_bytes() for one in (whole, killed)]
         assert studies[0] == studies[1]
+
+
+def test_these_were_a_hundred_kills() -> None:
+    assert len(KILLS) >= 100, f"{len(KILLS)} kills"

@@ -5,12 +5,16 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import conevo
 from conevo.errors import EnvironmentFailure, UsageError
+from conevo.runs.champions import Finalists
+from conevo.runs.checkpoint import save
 from conevo.runs.config import resolve
 from conevo.runs.provenance import describe_machine
 from conevo.runs.store import Store, create
@@ -176,3 +180,50 @@ def test_a_place_that_cannot_be_written_is_an_environment_failure(out: str, tmp_
 def test_what_is_no_run_is_refused(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="is no run"):
         conevo.Run(tmp_path)
+
+
+def test_teams_and_states_of_other_shapes_are_refused_however_whole_their_files(
+    tmp_path: Path,
+) -> None:
+    run = evolve_tiny(tmp_path / "run", run__generations=2)
+    store = Store(run.path)
+    team = store.load_champion()
+    assert team is not None
+    wide = team.active[..., None]
+    for name, other, words in (
+        ("champion.npz", replace(team, active=wide), r"genes of shape .* in slots of shape"),
+        ("champion.npz", replace(team, fitness=team.fitness[:1]), "not of 3 robots"),
+        ("champion.npz", replace(team, genes=team.genes.astype(np.float64)), "of another type"),
+        ("champion.npz", replace(team, genes=team.genes + 3), r"genes outside \[-1, 1\]"),
+        ("champion.npz", replace(team, generation="1"), "generation is '1'"),
+        ("champion.npz", replace(team, active=3), "active is 3"),
+        ("finalists.npz", replace(Finalists.of([team]), active=wide[:0]), "not every array has 1"),
+        ("finalists.npz", replace(Finalists.of([team]), generation=np.zeros(0, np.int64)), "shape"),
+    ):
+        path = run.path / name
+        whole = path.read_bytes()
+        save(path, other, store._identity())
+        with pytest.raises(UsageError, match=rf"{name} is damaged: .*{words}") as caught:
+            store.load_champion() if name == "champion.npz" else store.load_finalists()
+        assert "\n" not in str(caught.value)
+        path.write_bytes(whole)
+    small = replace(team, genes=team.genes[:2], active=team.active[:2])
+    small = replace(small, fitness=team.fitness[:2], specialization=team.specialization[:2])
+    store.save_champion(small)
+    with pytest.raises(UsageError, match=r"a team of \(2, 4, \d+\) robots, neurons and genes"):
+        conevo.Run(run.path).test(1, threads=1)
+    state, _ = store.load_checkpoint("cone")
+    assert state is not None
+    (run.path / "DONE").unlink()
+    for changes, name in (
+        ({"genes": state.genes[:, :, :2]}, "genes"),
+        ({"active": state.active[..., None]}, "active"),
+        ({"past_fitness": state.past_fitness.astype(np.float32)}, "past_fitness"),
+        ({"root": 7}, "root"),
+        ({"elite": state.elite + 100}, "elite"),
+    ):
+        for file in run.path.glob("checkpoint-?.npz"):
+            save(file, replace(state, **changes), store._identity() | {"method": "cone"})
+        with pytest.raises(UsageError, match=f"{name} of its checkpoint") as caught:
+            conevo.Run(run.path).resume(threads=1)
+        assert "\n" not in str(caught.value)

@@ -103,6 +103,17 @@ class Finalists:
             specialization=np.stack([team.specialization for team in teams]),
         )
 
+    @property
+    def problem(self) -> str:
+        """What makes these no teams, nothing if they are; for those that were read from a file."""
+        columns = (self.genes, self.active, self.fitness, self.specialization)
+        n = self.generation.size
+        if self.generation.shape != (n,) or self.generation.dtype != np.int64 or n == 0:
+            return f"generations of shape {self.generation.shape}"
+        if any(column.ndim == 0 or len(column) != n for column in columns):
+            return f"not every array has {n} teams"
+        return next((team.problem for team in self.teams() if team.problem), "")
+
     def teams(self) -> list[Team]:
         """Return the teams, in their order."""
         columns = (self.genes, self.active, self.fitness, self.specialization)

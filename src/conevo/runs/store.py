@@ -286,9 +286,12 @@ class Store(Directory):
         from conevo.runs.champions import Finalists
 
         path = self.path / FINALISTS
-        if not path.is_file():
+        if not os.path.lexists(path):
             return []
-        return checkpoint.load(path, Finalists, self._identity()).teams()
+        found = checkpoint.load(path, Finalists, self._identity())
+        if found.problem:
+            raise DamagedFile(f"{path} is damaged: {found.problem}")
+        return found.teams()
 
     def save_team(self, team: Team) -> None:
         """Keep the fittest team of a generation."""
@@ -318,7 +321,12 @@ class Store(Directory):
     def _load_team(self, path: Path) -> Team | None:
         from conevo.runs.champions import Team
 
-        return checkpoint.load(path, Team, self._identity()) if os.path.lexists(path) else None
+        if not os.path.lexists(path):
+            return None
+        team = checkpoint.load(path, Team, self._identity())
+        if team.problem:
+            raise DamagedFile(f"{path} is damaged: {team.problem}")
+        return team
 
     # --- checkpoints ------------------------------------------------------------------------------
 
