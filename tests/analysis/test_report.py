@@ -233,7 +233,7 @@ def test_only_an_unchanged_report_is_replaced(tmp_path) -> None:
         write_report(root, tmp_path / "other")
     (tmp_path / "own").mkdir()
     (tmp_path / "own" / "thesis.tex").write_text("mine")
-    with pytest.raises(UsageError, match="is no report"):
+    with pytest.raises(UsageError, match="is not a report"):
         write_report(root, tmp_path / "own")
     assert (tmp_path / "own" / "thesis.tex").read_text() == "mine"
     assert sorted(path.name for path in tmp_path.iterdir()) == ["camp", "other", "out", "own"]

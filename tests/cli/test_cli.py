@@ -161,7 +161,7 @@ BAD = [
     (["run", TASK, "--sed", "1"], "--sed"),
     (["rum", TASK], "did you mean 'run'"),
     (["resume", "nothing"], "unknown run 'nothing'"),
-    (["show", "."], "is no run"),
+    (["show", "."], "is not a run"),
     (["test"], "Missing argument"),
     (["list", "robots"], "'robots' is not one of"),
     (["list", "worlds", "here"], "takes no further argument, got 'here'"),
@@ -178,7 +178,7 @@ BAD = [
     (["run", TASK, "--set", "generations=5", "--set", "run.generations=6"], "given as generations"),
     (["run", TASK, "--set", "run.epochs=5", "--set", "run.epochs=6"], "run.epochs is set twice"),
     (["run", "pursuit/team-3", "--prey", "random", "--set", "prey=random"], "--prey and --set"),
-    (["list", "runs", "nowhere"], "nowhere is no directory"),
+    (["list", "runs", "nowhere"], "nowhere is not a directory"),
 ]  # fmt: skip
 
 

@@ -218,7 +218,7 @@ BAD = [
         "cannot be shown side by side: different tasks",
     ),
     (("replay", "epoch.npz", "--beside", "e1.npz"), "shown side by side: different scenarios"),
-    (("replay", "runs"), "is no run"),
+    (("replay", "runs"), "is not a run"),
     (("film", "cone", "--gif", "--mp4"), "--gif, --mp4 and --poster are mutually exclusive"),
     (("film", "cone", "--gif", "--out", "a.mp4"), "a.mp4"),
     (("film", "cone", "--out", "a.avi"), "a.avi"),

@@ -402,7 +402,7 @@ def test_a_finished_shaping_is_sealed(tmp_path: Path) -> None:
 
 
 def test_what_is_no_shaping_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match="is no shaping"):
+    with pytest.raises(UsageError, match="is not a shaping"):
         Shaping(evolve_tiny(tmp_path / "run").path)
 
 

@@ -178,7 +178,7 @@ def test_a_place_that_cannot_be_written_is_an_environment_failure(out: str, tmp_
 
 
 def test_what_is_no_run_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match="is no run"):
+    with pytest.raises(UsageError, match="is not a run"):
         conevo.Run(tmp_path)
 
 

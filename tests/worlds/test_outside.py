@@ -164,7 +164,7 @@ def test_a_world_named_anew_is_the_one_that_is_there_now(light: Path, tmp_path: 
 
 def test_a_digest_belongs_to_the_world_beside_it(light: Path, tmp_path: Path) -> None:
     for given, words in (
-        ({"run.world_digest": "0" * 12}, "no run.world beside it"),
+        ({"run.world_digest": "0" * 12}, "needs run.world next to it"),
         (
             {"run.world": "rover/complex-1", "run.world_digest": "0" * 12},
             "belongs to a world in a file, not to 'rover/complex-1'",

@@ -227,7 +227,7 @@ def _refuse_changed(out: Path) -> None:
         return
     manifest = out / MANIFEST
     if not manifest.is_file():
-        raise UsageError(f"{out} is no report, so it is not replaced; choose another --out")
+        raise UsageError(f"{out} is not a report, so it is not replaced; choose another --out")
     try:
         written = read_json(manifest, Manifest)["files"]
     except DamagedFile as error:

@@ -167,7 +167,7 @@ class View:
             bar,
             f"{self.line(entries)}, {duration(time.monotonic() - self.began)} so far",
             table,
-            *(f"at work: {label}" for label in at_work[:8]),
+            *(f"running: {label}" for label in at_work[:8]),
         )
 
     def print_end(self, entries: dict[str, Entry]) -> None:

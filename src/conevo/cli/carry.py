@@ -36,7 +36,7 @@ def accept_option(function: Function) -> Function:
     return click.option(
         "--accept-other-code",
         is_flag=True,
-        help="Continue what another version of conevo began; it is recorded and shown.",
+        help="Continue results of another version of conevo; show and reports name it.",
     )(function)
 
 
@@ -59,7 +59,7 @@ def time_limit_option(function: Function) -> Function:
 
     return click.option(
         "--time-limit", "limit", metavar="TIME", callback=begin,
-        help="Stop after 90s, 10m, 1.5h or 2d, so that resume goes on; ends with 0.",
+        help="Stop cleanly after 90s, 10m, 1.5h or 2d, with exit code 0; then resume.",
     )(function)  # fmt: skip
 
 

@@ -93,7 +93,7 @@ def _runs(folder: str | None) -> Rows:
 
     place = Path(folder) if folder else RUNS
     if folder and not place.is_dir():
-        raise UsageError(f"{place} is no directory")
+        raise UsageError(f"{place} is not a directory")
     rows = []
     for path in directories(place):
         try:

@@ -18,8 +18,10 @@ __all__ = ["query"]
 def query(arguments: tuple[str, ...], as_csv: bool, as_json: bool) -> None:
     """Print the answer to SQL over the finished runs of CAMPAIGN (the only one here by default).
 
-    Tables: runs, scores, generations, castes, robots, actions, metrics, behaviours; see their
-    columns with "DESCRIBE runs". Nothing can be changed by it.
+    Tables: runs, measures, scores, champions, generations, castes, robots, actions, metrics,
+    behaviours; "DESCRIBE runs" lists the columns of one. A query cannot change anything.
+
+    Try: conevo query NAME "SELECT method, count(*) FROM runs GROUP BY ALL"
     """
     from conevo.analysis.frames import Tables
     from conevo.cli.find import find_campaign, only_campaign, sealed

@@ -26,13 +26,13 @@ __all__ = ["resume"]
 @click.option(
     "--generations",
     type=click.IntRange(1, 10_000_000),
-    help="Where it is to end instead: all generations.",
+    help="New end of the run, in generations from its start.",
 )
 @click.option(
     "--budget-evaluations", type=click.IntRange(0, 2**63 - 1),
-    help="All team evaluations that it may now spend; 0: no limit.",
+    help="New budget from its start, in team evaluations; 0: no limit.",
 )  # fmt: skip
-@click.option("--target", metavar="VALUE|none", help="Task performance at which it is to end now.")
+@click.option("--target", metavar="VALUE|none", help="New task performance at which the run ends.")
 @time_limit_option
 @click.option(
     "--threads", type=click.IntRange(1, 4096), help="CPU threads (default all); changes no result."
@@ -54,8 +54,10 @@ def resume(
     """Continue RUN (a directory, or the beginning of its name in runs/) from its last checkpoint.
 
     The result is the same, bit for bit, as that of a run that was never interrupted. With
-    --generations or --budget-evaluations a finished run goes on, too: the result is that of a run
-    which was planned that long, for example conevo resume runs/first --generations 100
+    --generations or --budget-evaluations a finished run continues, too, with the result of a run
+    that was planned that long.
+
+    Try: conevo resume runs/first --generations 100
     """
     from conevo.cli.find import find
 

@@ -27,7 +27,7 @@ __all__ = ["test"]
 @click.option("--stages", is_flag=True, help="Of a shaping: in the environment of every stage.")
 @click.option(
     "--on", metavar="ENVIRONMENT",
-    help="Also in another environment: of its world, or WORLD/ENVIRONMENT with such controllers.",
+    help="Also in another environment: of its world, or WORLD/ENVIRONMENT with the same controllers.",
 )  # fmt: skip
 @click.option(
     "--set", "settings", metavar="world.KEY=VALUE", multiple=True,
@@ -35,7 +35,7 @@ __all__ = ["test"]
 )  # fmt: skip
 @click.option(
     "--robots", type=click.IntRange(1, 64),
-    help="Also in a team of so many: the first ones, or all of them again.",
+    help="Also in a team of N robots: the first N, or all of them repeated.",
 )  # fmt: skip
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON value.")
 def test(
@@ -52,8 +52,10 @@ def test(
     """Re-execute the fittest team of RUN (finished or not) in fresh scenarios; writes nothing.
 
     Of a shaping it is the team of the last stage that has one, in that stage's environment.
-    With --on, --set and --robots it is tested under changed conditions, too, and the change is
-    printed: conevo test runs/first --set world.iterations=500 --robots 10
+    With --on, --set and --robots it is tested under changed conditions, too, and the difference is
+    printed.
+
+    Try: conevo test runs/first --set world.iterations=500 --robots 10
     """
     from conevo.cli.find import find_run, find_shaping
     from conevo.cli.stages import stages_test_text

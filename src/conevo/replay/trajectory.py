@@ -164,7 +164,7 @@ def _channel(codes: Any, kept: Any) -> Channel:
     low, step = kept["low"], kept["step"]
     for number in (low, step):
         if isinstance(number, bool) or not isinstance(number, int | float):
-            raise TypeError(f"{number!r} is no number")
+            raise TypeError(f"{number!r} is not a number")
     top = low + step * np.iinfo(codes.dtype).max
     if not (math.isfinite(top) and math.isfinite(low) and step >= 0):
         raise ValueError(f"values from {low} in steps of {step}")

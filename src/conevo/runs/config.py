@@ -401,7 +401,7 @@ def _take_names(layers: list[Layer], asked: Mapping[str, str | None]) -> dict[st
         given = {name: layer.get("run", {}).pop(name, None) for name in NAMES}
         if given["world_digest"] is not None and given["world"] is None:
             place = given["world_digest"].place
-            raise UsageError(f"run.world_digest {place}: there is no run.world beside it")
+            raise UsageError(f"run.world_digest {place}: it needs run.world next to it")
         if given["world"] is not None:
             names["world_digest"] = ""  # of another world
         for name, found in given.items():

@@ -111,7 +111,7 @@ class Directory:
     def __init__(self, path: Path, kind: str) -> None:
         name = next(name for name in KINDS if KINDS[name] == kind)
         if not (path / name).is_file():
-            raise UsageError(f"{path} is no {kind} (it has no {name})")
+            raise UsageError(f"{path} is not a {kind} (it has no {name})")
         self.path = path
 
     @contextmanager

@@ -278,7 +278,7 @@ def test_runs_that_nobody_studied(tmp_path: Path) -> None:
     with Tables(tmp_path) as tables:
         found = {one.id: one.verdict for one in verdicts(tables) if one.id in ("R9", "R11", "R12")}
     assert found == {
-        "R9": "undecided: no castes told",
+        "R9": "undecided: no castes recorded",
         "R11": "undecided: no castes replaced",
         "R12": "undecided: no teams of clones",
     }

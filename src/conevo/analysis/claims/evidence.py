@@ -97,7 +97,7 @@ def _share(tables: Tables) -> dict[str, float]:
 
 def _collective(behaviour: str) -> Quantity:
     read = _query(SEEN.format(kind="collective", behaviour=behaviour))
-    return Quantity(read, "no behaviours told", is_share=True)
+    return Quantity(read, "no behaviours recorded", is_share=True)
 
 
 QUANTITIES: dict[str, Quantity] = {
@@ -119,15 +119,15 @@ QUANTITIES: dict[str, Quantity] = {
     "complementary": Quantity(_query(COMPLEMENTARY), "no team of two behaviours"),
     "one caste": Quantity(
         _query(CASTES.format(condition="count(DISTINCT caste) = 1")),
-        "no castes told",
+        "no castes recorded",
         is_share=True,
     ),
     "several castes": Quantity(
-        _query(CASTES.format(condition=SEVERAL_CASTES)), "no castes told", is_share=True
+        _query(CASTES.format(condition=SEVERAL_CASTES)), "no castes recorded", is_share=True
     ),
     "idle predators": Quantity(
         _query(SEEN.format(kind="individual", behaviour="idle")),
-        "no behaviours told",
+        "no behaviours recorded",
         is_share=True,
     ),
     **{

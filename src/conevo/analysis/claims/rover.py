@@ -40,7 +40,7 @@ ROVER: tuple[Claim, ...] = (
         "5.4.2",
         "rover",
         (Part(above("value", COMPLEX, ("cone",), OTHERS)),),
-        caution="value only; 5.4.2 speaks of task performance, which is value and area",
+        caution="value only; 5.4.2 names task performance, which is value and area",
     ),
     Claim(
         "R2",

@@ -172,8 +172,8 @@ def _pair_table(
         f"{measure.direction.capitalize()}. Difference: mean of the first less that of the second; "
         f"95 % interval: Welch; {tests} "
         "Alike: no test below 0.05 and the interval inside ±15 % of the larger mean; power: "
-        "probability that two methods that are exactly alike, with so many runs that scatter so, "
-        "are found alike."
+        "probability that two exactly alike methods, with this number and spread of runs, are "
+        "found alike."
         + (" No exchange: CONE hardly recombined between populations there." if idle else "")
     )
     rows = [_pair_row(scope, pair) | _judged(pair, idle) for pair in pairs]

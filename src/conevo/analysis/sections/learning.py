@@ -124,7 +124,7 @@ def _course_table(
         Column("n", "n"),
         *(Column(str(q), f"at {q:,}") for q in quarters),
     ]
-    note += " At so many team evaluations; n: runs."
+    note += " At the number of team evaluations given; n: runs."
     return Table(f"{scope.stem}-{name}", title, note, columns, rows, is_open=False, numbers=numbers)
 
 

@@ -87,8 +87,8 @@ def metrics(scope: Scope) -> Section:
     table = Table(
         f"{scope.stem}-specialization-measures",
         "Measures of specialization of the champions",
-        "Mean over runs ± standard deviation of the runs, champions in fresh scenarios; what the "
-        "measures are and between which values they lie stands at the end of the report. "
+        "Mean over runs ± standard deviation of the runs, champions in fresh scenarios; the end "
+        "of the report explains each measure and its range. "
         f"{PAYS.capitalize()} is one number for all runs of a cell, from three on.",
         columns,
         rows,

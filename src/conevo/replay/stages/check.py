@@ -244,4 +244,4 @@ def _kinds(name: str, kinds: tuple[Kind, ...]) -> None:
 
 def _colour(colour: str, or_none: bool = False) -> None:
     is_right = (or_none and not colour) or _COLOUR.fullmatch(colour) is not None
-    _require(is_right, f"{colour!r} is no colour")
+    _require(is_right, f"{colour!r} is not a colour")
