@@ -27,7 +27,7 @@ __all__ = ["test"]
 @click.option("--stages", is_flag=True, help="Of a shaping: in the environment of every stage.")
 @click.option(
     "--on", metavar="ENVIRONMENT",
-    help="Also in another environment: of its world, or WORLD/ENVIRONMENT with the same controllers.",
+    help="Also in another environment: ENVIRONMENT of its world, or WORLD/ENVIRONMENT.",
 )  # fmt: skip
 @click.option(
     "--set", "settings", metavar="world.KEY=VALUE", multiple=True,
