@@ -312,6 +312,15 @@ def test_a_small_file_that_unpacks_to_a_large_one_costs_nothing(
         tracemalloc.stop()
 
 
+def test_an_archive_that_is_never_compressed_unpacks_to_its_own_size(tmp_path: Path) -> None:
+    path = tmp_path / "a.npz"
+    np.savez(path, a=np.zeros(1000))
+    assert read_arrays(path, is_packed=False)["a"].size == 1000
+    np.savez_compressed(path, a=np.zeros(1000))
+    with pytest.raises(DamagedFile, match="unpacked it would have 8,128 bytes, more than"):
+        read_arrays(path, is_packed=False)
+
+
 def test_a_member_that_is_there_twice_or_packed_otherwise_is_refused(tmp_path: Path) -> None:
     path, out = tmp_path / "a.npz", io.BytesIO()
     with zipfile.ZipFile(out, "w") as archive:

@@ -355,7 +355,7 @@ _DECODER = json.JSONDecoder(
 
 
 def read_arrays(
-    path: Path, limit: int = MOST_ARRAYS, kind: str = "an npz file"
+    path: Path, limit: int = MOST_ARRAYS, kind: str = "an npz file", *, is_packed: bool = True
 ) -> dict[str, npt.NDArray[Any]]:
     """Return the arrays of an npz file by name.
 
@@ -366,6 +366,7 @@ def read_arrays(
         path: the file.
         limit: bytes that it may have, packed and unpacked.
         kind: what it should be, for messages.
+        is_packed: whether it may be compressed; else it may not unpack to more than it has.
 
     Raises:
         DamagedFile: it is damaged, not an npz file of numbers, not a regular file, or too large.
@@ -375,7 +376,7 @@ def read_arrays(
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             members = archive.infolist()
-            _refuse_members(members, limit)
+            _refuse_members(members, limit if is_packed else len(content))
             found: dict[str, npt.NDArray[Any]] = {}
             for member in members:
                 with archive.open(member) as file:

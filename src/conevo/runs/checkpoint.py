@@ -66,7 +66,7 @@ def load(path: Path, record_class: type[Record], identity: Mapping[str, str]) ->
     from conevo.runs.records import FileText
 
     try:
-        arrays = read_arrays(path, kind="a file of conevo")
+        arrays = read_arrays(path, kind="a file of conevo", is_packed=False)
     except DamagedFile as error:
         raise UnusableFile(str(error)) from error
     try:
