@@ -11,6 +11,20 @@ if os.environ.get("CONEVO_TEST_WARP_MODE"):  # "debug": array accesses out of bo
     warp.config.mode = os.environ["CONEVO_TEST_WARP_MODE"]
 
 
+def pytest_collection_modifyitems(config, items):
+    """Leave out tests that take minutes, and in parallel those that need cores of their own.
+
+    Unless ``-m`` asks for them by name.
+    """
+    asked = config.option.markexpr
+    left_out = {"exhaustive"} | ({"timing"} if hasattr(config, "workerinput") else set())
+    left_out = {mark for mark in left_out if mark not in asked}
+    gone = [item for item in items if any(item.get_closest_marker(mark) for mark in left_out)]
+    if gone:
+        config.hook.pytest_deselected(items=gone)
+        items[:] = [item for item in items if item not in set(gone)]
+
+
 @pytest.fixture
 def cpu_blocks():
     """Return a context in which Warp runs a block's lanes on the CPU (its experimental fibers)."""
