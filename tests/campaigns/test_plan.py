@@ -153,6 +153,10 @@ def test_some_runs_of_a_plan_may_be_shapings(tmp_path):
             "unknown key 'method.gst'",
         ),
         ("[settings]", '[settings]\n"run.seed" = 4', "seeds are campaign.seeds"),
+        ("[settings]", '[[where]]\nmethod = "conne"\n[settings]', "did you mean 'cone'"),
+        ("[settings]", '[[where]]\npreset = "smok"\n[settings]', "did you mean 'smoke'"),
+        ("[settings]", '[[where]]\nworld = "rovr/complex-1"\n[settings]', "did you mean 'rover'"),
+        ("complex-1", "complex-5..2", "begins with its smaller number"),
     ],
 )
 def test_a_wrong_plan_is_one_clear_line(tmp_path, old, new, says):

@@ -173,6 +173,8 @@ BAD = [
     (["run", TASK, "--dry-run", "--preset", "smok"], "did you mean 'smoke'"),
     (["run", TASK, "--dry-run", "--budget-evaluations", "5"], "does not pay for one"),
     (["run", TASK, "--seed", "3", "--set", "run.seed=4"], "--seed and --set run.seed"),
+    (["run", TASK, "--set", "run.world=rover/complex-2"], "WORLD/ENVIRONMENT and --set run.world"),
+    (["run", TASK, "--dry-run", "--from", "nowhere"], "unknown run 'nowhere'"),
     (["run", TASK, "--seed", "3", "--set", "seed=3"], "--seed and --set seed"),
     (["run", TASK, "--preset", "smoke", "--set", "run.preset=desk"], "--preset and --set"),
     (["run", TASK, "--set", "generations=5", "--set", "run.generations=6"], "given as generations"),

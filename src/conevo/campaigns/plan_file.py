@@ -41,8 +41,10 @@ from typing import Any
 from conevo.campaigns.inputs import located
 from conevo.campaigns.plan import MOST_SEEDS, Plan, Where
 from conevo.errors import UsageError, shown, unknown_name
+from conevo.evolution.methods.registry import METHODS
 from conevo.reading import parse_toml, read_toml
 from conevo.runs.config import PRESETS
+from conevo.worlds.registry import resolve as resolve_world
 
 __all__ = ["STUDIES", "preset_names", "read_plan", "read_preset"]
 
@@ -192,6 +194,8 @@ def _expand(names: Iterable[str]) -> list[str]:
             stem, first, last = match.groups()
             if max(len(first), len(last)) > 3:
                 raise UsageError(f"{shown(name)}: the numbers of a range have three digits at most")
+            if int(first) > int(last):
+                raise UsageError(f"{shown(name)}: a range begins with its smaller number")
             found += [f"{stem}{k}" for k in range(int(first), int(last) + 1)]
         else:
             found.append(name)
@@ -210,6 +214,13 @@ def _where(table: Any, of_all: Mapping[str, Any], place: str) -> Where:
             raise unknown_name("condition", f"where.{key}", [*CONDITIONS, *EFFECTS], place)
         allowed = [value] if isinstance(value, str) else value
         conditions[key] = tuple(_expand(_texts(allowed, f"where.{key}", place)))
+    for key, known in (("method", METHODS), ("preset", PRESETS)):
+        for name in conditions.get(key, ()):
+            if name not in known:
+                raise unknown_name(f"where.{key}", name, known, place)
+    for name in conditions.get("world", ()):
+        if name not in of_all["world"] and ".py" not in name:
+            resolve_world(name)  # a condition on a world that does not exist never holds
     shape = _truth(table["shape"], "where.shape", place) if "shape" in table else None
     factors = _factors(_table(table, "factors", place), "where.factors", place)
     if twice := sorted(factors.keys() & of_all.keys()):

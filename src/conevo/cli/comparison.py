@@ -17,6 +17,11 @@ if TYPE_CHECKING:
 __all__ = ["compare", "plan_of"]
 
 
+# As many team evaluations for every method, as in the plans that come with conevo: a smoke run's
+# generations cost each method another number, and runs of different budgets are not compared.
+SMOKE = {"run.generations": 20, "run.budget_evaluations": 430}
+
+
 def plan_of(order: Order, config: RunConfig, n_seeds: int, shape: bool) -> Plan:
     """Return the plan of every method with every seed; its name says what it compares.
 
@@ -36,6 +41,8 @@ def plan_of(order: Order, config: RunConfig, n_seeds: int, shape: bool) -> Plan:
     first = 1 if order.seed is None else order.seed
     methods = order.methods
     settings = dict(order.overrides)
+    if len(methods) > 1 and config.preset == "smoke" and not config.run.budget_evaluations:
+        settings |= SMOKE | settings
     parts = [config.task, *methods, config.preset, *(["shaped"] if shape else [])]
     if settings:
         text = json.dumps(settings, sort_keys=True, default=str)

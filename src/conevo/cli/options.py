@@ -129,6 +129,7 @@ class Order:
         """
         from conevo.runs.config import resolve
 
+        self._refuse_twice("run.world", "WORLD/ENVIRONMENT", world)
         return resolve(
             world,
             self.methods[0] if self.method else None,
@@ -139,17 +140,29 @@ class Order:
             place=PLACE,
         )
 
-    def print_only(self, configs: Sequence[RunConfig]) -> None:
-        """Print what would be started, stage by stage; writes and starts nothing."""
+    def print_only(
+        self, configs: Sequence[RunConfig], origin: str | None = None, of_champion: bool = False
+    ) -> None:
+        """Print what would be started, stage by stage; writes and starts nothing.
+
+        Args:
+            configs: of the run, or of every stage.
+            origin: as for ``run``, as the next.
+            of_champion: whether the populations are bred from its champion.
+        """
+        from conevo.cli.find import find_last
         from conevo.cli.settings_text import print_dry_run
         from conevo.runs.directory import refuse_existing
-        from conevo.runs.run import RUNS
+        from conevo.runs.run import RUNS, beginning
         from conevo.runs.shaping import label
 
-        name = configs[0].label if len(configs) == 1 else label(configs)
-        path = Path(self.out) if self.out else RUNS / name
-        refuse_existing(path)
-        print_dry_run(configs, path, self.as_json)
+        if len(configs) == 1:
+            found = None if origin is None else find_last(origin)
+            path, ancestor, ancestry = beginning(configs[0], self.out, found, of_champion)
+        else:
+            path, ancestor, ancestry = Path(self.out or RUNS / label(configs)), None, {}
+            refuse_existing(path)
+        print_dry_run(configs, path, self.as_json, ancestor, ancestry)
 
     def run(self, config: RunConfig, origin: str | None = None, of_champion: bool = False) -> None:
         """Start a run and carry it on to its end.

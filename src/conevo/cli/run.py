@@ -81,7 +81,7 @@ def run(
         else:
             order.shape(tasks)
     elif dry_run:
-        order.print_only([config])
+        order.print_only([config], origin or champion, of_champion=champion is not None)
     else:
         order.run(config, origin or champion, of_champion=champion is not None)
     return None

@@ -87,21 +87,34 @@ def print_settings(rows: list[dict[str, Any]], as_json: bool) -> None:
             click.echo(" " * (width + 2) + more)
 
 
-def print_dry_run(configs: Sequence[RunConfig], path: Path, as_json: bool) -> None:
+def print_dry_run(
+    configs: Sequence[RunConfig], path: Path, as_json: bool, ancestor: Any, ancestry: Any
+) -> None:
     """Print what a run, or every stage of a shaping, would be.
 
     As text it is a configuration file that ``conevo run --config`` takes (of a shaping: that of the
     last stage), below comments on where it would be written and what it would cost.
+
+    Args:
+        configs: of the run, or of every stage.
+        path: where it would be.
+        as_json: whether to print JSON.
+        ancestor: what the run would begin with, None for random populations.
+        ancestry: what its provenance would say of that.
     """
-    prices = [price_of(config) for config in configs]
+    prices = [price_of(config, ancestor) for config in configs]
     if as_json:
         stages = [
             {"run_id": one.run_id, **dataclasses.asdict(price), "config": one.tables()}
             for one, price in zip(configs, prices, strict=True)
         ]
-        click.echo(json.dumps({"path": str(path), "runs": stages}))
+        click.echo(json.dumps({"path": str(path), "runs": stages, **ancestry}))
         return
     click.echo(f"# {path} (nothing was written)")
+    if ancestry:
+        click.echo(
+            f"# begins with populations of {ancestry['origin']['path']}; --from is not in the file"
+        )
     for one, price in zip(configs, prices, strict=True):
         click.echo(
             f"# {title(one.outline)}: {count(price.evaluations)} team evaluations in the first "

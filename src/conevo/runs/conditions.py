@@ -90,6 +90,8 @@ def _changed(
                 "key", key, [f"world.{one}" for one in known], "(only the world can be changed)"
             )
         settings[f"world.{name}"] = value
+        if f"{name}_digest" in known:
+            settings[f"world.{name}_digest"] = ""  # of what it was
     if robots is not None:
         if "n_robots" in known:
             settings["world.n_robots"] = robots

@@ -46,16 +46,20 @@ class Price:
     team_steps: int
 
 
-def price_of(config: RunConfig) -> Price:
+def price_of(config: RunConfig, ancestor: State | Team | None = None) -> Price:
     """Return how much a run would evolve; simulates nothing and loads no kernel.
 
+    Args:
+        config: of the run.
+        ancestor: as for ``Lab.first_state``.
+
     Raises:
-        UsageError: the budget does not pay for one generation.
+        UsageError: the budget does not pay for one generation, or the ancestor does not fit.
     """
     world, run = config.build_world(), config.run
     method = METHODS[config.method].build(config.method_config)
     check_memory(config, layout_of(world))
-    state = method.init(layout_of(world), run.seed)
+    state = _first(method, layout_of(world), run.seed, ancestor)
     check_budget(method, state, run.budget_evaluations)
     first = price(method, state)
     generations = run.generations
@@ -63,6 +67,15 @@ def price_of(config: RunConfig) -> Price:
         generations = min(generations, run.budget_evaluations // first)
     epochs = (first - 1) * run.epochs + run.fittest_epochs
     return Price(first, generations, generations * epochs * world.params.iterations)
+
+
+def _first(method: Method, layout: Layout, seed: int, ancestor: State | Team | None) -> State:
+    """Return generation 0 of random populations, of an ancestor's, or bred from its team."""
+    if ancestor is None:
+        return method.init(layout, seed)
+    if isinstance(ancestor, Team):
+        return breed_from(method, layout, seed, ancestor.genes, ancestor.active)
+    return hand_on(method, layout, seed, ancestor)
 
 
 def check_memory(config: RunConfig, layout: Layout) -> None:
@@ -173,12 +186,7 @@ class Lab:
         """
         layout, seed = layout_of(self.world), self.config.run.seed
         check_memory(self.config, layout)
-        if ancestor is None:
-            state = self.method.init(layout, seed)
-        elif isinstance(ancestor, Team):
-            state = breed_from(self.method, layout, seed, ancestor.genes, ancestor.active)
-        else:
-            state = hand_on(self.method, layout, seed, ancestor)
+        state = _first(self.method, layout, seed, ancestor)
         check_budget(self.method, state, self.config.run.budget_evaluations)
         self.world.scenarios([seed])  # says so now if there is no room for what belongs in it
         return state

@@ -103,18 +103,9 @@ def start(
             origin is unfinished, was changed since, or its populations do not fit.
         EnvironmentFailure: no such device, full disk, no permission; nothing was written.
     """
-    from conevo.runs.ancestry import ancestor_of, refuse_other_controllers
     from conevo.runs.lab import Lab
 
-    ancestor: State | Team | None = None
-    ancestry: Record = {}
-    if origin is not None:
-        ancestor, ancestry = ancestor_of(origin._store, origin.outline.method, of_champion)
-    suffix = f"-from-{ancestry['origin']['checkpoint'][:6]}" if ancestry else ""
-    path = Path(out) if out is not None else RUNS / f"{config.label}{suffix}"
-    refuse_existing(path)
-    if origin is not None:
-        refuse_other_controllers(origin, config.build_world())
+    path, ancestor, ancestry = beginning(config, out, origin, of_champion)
     lab = Lab.equip(config, threads, device)
     first = lab.first_state(ancestor)
     about = {
@@ -131,6 +122,28 @@ def start(
         "sessions": [],
     }
     return Run(create(path, config, about, first if ancestry else None).path, lab)
+
+
+def beginning(
+    config: RunConfig, out: str | Path | None, origin: Run | None, of_champion: bool
+) -> tuple[Path, State | Team | None, Record]:
+    """Return where a run would be, what it begins with, and what its provenance says of that.
+
+    Raises:
+        UsageError: as ``start``.
+    """
+    from conevo.runs.ancestry import ancestor_of, refuse_other_controllers
+
+    ancestor: State | Team | None = None
+    ancestry: Record = {}
+    if origin is not None:
+        ancestor, ancestry = ancestor_of(origin._store, origin.outline.method, of_champion)
+    suffix = f"-from-{ancestry['origin']['checkpoint'][:6]}" if ancestry else ""
+    path = Path(out) if out is not None else RUNS / f"{config.label}{suffix}"
+    refuse_existing(path)
+    if origin is not None:
+        refuse_other_controllers(origin, config.build_world())
+    return path, ancestor, ancestry
 
 
 class Run:
