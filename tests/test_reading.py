@@ -332,3 +332,13 @@ def test_a_member_that_is_there_twice_or_packed_otherwise_is_refused(tmp_path: P
     with zipfile.ZipFile(out, "w", zipfile.ZIP_LZMA) as archive:
         archive.writestr("a.npy", b"")
     assert "packed otherwise than numpy does" in refused(read_arrays, path, out.getvalue())
+
+
+def test_long_dotted_keys_are_refused_before_they_take_memory(tmp_path: Path) -> None:
+    path = tmp_path / "file.toml"
+    for key in ("a." * 20000 + "a", "[" + "a." * 20000 + "a]\nb", '"a". ' * 20000 + "a"):
+        path.write_text(f"{key} = 1\n")
+        with pytest.raises(DamagedFile, match="nested too deeply"):
+            read_toml(path)
+    path.write_text(f'a.b.c = 1\nlong = "{"word" * 200_000}"\npath = "{"a/b.c/" * 1000}"\n')
+    assert read_toml(path)["a"] == {"b": {"c": 1}}

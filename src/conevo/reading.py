@@ -54,6 +54,8 @@ MOST_LOG = 512 * MIB
 MOST_ARRAYS = 1024 * MIB  # bytes of an archive when it is unpacked
 MEMBERS = 1000  # of an archive
 DEPTH = 32  # lists and tables within each other; conevo's own files have six
+# As many parts of a key in a row; a text that looks like this is no setting of anything, either.
+DOTTED = re.compile(rf"""(?<![\w"'.-])(?:[\w"'-]+[ \t]*\.[ \t]*){{{DEPTH}}}""")
 KINDS = {
     stat.S_IFDIR: "Is a directory",
     stat.S_IFIFO: "it is a pipe, not a regular file",
@@ -263,6 +265,8 @@ def parse_toml(text: str, name: str) -> dict[str, Any]:
         DamagedFile: it is not valid TOML.
     """
     try:
+        if DOTTED.search(text):  # each part costs a table, and a copy of all parts before it
+            raise RecursionError
         found = tomllib.loads(text)
         _refuse_deep(found)
     except RecursionError:

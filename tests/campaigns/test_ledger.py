@@ -1,4 +1,8 @@
+import os
+import signal
 import sqlite3
+import subprocess
+import sys
 
 import pytest
 
@@ -72,3 +76,48 @@ def test_a_damaged_ledger_is_said_to_be_damaged(tmp_path):
 def test_a_place_that_cannot_be_written_is_the_machine_s_fault(tmp_path):
     with pytest.raises(EnvironmentFailure, match=r"cannot use .*ledger\.sqlite"):
         Ledger(tmp_path / "none" / "ledger.sqlite").enrol(["one"])
+
+
+KILLED = """
+import os, signal, sqlite3, sys
+db = sqlite3.connect(sys.argv[1], isolation_level=None)
+db.execute("PRAGMA cache_size = 2")  # so that pages are written before the end
+db.execute("BEGIN IMMEDIATE")
+for k in range(5000):
+    db.execute("INSERT INTO events VALUES ('now', ?, 'x', ?)", (str(k), "y" * 100))
+os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+def test_what_a_killed_writer_left_is_undone_by_whoever_reads_next(ledger):
+    ledger.begin("two", 1, 0.0)
+    before = states(ledger)
+    done = subprocess.run([sys.executable, "-c", KILLED, str(ledger.path)], check=False)
+    assert done.returncode == -signal.SIGKILL
+    assert os.path.exists(f"{ledger.path}-journal")
+    assert states(ledger) == before
+    ledger.end("two", "finished")
+    assert states(ledger)["two"] == "finished"
+
+
+def test_a_ledger_with_any_byte_changed_is_read_or_refused(ledger):
+    ledger.end("one", "failed", "why")
+    whole = ledger.path.read_bytes()
+    refused = 0
+    for at in [
+        *range(0, len(whole), 97),
+        *(k for k in range(len(whole) - 3) if whole[k : k + 3] == b"why"),
+    ]:
+        ledger.path.write_bytes(whole[:at] + bytes([whole[at] ^ 0xA5]) + whole[at + 1 :])
+        try:
+            ledger.entries()
+        except (UsageError, EnvironmentFailure):
+            refused += 1
+    assert refused > 0
+
+
+def test_a_ledger_that_is_a_link_to_itself_is_refused(tmp_path):
+    path = tmp_path / "ledger.sqlite"
+    path.symlink_to(path)
+    with pytest.raises(EnvironmentFailure, match="cannot use"):
+        Ledger(path).enrol(["one"])

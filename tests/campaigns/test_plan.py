@@ -156,6 +156,10 @@ def test_some_runs_of_a_plan_may_be_shapings(tmp_path):
         ("[settings]", '[[where]]\nmethod = "conne"\n[settings]', "did you mean 'cone'"),
         ("[settings]", '[[where]]\npreset = "smok"\n[settings]', "did you mean 'smoke'"),
         ("[settings]", '[[where]]\nworld = "rovr/complex-1"\n[settings]', "did you mean 'rover'"),
+        ("[settings]", '"run.method" = ["mesp", "ccga"]\n[settings]', "the method is given as"),
+        ("[settings]", '[settings]\n"run.method" = "mesp"', "run.method = 'mesp'.*is given as"),
+        ("[settings]", '[settings]\n"run.preset" = "desk"', "the preset is given as smoke"),
+        ("[settings]", '[settings]\n"run.world" = "rover/complex-2"', "the world is given as"),
         ("complex-1", "complex-5..2", "begins with its smaller number"),
     ],
 )

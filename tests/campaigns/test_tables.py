@@ -167,6 +167,22 @@ def test_tables_are_made_again_only_when_more_is_finished(campaign):
     assert not list(campaign.path.glob(".tables*"))
 
 
+@pytest.mark.parametrize("table", ["runs", "generations", "scores"])
+def test_a_table_that_is_lost_is_made_again(campaign, table):
+    path = campaign.places.tables / f"{table}.parquet"
+    with Tables(campaign.places.tables) as opened:
+        before = opened.query(f"SELECT count(*) FROM {table}")
+    path.unlink()
+    assert not campaign.is_sealed
+    campaign.seal()
+    with Tables(campaign.places.tables) as opened:
+        assert opened.query(f"SELECT count(*) FROM {table}") == before
+    path.unlink()
+    os.mkfifo(path)
+    campaign.seal()
+    assert path.is_file()
+
+
 def test_a_damaged_run_is_left_out_and_the_rest_is_reported(campaign, tmp_path):
     copy = Campaign(shutil.copytree(campaign.path, tmp_path / "copy"))
     shutil.rmtree(copy.places.tables)

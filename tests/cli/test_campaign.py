@@ -44,6 +44,10 @@ def test_a_campaign_from_start_to_answers(conevo, tmp_path):
     ]
     code, out, _ = conevo("query", "tiny", "SELECT method AS m FROM runs ORDER BY m", "--csv")
     assert out == "m\ncone\nhomcne\n"
+    code, out, _ = conevo(
+        "query", "tiny", "SELECT 'nan'::DOUBLE AS a, 'inf'::DOUBLE AS b", "--json"
+    )
+    assert json.loads(out) == {"a": None, "b": None}
     for nothing in ("", ";", "/* only a comment */"):
         code, out, err = conevo("query", "tiny", nothing)
         assert (code, out) == (2, "")

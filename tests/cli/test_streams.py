@@ -63,3 +63,12 @@ def test_a_command_alone_prints_its_help(say) -> None:
         said = say(*words)
         assert (said.code, said.err) == (0, "")
         assert said.out.startswith("Usage: conevo")
+
+
+def test_a_run_whose_reader_leaves_is_interrupted_and_says_so(tmp_path: Path) -> None:
+    words = " ".join(command(Path("run"), "cone", run__generations=4000))
+    done = shell(f'$CONEVO {words} --verbose | head -3; exit "${{PIPESTATUS[0]}}"', tmp_path)
+    assert done.returncode == 130
+    assert done.stderr.startswith("interrupted after ")
+    assert done.stderr.endswith("continue with: conevo resume run\n")
+    assert done.stderr.count("\n") == 1

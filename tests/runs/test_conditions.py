@@ -52,6 +52,21 @@ def test_fewer_robots_are_the_first_and_more_repeat_them(
     assert len(both["changed"]["labels"]) == both["conditions"]["robots"] == robots
 
 
+def test_a_setting_is_given_once(run: conevo.Run) -> None:
+    for world, robots in (
+        ({"n_robots": 3}, 2),
+        ({"iterations": 12, "world.iterations": 12}, None),
+    ):
+        with pytest.raises(UsageError, match="is set twice"):
+            run.test_under(world=world, robots=robots)
+
+
+def test_numbers_out_of_bounds_are_refused_before_anything_is_played(run: conevo.Run) -> None:
+    for scenarios, seed in ((10**9, None), (0, None), (True, None), (2, -1), (2, 1.5)):
+        with pytest.raises(UsageError, match="must be a whole number from"):
+            run.test(scenarios, seed)
+
+
 def test_what_cannot_be_played_is_one_line(run: conevo.Run) -> None:
     for arguments, words in (
         ({"on": "gacc/complex-1"}, r"sensors became \d+"),

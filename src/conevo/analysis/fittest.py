@@ -18,7 +18,7 @@ def equip(run: Run, threads: int | None = None) -> tuple[Team, Lab]:
     """
     team, about = run.champion, run.provenance
     if team is None:
-        raise UsageError(f"{run.path} has no finished generation yet, so no team to observe")
+        raise run.without_team()
     lab = Lab.equip(run.config, threads, about["device"])
     if lab.rollout.kernel_hash != about["kernel_hash"]:
         raise UsageError(

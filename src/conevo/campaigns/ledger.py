@@ -130,18 +130,20 @@ class Ledger:
 
     @contextmanager
     def _reading(self) -> Iterator[sqlite3.Connection]:
-        with self._open("ro") as db:
+        # What a killed writer left half-written is undone first, which a reader may not do.
+        is_torn = self.path.with_name(f"{self.path.name}-journal").exists()
+        with self._open("rw" if is_torn else "ro") as db:
             yield db
 
     @contextmanager
     def _open(self, mode: str) -> Iterator[sqlite3.Connection]:
-        address = f"{self.path.resolve().as_uri()}?mode={mode}"
+        address = f"{self.path.absolute().as_uri()}?mode={mode}"
         # The default journal: write-ahead logs must not lie on network file systems.
         try:
             with closing(sqlite3.connect(address, uri=True, timeout=60)) as db, db:
                 yield db
-        except sqlite3.DatabaseError as error:
-            if isinstance(error, sqlite3.OperationalError):
+        except (sqlite3.DatabaseError, UnicodeDecodeError) as error:
+            if isinstance(error, sqlite3.OperationalError) and "decode" not in str(error):
                 raise EnvironmentFailure(f"cannot use {self.path}: {error}") from error
             raise UsageError(
                 f"{self.path} is damaged ({error}); remove it and start the campaign again: it is "

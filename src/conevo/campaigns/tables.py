@@ -38,6 +38,8 @@ Row = dict[str, Any]
 def is_sealed(places: Places, finished: Sequence[PlannedRun]) -> bool:
     """Whether the tables are those of exactly these runs."""
     path = places.tables / MANIFEST
+    if not all((places.tables / f"{table}.parquet").is_file() for table in SCHEMA):
+        return False
     try:
         return path.is_file() and read_json(path) == _manifest(finished) | {"left_out": {}}
     except DamagedFile:

@@ -17,7 +17,7 @@ from conevo.campaigns.estimate import remaining_seconds
 from conevo.campaigns.executors import Ending, Executor, make_executor
 from conevo.campaigns.ledger import Entry
 from conevo.cli.campaign_text import counts, grid
-from conevo.cli.carry import style_of
+from conevo.cli.carry import drop_output, style_of
 from conevo.cli.text import duration
 from conevo.errors import EnvironmentFailure, UsageError
 from conevo.runs.time_limit import TimeLimit
@@ -77,7 +77,9 @@ def carry_on(campaign: Campaign, execution: Execution) -> int:
                 watch=view.watch,
                 time_limit=execution.limit,
             )
-    except (KeyboardInterrupt, Stopped) as error:
+    except (KeyboardInterrupt, BrokenPipeError, Stopped) as error:
+        if isinstance(error, BrokenPipeError):
+            drop_output()
         word = str(error) if isinstance(error, Stopped) else "interrupted"
         done = counts(campaign.standings())
         click.echo(f"{word} with {done}; go on with: {advice}", err=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -15,7 +16,14 @@ if TYPE_CHECKING:
     from conevo.runs.shaping import Shaping
     from conevo.runs.time_limit import TimeLimit
 
-__all__ = ["accept_option", "carry_on", "output_options", "style_of", "time_limit_option"]
+__all__ = [
+    "accept_option",
+    "carry_on",
+    "drop_output",
+    "output_options",
+    "style_of",
+    "time_limit_option",
+]
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -38,6 +46,11 @@ def accept_option(function: Function) -> Function:
         is_flag=True,
         help="Continue results of another version of conevo; show and reports name it.",
     )(function)
+
+
+def drop_output() -> None:
+    """Send standard output nowhere from now on, since its reader has gone."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def style_of(as_json: bool, quiet: bool, verbose: bool) -> str:
@@ -119,7 +132,9 @@ def carry_on(
             carry(found)
         else:
             found.carry_on(carry, threads, accept_other_code)
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, BrokenPipeError) as error:
+        if isinstance(error, BrokenPipeError):
+            drop_output()
         click.echo(f"interrupted after {_done(found)}; continue with: {advice}", err=True)
         sys.exit(130)
     except EnvironmentFailure as error:

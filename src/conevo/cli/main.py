@@ -132,7 +132,9 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
         )
     except OSError as error:
         if error.errno == errno.EPIPE:  # the reader of our output has gone
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            from conevo.cli.carry import drop_output
+
+            drop_output()
             sys.exit(0)
         fail(f"{error.filename}: {error.strerror}" if error.filename else str(error), 3)
     except Exception as error:

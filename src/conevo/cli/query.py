@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import math
 import sys
 
 import click
@@ -37,7 +38,8 @@ def query(arguments: tuple[str, ...], as_csv: bool, as_json: bool) -> None:
         columns, rows = tables.query(arguments[-1])
     if as_json:
         for row in rows:
-            click.echo(json.dumps(dict(zip(columns, row, strict=True)), default=str))
+            values = [None if _is_no_json(value) else value for value in row]
+            click.echo(json.dumps(dict(zip(columns, values, strict=True)), default=str))
     elif as_csv:
         writer = csv.writer(sys.stdout, lineterminator="\n")
         writer.writerow(columns)
@@ -45,6 +47,11 @@ def query(arguments: tuple[str, ...], as_csv: bool, as_json: bool) -> None:
     else:
         texts = [["-" if value is None else _text(value) for value in row] for row in rows]
         click.echo(table(columns, texts))
+
+
+def _is_no_json(value: object) -> bool:
+    """Whether a value is a number that JSON cannot hold: not-a-number or infinite."""
+    return isinstance(value, float) and not math.isfinite(value)
 
 
 def _text(value: object) -> str:

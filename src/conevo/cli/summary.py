@@ -244,9 +244,10 @@ def next_commands(run: Run) -> list[str]:
         f"conevo replay {run.path}": "see its team in the browser",
         f"conevo test {run.path} --scenarios 100": "test its team longer",
         f"conevo resume {run.path} --{_twice_as_long(run)}": "evolve it longer",
-        again: "the same with another seed",
-        repeat + "".join(changes): "the same with another method",
     }
+    if "origin" not in run.provenance:  # which neither the file nor the options have
+        commands[again] = "the same with another seed"
+        commands[repeat + "".join(changes)] = "the same with another method"
     return [line for command, what in commands.items() for line in (f"# {what}", command)]
 
 

@@ -83,12 +83,16 @@ def _changed(
     settings = {}
     if there.world == config.world:
         settings = {f"world.{key}": value for key, value in config.tables()["world"].items()}
+    given: set[str] = set()
     for key, value in world.items():
         name = key.removeprefix("world.")
         if name not in known:
             raise unknown_name(
                 "key", key, [f"world.{one}" for one in known], "(only the world can be changed)"
             )
+        if name in given or (name == "n_robots" and robots is not None):
+            raise UsageError(f"world.{name} is set twice; give it once")
+        given.add(name)
         settings[f"world.{name}"] = value
         if f"{name}_digest" in known:
             settings[f"world.{name}_digest"] = ""  # of what it was

@@ -275,8 +275,9 @@ def resolve(
         folder: from which ``world`` and ``overrides`` name files, by default the working directory.
 
     Raises:
-        UsageError: an unknown name or a value that is not allowed; a preset that would change
-            nothing, as the file sets all that it does; nothing has been written.
+        UsageError: an unknown name or a value that is not allowed; a world, method, preset or
+            seed that ``overrides`` has, too; a preset that would change nothing, as the file sets
+            all that it does; nothing has been written.
         EnvironmentFailure: the file cannot be read.
     """
     from conevo.evolution.methods.registry import METHODS
@@ -287,6 +288,11 @@ def resolve(
     single, short = _split_keys(given, place, folder)
     if world is not None:
         world = _Value(world, place, folder).as_file
+    for name, asked in (("world", world), ("method", method), ("preset", preset)):
+        if asked is not None and (twice := single.get("run", {}).get(name)):
+            raise UsageError(
+                f"run.{name} = {shown(twice.value)} {twice.place}: the {name} is given as {asked}"
+            )
     own_preset = layers[0].get("run", {}).get("preset") if layers else None
     names = _take_names([*layers, single], {"world": world, "method": method, "preset": preset})
     if not names["world"]:

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 __all__ = ["RUNS", "Run", "evolve", "start"]
 
 RUNS = Path("runs")  # where runs are made and looked for unless told otherwise
+MOST_TESTS = 10_000  # scenarios of a test, as of ``RunSettings.n_tests``
 Record = dict[str, Any]
 Watch = Callable[["Run", Record], None]
 
@@ -389,6 +390,12 @@ class Run:
             self.outline, self.config = self._store.read_outline(), self._store.read_config()
             yield
 
+    def without_team(self) -> UsageError:
+        """Return the error for a run that has no champion."""
+        if self.generations():
+            return UsageError(f"{self.path} has lost its champion.npz")
+        return UsageError(f"{self.path} has no finished generation yet, so there is no team")
+
     def test(
         self,
         scenarios: int | None = None,
@@ -406,11 +413,20 @@ class Run:
             team: another run's team, for which the world has robots and networks of the same size.
 
         Raises:
-            UsageError: no generation has finished yet, or made with other kernels.
+            UsageError: no generation has finished yet, made with other kernels, or numbers of
+                scenarios or a seed that are out of bounds.
         """
+        for name, value, least, most in (
+            ("scenarios", scenarios, 1, MOST_TESTS),
+            ("seed", seed, 0, 2**63 - 1),
+        ):
+            if value is not None and not (type(value) is int and least <= value <= most):
+                raise UsageError(
+                    f"{name} = {value!r}: must be a whole number from {least:,} to {most:,}"
+                )
         champion = team or self.champion
         if champion is None:
-            raise UsageError(f"{self.path} has no finished generation yet, so no team to test")
+            raise self.without_team()
         lab = self._equip(threads)
         return self._test(lab, champion, scenarios, seed)
 

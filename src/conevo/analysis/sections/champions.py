@@ -39,8 +39,9 @@ def champions(scope: Scope) -> Section | None:
         "Means over runs. Selection: in the scenarios that the fittest team of each generation "
         "meets, by which finalists are kept; validation: in scenarios of their own, by which the "
         "champion is chosen among them; test: in fresh ones. Fitness: mean of the robots, on which "
-        "methods select. Where test / selection is below 1 the champion was lucky when it was "
-        "selected. n: runs in which all three are finite."
+        "methods select. Where the test is worse than the selection (a ratio below 1 if larger is "
+        "better, above 1 if smaller is) the champion was lucky when it was selected. "
+        "n: runs in which all three are finite."
     )
     title = "What champions were chosen by, and what is left of it"
     table = Table(f"{scope.stem}-chosen", title, note, columns, rows, is_open=len(rows) <= 12)

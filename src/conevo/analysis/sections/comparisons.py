@@ -61,8 +61,8 @@ def comparisons(scope: Scope) -> Section | None:
         most = per_generation(*max(made[cell] for cell in idle))
         text.append(
             f"{names} exchanged next to nothing between populations in {len(idle)} of {len(made)} "
-            f"cells, at most {most} in a generation: without it CONE is Multi-Agent ESP with type "
-            "C fitness. Comparisons of these cells do not test what exchange is good for."
+            f"cells, at most {most} in a generation: without it CONE is Multi-Agent ESP, with "
+            "type C fitness where that is on. These cells do not test what exchange is good for."
         )
     exhibits: list[Exhibit] = [
         *_map(scope, pairs),
