@@ -183,7 +183,7 @@ def read_json_lines(
     content = read_bytes(path, MOST_LOG)
     lines = whole_lines(content)
     if not is_log and content and not content.endswith(b"\n"):
-        raise DamagedFile(f"{path} is damaged: line {len(lines) + 1} is not whole")
+        raise DamagedFile(f"{path} is damaged: line {len(lines) + 1} is incomplete")
     return [
         parse_json(line, f"{path}", model, f" in line {number}")
         for number, line in enumerate(lines, 1)
@@ -343,7 +343,7 @@ def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     if len(found) < len(pairs):
         names = [name for name, _ in pairs]
         twice = next(name for name in names if names.count(name) > 1)
-        raise ValueError(f"{shown(twice)} is there twice")
+        raise ValueError(f"{shown(twice)} appears twice")
     return found
 
 
@@ -397,9 +397,9 @@ def _refuse_members(members: list[zipfile.ZipInfo], limit: int) -> None:
     if len(members) > MEMBERS:
         raise ValueError(f"it has more than {MEMBERS} members")
     if len({member.filename for member in members}) < len(members):
-        raise ValueError("it has a member twice")
+        raise ValueError("it has two members of one name")
     if any(one.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED) for one in members):
-        raise ValueError("a member is packed otherwise than numpy does")  # and without a bound
+        raise ValueError("a member is not packed as numpy packs it")  # and without a bound
     size = sum(member.file_size for member in members)
     if size > limit:
         raise ValueError(f"unpacked it would have {size:,} bytes, more than {limit:,}")
@@ -418,7 +418,7 @@ def _array(content: bytes) -> npt.NDArray[Any]:
         raise ValueError(f"an array of type {dtype}, not of numbers")
     size = len(content) - stream.tell()
     if min(shape, default=0) < 0 or math.prod(shape) * dtype.itemsize != size:
-        raise ValueError("an array of another size than it says")
+        raise ValueError("an array whose size is not that of its header")
     flat: npt.NDArray[Any] = np.frombuffer(content, dtype=dtype, offset=stream.tell())
     if dtype.kind == "b" and flat.view(np.uint8).max(initial=0) > 1:
         raise ValueError("truth values that are neither true nor false")

@@ -82,7 +82,7 @@ def test_the_page_stands_alone_and_its_links_lead_somewhere(report) -> None:
 
 def test_every_section_is_there_and_says_n_and_tests(report) -> None:
     text = (report / "index.html").read_text()
-    for title in ("What was run", r"Task performance: value \(points, larger is better\)",
+    for title in ("Runs", r"Task performance: value \(points, larger is better\)",
                   "How champions were chosen", "Comparisons", "Learning", "Castes", "Lesions",
                   "Behavioural validation: clones",
                   "Measures of specialization", "Behaviours", "Claims of the thesis",

@@ -62,7 +62,7 @@ def test_devices_are_named_as_warp_does(text, expected):
         ("gpu", "'gpu' is not a device; allowed: cpu, cuda, cuda:0, or several"),
         ("cuda:0,", "'' is not a device"),
         ("cuda:0;reboot", "is not a device"),
-        ("cuda:1,cuda:1", "a device is there twice"),
+        ("cuda:1,cuda:1", "a device is listed twice"),
         ("cpu,cuda:0", "several devices are written cuda:0,cuda:1"),
         ("cuda,cuda:0", "several devices are written cuda:0,cuda:1"),
     ],
@@ -131,7 +131,7 @@ def test_a_run_goes_on_where_it_was_begun_or_says_that_it_cannot(campaign):
     ended = json.loads(campaign.places.ended(label).read_text())
     assert ended["origin"] == "machine"
     assert ended["message"].startswith(
-        f"{path} was begun on cuda:7 and goes on there only: device 'cuda:7': "
+        f"{path} was started on cuda:7 and continues only there: device 'cuda:7': "
     )
     (path / "provenance.json").write_text(json.dumps(about))
     assert work.carry_out(campaign.path, label, 1, device="cuda:7")  # begun on the CPU

@@ -150,7 +150,7 @@ def test_a_changed_run_fails_and_the_others_go_on(campaign: Campaign) -> None:
 def test_a_coordinator_stops_in_time(tmp_path: Path) -> None:
     campaign = tiny_campaign(tmp_path)
     began = time.monotonic()
-    with pytest.raises(Stopped, match="time is over"):
+    with pytest.raises(Stopped, match="time limit reached"):
         campaign.carry_on(Serial(1), time_limit=1e-6)
     assert time.monotonic() - began < 30
     states = [one.state for one in campaign.standings().values()]

@@ -139,7 +139,7 @@ def test_a_run_that_was_finished_and_is_to_go_on_is_not_passed_over(tmp_path):
 @pytest.mark.parametrize(
     ("labels", "asked", "says"),
     [
-        ([], {}, "no run left"),
+        ([], {}, "no unfinished run"),
         (["a"], {"hours": 0.05}, "--hours 0.05: must be from 0.1 .a worker has 180 s to leave. to"),
         (["a"], {"hours": float("inf")}, "--hours inf: must be from 0.1 "),
         (["a"], {"hours": float("nan")}, "--hours nan: must be from 0.1 "),

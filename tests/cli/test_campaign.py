@@ -138,7 +138,7 @@ def test_a_time_limit_ends_with_0_and_says_how_to_go_on(conevo, tmp_path):
         "campaign", "start", "a.toml", "--executor", "serial", "--time-limit", "0.001s"
     )
     assert code == 0
-    assert "time is over with 1 pending; go on with: conevo campaign start campaigns/a" in err
+    assert "time limit reached with 1 pending; continue with: conevo campaign start camp" in err
     for wrong in ("soon", "0", "-1m", "5w"):
         code, _, err = conevo("campaign", "start", "a", "--time-limit", wrong)
         assert (code, "expected a time above 0" in err) == (2, True)
@@ -219,7 +219,7 @@ def test_an_interrupted_campaign_says_how_to_go_on(conevo, tmp_path, monkeypatch
     monkeypatch.setattr(Serial, "submit", interrupt)
     code, _, err = conevo("campaign", "start", "tiny", "--executor", "serial")
     assert code == 130
-    assert "interrupted with 4 pending; go on with: conevo campaign start campaigns/tiny" in err
+    assert "interrupted with 4 pending; continue with: conevo campaign start campaigns/tiny" in err
 
 
 def test_a_job_array_has_the_runs_that_are_not_finished(conevo, tmp_path):
@@ -232,7 +232,7 @@ def test_a_job_array_has_the_runs_that_are_not_finished(conevo, tmp_path):
     assert "--array=0-3%2" in script
     conevo("campaign", "start", "tiny", "--executor", "serial", "--quiet")
     code, _, err = conevo("campaign", "slurm", "tiny")
-    assert (code, "no run left" in err) == (2, True)
+    assert (code, "no unfinished run" in err) == (2, True)
 
 
 def test_status_shows_runs_that_slurm_tasks_or_a_resume_carry_out(conevo, tmp_path):

@@ -300,7 +300,7 @@ def test_a_run_begins_with_what_another_one_ended_with(say) -> None:
     assert say(*tiny("--out", "first", "--quiet")).code == 0
     same = ("--config", "first/config.toml", "--threads", "1", "--quiet")
     for option, words in (
-        ("--from", "Begun with the populations of first, generation 5"),
+        ("--from", "Started from the populations of first, generation 5"),
         ("--from-champion", "Bred from the champion of first, generation"),
     ):
         said = say("run", "rover/complex-2", *same, option, "first", "--out", option[2:])

@@ -102,7 +102,7 @@ def test_test_takes_that_team_to_the_environment_of_every_stage(say) -> None:
     assert [row[:2] for row in rows] == [[str(k), f"rover-v1/complex-{k}"] for k in (1, 2, 3)]
     said = say("test", "here/stage-1", "--stages")
     assert (said.code, said.err) == (
-        2, "conevo: error: here/stage-1 is a run, and only a shaping has stages\n",
+        2, "conevo: error: here/stage-1 is a run; only a shaping has stages\n",
     )  # fmt: skip
 
 
@@ -217,8 +217,8 @@ BAD = [
     (["run", "--shape"], "which world"),
     (["run", "rover/complex-2", "--shape", "--set", "run.epochs=0"], "run.epochs = 0 on the comm"),
     (["run", "rover/complex-2", "--shape", "--budget-evaluations", "5"], "does not pay for one"),
-    (["run", "rover/complex-2", "--prey", "random"], "rover-v1 has no prey to be chosen"),
-    (["run", "prey/shaping-2", "--prey", "random"], "prey-v1 has no prey to be chosen"),
+    (["run", "rover/complex-2", "--prey", "random"], "rover-v1 has no prey to choose"),
+    (["run", "prey/shaping-2", "--prey", "random"], "prey-v1 has no prey to choose"),
     (["run", "pursuit/team-2", "--prey", "randon"], "did you mean 'random'"),
     (["run", "pursuit/team-2", "--prey", "none.npz"], "cannot read none.npz: No such file"),
     (["shape-prey", "pursuit/team-2"], "unexpected extra argument"),

@@ -64,7 +64,7 @@ def test_details_have_every_generation(tmp_path):
         "hi": [0, 0, 3],
     }
     assert found["status"] == "interrupted"
-    with pytest.raises(UsageError, match="no run is called 'other' here"):
+    with pytest.raises(UsageError, match="there is no run 'other' here"):
         watched.details("other")
 
 
@@ -364,7 +364,7 @@ def test_a_run_that_was_named_and_goes_away_is_one_line(tmp_path):
 
 
 def test_what_holds_nothing_is_refused(tmp_path):
-    with pytest.raises(UsageError, match="holds no run, no shaping and no campaign"):
+    with pytest.raises(UsageError, match="is not a run, a shaping or a campaign"):
         Watched([tmp_path])
 
 

@@ -203,7 +203,7 @@ def test_a_request_has_one_host(server, lines):
 def test_requests_of_other_sites_are_refused(server):
     for site in ("cross-site", "same-site"):
         status, _, body = ask(server, "/replay/run", Sec_Fetch_Site=site, Sec_Fetch_Dest="image")
-        assert (status, body) == (403, "requests of other sites are refused\n")
+        assert (status, body) == (403, "requests from other sites are refused\n")
         assert ask(server, "/", Sec_Fetch_Site=site, Sec_Fetch_Dest="document")[0] == 200
     assert (
         ask(server, "/state.json", Sec_Fetch_Site="same-origin", Sec_Fetch_Dest="empty")[0] == 200

@@ -84,7 +84,7 @@ def test_a_log_that_says_otherwise_is_noticed(folder):
     lines = log.read_text().splitlines()
     lines[0] = lines[0].replace('"team_fitness": ', '"team_fitness": 1')
     log.write_text("\n".join(lines) + "\n")
-    with pytest.raises(UsageError, match="does not come out again"):
+    with pytest.raises(UsageError, match="evolves differently from its log"):
         record(changed, generation=lost, threads=1)
 
 

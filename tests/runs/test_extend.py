@@ -211,7 +211,7 @@ def test_a_run_of_conevo_0_1_0_keeps_its_length(run: conevo.Run) -> None:
     about = json.loads(file.read_text())
     del about["stem_id"]
     file.write_text(json.dumps(about))
-    with pytest.raises(UsageError, match="could not give a run another length"):
+    with pytest.raises(UsageError, match="whose runs cannot be extended"):
         run.resume(generations=9)
 
 

@@ -200,7 +200,7 @@ def test_a_check_that_does_not_go_on_is_ended(
     monkeypatch.setattr(checking, "MOST_SECONDS", 0.1)
     code, out = run(capsys, str(written(tmp_path / "light.py")), "--json")
     assert code == 2
-    assert json.loads(out)[-1]["text"] == "nothing ends any more: a loop may run for ever"
+    assert json.loads(out)[-1]["text"] == "the check did not end: a loop may run forever"
 
 
 def test_a_sound_world_has_no_problem_and_a_wrong_name_is_one_line(

@@ -353,7 +353,7 @@ class Campaign:
             if self.places.stop.is_file():
                 raise Stopped("stopped")
             if limit.is_over and (waiting or at_work):
-                raise Stopped("time is over")
+                raise Stopped("time limit reached")
             if (began := time.monotonic()) >= next_seal:
                 self.seal()
                 ended = time.monotonic()

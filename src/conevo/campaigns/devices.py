@@ -31,7 +31,7 @@ def parse_devices(text: str) -> tuple[str, ...]:
                 f"cuda:0, or several as cuda:0,cuda:1"
             )
     if len(set(devices)) < len(devices):
-        raise UsageError(f"--device {shown(text)}: a device is there twice")
+        raise UsageError(f"--device {shown(text)}: a device is listed twice")
     if len(devices) > 1 and not all(":" in device for device in devices):
         raise UsageError(f"--device {shown(text)}: several devices are written cuda:0,cuda:1")
     return devices

@@ -168,7 +168,7 @@ def _seeds(value: Any, place: str) -> tuple[int, ...]:
     if not is_list or any(type(seed) is not int or not 0 <= seed < 2**63 for seed in value):
         raise UsageError(
             f"campaign.seeds = {shown(value)} {place}: must be a number from 1 to {MOST_SEEDS:,}, "
-            f"or a list of as many seeds"
+            f"or a list of at most that many seeds"
         )
     return tuple(value)
 

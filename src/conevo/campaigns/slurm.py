@@ -110,7 +110,7 @@ def write_array(
         EnvironmentFailure: the file cannot be written.
     """
     if not labels:
-        raise UsageError(f"{root} has no run left to carry out")
+        raise UsageError(f"{root} has no unfinished run")
     check_request(hours, options, device)
     root = root.resolve()
     path = root / "slurm.sh"

@@ -55,7 +55,7 @@ def planned_runs(root: Path) -> dict[str, PlannedRun]:
         for line in read_json_lines(path, PlannedLine)
     ]
     if not runs:
-        raise UsageError(f"{path} is damaged: it lists no run")
+        raise UsageError(f"{path} is damaged: it lists no runs")
     return {run.label: run.mapped(lambda value: located(value, root)) for run in runs}
 
 
@@ -88,7 +88,7 @@ def carry_out(
         places = Places(root)
         planned = planned_runs(root)
         if label not in planned:
-            raise UsageError(f"{root} plans no run {label!r}")
+            raise UsageError(f"{root} has no run {label!r} in its plan")
         admit_code(places, planned)
         found = _evolve(places, planned[label], threads, device, limit or TimeLimit(None))
         if found.status != "finished":
@@ -96,7 +96,7 @@ def carry_out(
         if planned[label].studies:
             _study(places, planned[label], found, threads)
     except _InUse:
-        sys.stderr.write(f"{label} is in use by another worker, and left to it\n")
+        sys.stderr.write(f"{label} is in use by another worker, which will finish it\n")
         return False  # whoever has it writes how it ended
     except Exception as error:
         ending = {"status": "failed", **_describe(error)}

@@ -13,19 +13,32 @@ __all__ = ["behaviours"]
 @click.command(short_help="Classify predators: pursuer, blocker, flanker, knocker, idle.")
 @click.argument("run")
 @click.option(
-    "--scenarios", type=click.IntRange(1, 10_000), default=20, show_default=True, help="How many."
+    "--scenarios",
+    type=click.IntRange(1, 10_000),
+    default=20,
+    show_default=True,
+    help="Number of scenarios.",
 )
 @click.option(
-    "--seed", type=click.IntRange(0, 2**63 - 1), help="Draw other scenarios (default: the run's)."
+    "--seed",
+    type=click.IntRange(0, 2**63 - 1),
+    help="Seed of other scenarios (default: those of the run's own test).",
 )
 @click.option(
-    "--threads", type=click.IntRange(1, 4096), help="CPU threads (default all); changes no result."
+    "--threads",
+    type=click.IntRange(1, 4096),
+    help="CPU threads (default: all); does not change results.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def behaviours(
     run: str, scenarios: int, seed: int | None, threads: int | None, as_json: bool
 ) -> None:
-    """Watch the fittest team of RUN, a run of pursuit, in fresh scenarios; writes nothing."""
+    """Classify what the fittest team of RUN does in fresh scenarios; nothing is written.
+
+    RUN must be a run of the pursuit world.
+
+    Try: conevo behaviours runs/hunt
+    """
     from conevo.analysis.behaviour_report import behaviour_report
     from conevo.cli.find import find_run
 

@@ -24,31 +24,33 @@ EXECUTION = (
         "--executor", default="processes", show_default=True, metavar="NAME",
         help="processes, serial or ray.",
     ),
-    click.option("--cores", type=click.IntRange(1, 4096), help="CPU cores to use together (all)."),
+    click.option(
+        "--cores", type=click.IntRange(1, 4096), help="CPU cores for all runs (default: all)."
+    ),
     click.option(
         "--threads", type=click.IntRange(1, 4096), default=1, show_default=True,
-        help="CPU threads of a run; changes no result.",
+        help="CPU threads per run; does not change results.",
     ),
     click.option(
         "--device", metavar="DEVICES", default="cpu", show_default=True,
         help="cpu, cuda, or several that workers use in turn: cuda:0,cuda:1.",
     ),
-    click.option("--address", metavar="ADDRESS", help="With ray: of an existing cluster, or auto."),
+    click.option("--address", metavar="ADDRESS", help="With ray: address of a cluster, or auto."),
     click.option(
         "--store", metavar="URI",
-        help="With ray: object store for nodes that do not see the campaign's directory.",
+        help="With ray: object store, for nodes that do not see the campaign's directory.",
     ),
     time_limit_option,
-    click.option("--json", "as_json", is_flag=True, help="One JSON object per run that ends."),
+    click.option("--json", "as_json", is_flag=True, help="Print one JSON object per ended run."),
     click.option("--quiet", is_flag=True, help="Print only the campaign's directory."),
 )  # fmt: skip
 PLAN = (
     click.argument("name", metavar="NAME|FILE|DIR"),
     click.option("--preset", metavar="NAME", help="smoke, desk (default), night, thesis."),
-    click.option("--seeds", type=int, help="Runs of every cell (default: as the plan says)."),
+    click.option("--seeds", type=int, help="Runs per cell (default: the plan's)."),
     click.option(
         "--set", "settings", metavar="KEY=VALUE", multiple=True,
-        help="A setting of all runs, for example run.budget_evaluations=5000.",
+        help="Setting of all runs, for example run.budget_evaluations=5000; may be repeated.",
     ),
     click.option("--out", metavar="DIR", help="Output directory (default: campaigns/NAME)."),
 )  # fmt: skip
@@ -68,18 +70,18 @@ def execution_options(function: Function) -> Function:
     return function
 
 
-@click.group("campaign", short_help="Start, watch, stop and retry plans of many runs.")
+@click.group("campaign", short_help="Start, monitor, stop and retry campaigns of many runs.")
 def campaign() -> None:
-    """Plans of many runs: methods x environments x seeds, resumable.
+    """Campaigns of many runs: methods x environments x seeds, resumable.
 
     Try: conevo campaign start rover-complex --preset smoke --seeds 2
     """
 
 
-@campaign.command("list", short_help="The thesis' experiments, and the campaigns here.")
+@campaign.command("list", short_help="List the thesis' experiments and your campaigns.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON value.")
 def list_(as_json: bool) -> None:
-    """List the experiments that come with conevo, and the campaigns in campaigns/."""
+    """List the experiments that come with conevo and the campaigns in campaigns/."""
     from conevo.cli.campaign_text import campaigns_here, experiments, print_lists
 
     found = {"experiments": experiments(), "campaigns": campaigns_here()}
@@ -104,12 +106,13 @@ def start(
     accept_other_code: bool,
     **execution: Any,
 ) -> int:
-    """Carry out NAME (see: conevo campaign list), a plan in a TOML FILE, or go on in DIR.
+    """Start NAME (see: conevo campaign list) or the plan in a TOML FILE, or continue in DIR.
 
-    Starting it again finishes only what is missing. More seeds or levels add runs, more generations
-    or a larger budget extend those that are there: conevo campaign start DIR
-    --set run.budget_evaluations=50000. Ctrl-C and conevo campaign stop leave runs that go on where
-    they were.
+    Starting a campaign again finishes only what is missing; interrupted runs continue from their
+    checkpoints. More seeds or levels add runs; more generations or a larger budget extend existing
+    runs: conevo campaign start DIR --set run.budget_evaluations=50000
+
+    Try: conevo campaign start rover-complex --preset smoke --seeds 2
     """
     from conevo.campaigns.campaign import Campaign, check, create
     from conevo.cli.campaign_run import carry_on, ready
@@ -130,14 +133,16 @@ def start(
 @plan_options
 @click.option(
     "--threads", type=click.IntRange(1, 4096), default=1, show_default=True,
-    help="CPU threads of a run; changes no result.",
+    help="CPU threads per run; does not change results.",
 )  # fmt: skip
 @click.option(
     "--hours", type=float, default=24.0, show_default=True,
     help="Time limit per task; unfinished runs are requeued.",
 )  # fmt: skip
 @click.option(
-    "--at-once", type=click.IntRange(1, 100_000), help="Tasks running together (default: any)."
+    "--at-once",
+    type=click.IntRange(1, 100_000),
+    help="Maximum number of concurrent tasks (default: no limit).",
 )
 @click.option("--partition", metavar="NAME", help="SLURM partition.")
 @click.option("--account", metavar="NAME", help="SLURM account.")
@@ -146,7 +151,7 @@ def start(
 @click.option("--device", default="cpu", show_default=True, help="cpu or cuda; see --gres.")
 @click.option(
     "--sbatch", "others", metavar="OPTION", multiple=True,
-    help="Another option of sbatch, for example --sbatch=--constraint=avx512.",
+    help="Another sbatch option, for example --sbatch=--constraint=avx512; may be repeated.",
 )  # fmt: skip
 @accept_option
 def slurm(
@@ -163,10 +168,12 @@ def slurm(
     accept_other_code: bool,
     **named: str | None,
 ) -> None:
-    """Write a script that carries out all runs that are not finished; submit it with sbatch.
+    """Write a job script for all unfinished runs; submit it with sbatch.
 
-    All nodes must see the campaign's directory. conevo campaign status shows how far it is, and
+    All nodes must see the campaign's directory. conevo campaign status shows its progress, and
     conevo campaign start finishes what is missing.
+
+    Try: conevo campaign slurm rover-complex --preset night --hours 12
     """
     from conevo.campaigns.campaign import Campaign, create
     from conevo.campaigns.slurm import check_request, write_array
@@ -194,12 +201,14 @@ def slurm(
 
 @campaign.command(short_help="Show a campaign's progress.")
 @click.argument("name", metavar="NAME")
-@click.option("--runs", is_flag=True, help="A line for every run.")
+@click.option("--runs", is_flag=True, help="Print a line for every run.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON value.")
 def status(name: str, runs: bool, as_json: bool) -> int:
-    """Print how many runs of every cell are finished, and what failed and why; ends with 1 if any.
+    """Print how many runs of each cell are finished, and which failed and why.
 
-    It only reads, also while the campaign runs.
+    It writes nothing and can be used while the campaign runs. The exit code is 1 if a run failed.
+
+    Try: conevo campaign status rover-complex --runs
     """
     from conevo.cli.campaign_text import print_status
     from conevo.cli.find import find_campaign
@@ -210,20 +219,23 @@ def status(name: str, runs: bool, as_json: bool) -> int:
 @campaign.command(short_help="Stop a running campaign.")
 @click.argument("name", metavar="NAME")
 def stop(name: str) -> None:
-    """Ask the campaign's coordinator, on whatever machine, to stop; runs keep all they have."""
+    """Ask the campaign's coordinator, on whatever machine, to stop.
+
+    Runs write a checkpoint first, so nothing is lost; conevo campaign start continues them.
+    """
     from conevo.cli.find import find_campaign
 
     found = find_campaign(name)
     found.stop()
-    click.echo(f"asked {found.path} to stop; go on with: conevo campaign start {found.path}")
+    click.echo(f"asked {found.path} to stop; continue with: conevo campaign start {found.path}")
 
 
-@campaign.command(short_help="Try the failed runs again.")
+@campaign.command(short_help="Retry the failed runs.")
 @click.argument("name", metavar="NAME")
 @accept_option
 @execution_options
 def retry(name: str, accept_other_code: bool, **execution: Any) -> int:
-    """Try the failed runs of a campaign again, and finish what is missing."""
+    """Retry the failed runs of a campaign and finish what is missing."""
     from conevo.cli.campaign_run import carry_on, ready
     from conevo.cli.find import find_campaign
 
@@ -249,7 +261,7 @@ def _planned(
     there = campaign_at(name)
     if there is not None and out is not None and Path(out).resolve() != there.path.resolve():
         if name not in preset_names():
-            raise UsageError(f"--out {out}: the campaign {there.path} goes on where it is")
+            raise UsageError(f"--out {out}: the campaign {there.path} continues where it is")
         there = None
     wanted = preset is not None or seeds is not None or bool(settings)
     if there is not None and not wanted:

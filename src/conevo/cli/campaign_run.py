@@ -82,7 +82,7 @@ def carry_on(campaign: Campaign, execution: Execution) -> int:
             drop_output()
         word = str(error) if isinstance(error, Stopped) else "interrupted"
         done = counts(campaign.standings())
-        click.echo(f"{word} with {done}; go on with: {advice}", err=True)
+        click.echo(f"{word} with {done}; continue with: {advice}", err=True)
         sys.exit(0 if isinstance(error, Stopped) else 130)
     except EnvironmentFailure as error:
         raise EnvironmentFailure(f"{error}; once fixed: {advice}") from error
@@ -146,7 +146,7 @@ class View:
         """Return how many runs are finished, and the time left."""
         found = self.progress(entries)
         left = found["seconds_left"]
-        rest = "time left not known yet" if left is None else f"about {duration(left)} left"
+        rest = "time left unknown" if left is None else f"about {duration(left)} left"
         return f"{found['finished']} of {found['of']} finished, {rest}"
 
     def render(self, entries: dict[str, Entry]) -> Any:
@@ -179,9 +179,9 @@ class View:
         for entry in [entry for entry in entries.values() if entry.state == "failed"]:
             click.echo(f"  failed {entry.label}: {entry.reason}")
         if any(entry.state == "failed" for entry in entries.values()):
-            click.echo(f"try them again:  conevo campaign retry {path}")
-        click.echo(f"look at it:      conevo report {path}")
+            click.echo(f"retry them:       conevo campaign retry {path}")
+        click.echo(f"write a report:   conevo report {path}")
         click.echo(
-            f"ask anything:    conevo query {path} "
+            f"query its tables: conevo query {path} "
             '"SELECT task, method, count(*) FROM runs GROUP BY ALL"'
         )

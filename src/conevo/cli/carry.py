@@ -31,9 +31,9 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 def output_options(function: Function) -> Function:
     """Add --json, --quiet and --verbose to a command."""
     for option in (
-        click.option("--verbose", is_flag=True, help="One plain line for every generation."),
+        click.option("--verbose", is_flag=True, help="Print one plain line per generation."),
         click.option("--quiet", is_flag=True, help="Print only the run's directory."),
-        click.option("--json", "as_json", is_flag=True, help="One JSON object per generation."),
+        click.option("--json", "as_json", is_flag=True, help="Print one JSON line per generation."),
     ):
         function = option(function)
     return function
@@ -44,7 +44,7 @@ def accept_option(function: Function) -> Function:
     return click.option(
         "--accept-other-code",
         is_flag=True,
-        help="Continue results of another version of conevo; show and reports name it.",
+        help="Continue results of another version of conevo; show and reports list both.",
     )(function)
 
 
@@ -72,7 +72,7 @@ def time_limit_option(function: Function) -> Function:
 
     return click.option(
         "--time-limit", "limit", metavar="TIME", callback=begin,
-        help="Stop cleanly after 90s, 10m, 1.5h or 2d, with exit code 0; then resume.",
+        help="Stop cleanly after a time such as 90s, 10m, 1.5h or 2d, with exit code 0.",
     )(function)  # fmt: skip
 
 
@@ -121,7 +121,7 @@ def carry_on(
         found.refuse_finished()
     elif not isinstance(found, Run):
         raise UsageError(
-            f"{found.path} is a shaping, whose stages keep their length; begin a run with the "
+            f"{found.path} is a shaping, whose stages keep their length; start a run from the "
             f"populations of its last stage: conevo run WORLD/ENVIRONMENT --from {found.path}"
         )
     if not accept_other_code:
@@ -140,7 +140,7 @@ def carry_on(
     except EnvironmentFailure as error:
         raise EnvironmentFailure(f"{error}; once fixed: {advice}") from error
     if found.status != "finished":
-        click.echo(f"time is over after {_done(found)}; continue with: {advice}", err=True)
+        click.echo(f"time limit reached after {_done(found)}; continue with: {advice}", err=True)
     if isinstance(found, Run):
         print_end(found, style)
     else:

@@ -16,12 +16,12 @@ __all__ = ["check"]
 def check(world: str, as_json: bool) -> int:
     """Check the world in FILE.py, or one of the package, and print a line for each thing checked.
 
-    Parameters and their bounds, phases, fields, scenarios; array indices, in a process of its own;
-    sensors, outputs, counts; that robots visited in another order give the same bits; that record
-    equals evaluate; what random teams reach. Without an environment the first one is checked. The
-    exit code is 2 if there is a problem.
+    It checks parameters and their bounds, phases, fields, scenarios, sensors, outputs and counts;
+    array indices, in a process of its own; whether robots visited in another order give the same
+    bits; whether record equals evaluate; and the scores of random teams. Without an environment the
+    first one is checked. The exit code is 2 if there is a problem.
 
-    conevo check examples/light.py
+    Try: conevo check examples/light.py
     """
     from conevo.worlds.checking import check as findings
 

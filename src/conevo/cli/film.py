@@ -18,12 +18,12 @@ __all__ = ["film"]
 @epoch_options
 @click.option("--gif", is_flag=True, help="A GIF, for pages and slides.")
 @click.option("--mp4", is_flag=True, help="An MP4 (ffmpeg, or: pip install 'conevo[video]').")
-@click.option("--out", metavar="FILE", help="The film (default: a new one in replays/).")
+@click.option("--out", metavar="FILE", help="Output file (default: a new one in replays/).")
 @click.option(
     "--every", type=click.IntRange(1, 2**31 - 1), metavar="N", help="Iterations between two frames."
 )
 @click.option("--fps", type=click.IntRange(1, 100), help="Frames per second.")
-@click.option("--size", type=click.IntRange(200, 2160), help="Height and width of a world, pixels.")
+@click.option("--size", type=click.IntRange(200, 2160), help="Side of a drawn world in pixels.")
 @click.option(
     "--from", "first", type=click.IntRange(0, 2**31 - 1), metavar="T", help="First iteration."
 )
@@ -34,10 +34,10 @@ __all__ = ["film"]
     "--poster",
     type=click.IntRange(0, 2**31 - 1),
     metavar="T",
-    help="No film, but a picture (PNG) of iteration T.",
+    help="A picture (PNG) of iteration T instead of a film.",
 )
 @click.option("--colour", type=click.Choice(["action", "caste"]), default="action",
-              show_default=True, help="What a robot's colour says.")  # fmt: skip
+              show_default=True, help="Meaning of a robot's colour.")  # fmt: skip
 def film(
     what: str,
     gif: bool,
@@ -52,10 +52,12 @@ def film(
     colour: str,
     **which: Any,
 ) -> None:
-    """Record an epoch of RUN's fittest team (or take one that is kept, FILE) and make a film of it.
+    """Make a film of an epoch of RUN's fittest team, or of an epoch saved in FILE.
 
-    An MP4 if ffmpeg is there, else a GIF, unless an option names another format. Existing films are
-    never overwritten.
+    It is an MP4 if ffmpeg is installed, else a GIF, unless an option selects another format.
+    Existing films are never overwritten.
+
+    Try: conevo film runs/first --gif
     """
     from conevo.cli.seeing import REPLAYS, bar, name_of, stages, trajectories
     from conevo.replay.film import SIZES, choose_format, frames_of, write_film, write_poster

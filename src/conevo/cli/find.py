@@ -89,7 +89,7 @@ def find_shaping(text: str) -> Shaping:
     """
     found = find(text)
     if isinstance(found, Run):
-        raise UsageError(f"{found.path} is a run, and only a shaping has stages")
+        raise UsageError(f"{found.path} is a run; only a shaping has stages")
     return found
 
 

@@ -24,8 +24,8 @@ Rows = list[dict[str, str]]
 @click.command("list", short_help="List worlds, methods, presets, settings or runs.")
 @click.argument("what", type=click.Choice(["worlds", "methods", "presets", "settings", "runs"]))
 @click.argument("subject", metavar="[WORLD/ENVIRONMENT | FOLDER]", required=False)
-@click.option("--method", metavar="NAME", help="Whose settings, or sizes in presets (cone).")
-@click.option("--preset", metavar="NAME", help="Under which preset settings are listed (desk).")
+@click.option("--method", metavar="NAME", help="Method of the settings or presets (default: cone).")
+@click.option("--preset", metavar="NAME", help="Preset of the settings (default: desk).")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON array.")
 def listing(
     what: str, subject: str | None, method: str | None, preset: str | None, as_json: bool
@@ -33,8 +33,8 @@ def listing(
     """List worlds with their environments, methods, presets, settings, or runs.
 
     settings WORLD/ENVIRONMENT: every setting of a run there, with its value under the preset, its
-    default, unit, allowed values and meaning. presets [WORLD/ENVIRONMENT]: how much each preset
-    evolves there (default: rover/complex-1). runs [FOLDER]: the runs in FOLDER (default: runs/).
+    default, unit, allowed values and meaning. presets [WORLD/ENVIRONMENT]: the size of a run there
+    with each preset (default: rover/complex-1). runs [FOLDER]: the runs in FOLDER (default: runs/).
 
     Try: conevo list settings rover/complex-1 --method cone
     """
@@ -60,7 +60,7 @@ def listing(
     elif rows:
         click.echo(table(list(rows[0]), [list(row.values()) for row in rows]))
     else:
-        click.echo(f"no runs in {subject or 'runs'}/; begin with: conevo run rover/complex-1")
+        click.echo(f"no runs in {subject or 'runs'}/; try: conevo run rover/complex-1")
 
 
 def _worlds() -> Rows:

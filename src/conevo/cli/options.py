@@ -30,7 +30,7 @@ OPTIONS = (
         "--preset", metavar="NAME", help="smoke (seconds), desk (minutes, default), night, thesis."
     ),
     click.option("--seed", type=int,
-        help="Root of all randomness (default 1)."),
+        help="Root of all randomness (default: 1)."),
     click.option(
         "--set", "settings", metavar="KEY=VALUE", multiple=True,
         help="One setting, for example run.generations=5; may be repeated.",
@@ -44,7 +44,7 @@ OPTIONS = (
     ),
     click.option(
         "--threads", type=click.IntRange(1, 4096),
-        help="CPU threads (default all); changes no result."
+        help="CPU threads (default: all); does not change results."
     ),
     click.option("--device", default="cpu", show_default=True, help="cpu or cuda."),
     click.option("--out", metavar="DIR", help="Output directory (default: a new one under runs/)."),

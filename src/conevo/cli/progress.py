@@ -146,9 +146,7 @@ class Display:
         bar = Table.grid()  # a bar by itself does not end its line
         bar.add_row(ProgressBar(total=1.0, completed=self.pace.done(done - 1), width=60))
         grid = Table.grid(padding=(0, 2))
-        for label, text in (
-            self._rows() if self.records else [("", "the first generation is under way")]
-        ):
+        for label, text in self._rows() if self.records else [("", "running the first generation")]:
             grid.add_row(f"[bold]{label}[/bold]", text)
         return Group(
             f"[bold]{self.heading}[/bold]\n{self.run.path}",

@@ -17,7 +17,7 @@ __all__ = ["query"]
 @click.option("--csv", "as_csv", is_flag=True, help="Print comma-separated values.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object per row.")
 def query(arguments: tuple[str, ...], as_csv: bool, as_json: bool) -> None:
-    """Print the answer to SQL over the finished runs of CAMPAIGN (the only one here by default).
+    """Query the finished runs of CAMPAIGN (default: the only one in campaigns/) with SQL.
 
     Tables: runs, measures, scores, champions, generations, castes, robots, actions, metrics,
     behaviours; "DESCRIBE runs" lists the columns of one. A query cannot change anything.

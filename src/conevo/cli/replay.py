@@ -16,14 +16,16 @@ __all__ = ["replay"]
 @click.command(short_help="See a run's fittest team in the browser.")
 @click.argument("what", metavar="RUN|FILE")
 @epoch_options
-@click.option("--out", metavar="FILE", help="The page (default: a new one in replays/).")
-@click.option("--keep", metavar="FILE", help="Keep the recorded epoch too (.npz).")
-@click.option("--no-browser", is_flag=True, help="Do not open it, only print where it is.")
+@click.option("--out", metavar="FILE", help="Output file (default: a new one in replays/).")
+@click.option("--keep", metavar="FILE", help="Also save the recorded epoch (.npz).")
+@click.option("--no-browser", is_flag=True, help="Print the page's path; do not open it.")
 def replay(what: str, out: str | None, keep: str | None, no_browser: bool, **which: Any) -> None:
     """Record an epoch of RUN's fittest team and show it in the browser.
 
-    RUN may be finished or running; FILE is an epoch that --keep has kept. The page is one file that
-    needs no network. It is never written over another one.
+    RUN may be finished or running; FILE is an epoch saved with --keep. The page is one file that
+    needs no network. Existing files are never overwritten.
+
+    Try: conevo replay runs/first
     """
     from conevo.cli.seeing import REPLAYS, name_of, stages, trajectories
     from conevo.replay.page import replay_page

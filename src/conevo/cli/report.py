@@ -1,4 +1,4 @@
-"""``conevo report``: everything that a campaign says, as pages, tables, figures and numbers."""
+"""``conevo report``: a campaign as pages, tables, figures and numbers."""
 
 from __future__ import annotations
 
@@ -11,12 +11,14 @@ __all__ = ["report"]
 
 @click.command(short_help="Write a campaign's report: page, tables, figures, data.")
 @click.argument("name", metavar="CAMPAIGN")
-@click.option("--out", metavar="DIR", help="Where (default: report/ in the campaign).")
+@click.option("--out", metavar="DIR", help="Output directory (default: report/ in the campaign).")
 def report(name: str, out: str | None) -> None:
     """Write a self-contained page, LaTeX tables, PDF and SVG figures, and their numbers as CSV.
 
-    It is made of all runs that are finished, and says what is missing. A report that was changed
-    by hand is not replaced.
+    It covers all finished runs and lists what is missing. A report that was edited by hand is not
+    replaced.
+
+    Try: conevo report rover-complex
     """
     from conevo.analysis.report import write_report
     from conevo.cli.find import find_campaign, sealed

@@ -26,16 +26,18 @@ __all__ = ["resume"]
 @click.option(
     "--generations",
     type=click.IntRange(1, 10_000_000),
-    help="New end of the run, in generations from its start.",
+    help="New length of the whole run, in generations.",
 )
 @click.option(
     "--budget-evaluations", type=click.IntRange(0, 2**63 - 1),
-    help="New budget from its start, in team evaluations; 0: no limit.",
+    help="New budget of the whole run, in team evaluations; 0: no limit.",
 )  # fmt: skip
 @click.option("--target", metavar="VALUE|none", help="New task performance at which the run ends.")
 @time_limit_option
 @click.option(
-    "--threads", type=click.IntRange(1, 4096), help="CPU threads (default all); changes no result."
+    "--threads",
+    type=click.IntRange(1, 4096),
+    help="CPU threads (default: all); does not change results.",
 )
 @accept_option
 @output_options
@@ -54,8 +56,8 @@ def resume(
     """Continue RUN (a directory, or the beginning of its name in runs/) from its last checkpoint.
 
     The result is the same, bit for bit, as that of a run that was never interrupted. With
-    --generations or --budget-evaluations a finished run continues, too, with the result of a run
-    that was planned that long.
+    --generations or --budget-evaluations a finished run is extended; its result is then that of a
+    run planned that long.
 
     Try: conevo resume runs/first --generations 100
     """

@@ -18,25 +18,21 @@ __all__ = ["run"]
 @setting_options
 @click.option(
     "--prey", metavar="NAME|FILE",
-    help="In the pursuit world: shaped (default), heuristic, random, or what shape-prey made.",
+    help="Prey of the pursuit world: shaped (default), heuristic, random, or a file of shape-prey.",
 )  # fmt: skip
 @click.option(
     "--shape", is_flag=True,
-    help="In stages: the environments of the same name from number 1 up to this one.",
+    help="Evolve in stages: the environments of its family from number 1 up to this one.",
 )  # fmt: skip
-@click.option(
-    "--from", "origin", metavar="RUN", help="Begin with the populations that RUN ended with."
-)
+@click.option("--from", "origin", metavar="RUN", help="Start from the final populations of RUN.")
 @click.option(
     "--from-champion", "champion", metavar="RUN",
-    help="Begin with populations bred from the champion of RUN.",
+    help="Start from populations bred from the champion of RUN.",
 )  # fmt: skip
-@click.option(
-    "--dry-run", is_flag=True, help="Print all settings and what they cost; start nothing."
-)
+@click.option("--dry-run", is_flag=True, help="Print all settings and their cost; start nothing.")
 @click.option(
     "--seeds", type=click.IntRange(1, 10_000), metavar="N",
-    help="A comparison: N runs of each method (--method cone,mesp), as a campaign on all cores.",
+    help="Compare: N runs of each method (--method cone,mesp), as a campaign on all cores.",
 )  # fmt: skip
 @output_options
 def run(
@@ -51,21 +47,21 @@ def run(
 ) -> int | None:
     """Evolve a team for WORLD/ENVIRONMENT (see: conevo list worlds) and test it.
 
-    Everything is written to one directory. After Ctrl-C, continue with conevo resume. With --shape
-    every stage is a run of its own, and all settings are those of each stage. With --seeds the runs
-    are a campaign in campaigns/: continue it with conevo campaign start, see it with conevo report.
+    Everything is written to one directory. After Ctrl-C, continue with conevo resume. With --shape,
+    every stage is a run of its own and all settings apply to each stage. With --seeds, the runs
+    form a campaign in campaigns/; conevo campaign start continues it and conevo report reports it.
 
-    Try: conevo run rover/complex-1 --preset smoke --method cone,homcne --seeds 3
+    Try: conevo run rover/complex-1 --method cone,homcne --seeds 3
     """
     if origin is not None and champion is not None:
         raise UsageError("--from and --from-champion are mutually exclusive")
     if (origin or champion) and (shape or seeds is not None):
-        raise UsageError("--from and --from-champion begin one run, without --shape and --seeds")
+        raise UsageError("--from and --from-champion start one run: leave out --shape and --seeds")
     order = Order(**options, comparing=seeds is not None)
     config = order.resolve(world)
     if prey is not None:
         if not hasattr(config.world_params, "prey"):
-            raise UsageError(f"--prey {prey!r}: {config.world} has no prey to be chosen")
+            raise UsageError(f"--prey {prey!r}: {config.world} has no prey to choose")
         order.take("world.prey", "--prey", prey)
         config = order.resolve(world)
     if seeds is not None:

@@ -27,19 +27,19 @@ OPTIONS = (
     ),
     click.option(
         "--generation", type=click.IntRange(0, 2**31 - 1), metavar="G",
-        help="Its fittest team (default: the champion).",
+        help="Show the fittest team of generation G (default: the champion).",
     ),
     click.option(
         "--beside-generation", type=click.IntRange(0, 2**31 - 1), metavar="G",
-        help="The same for the second team; RUN may be the same run.",
+        help="The same for the second team, which may be of the same run.",
     ),
     click.option(
         "--epoch", type=click.IntRange(0, 2**31 - 1), metavar="K",
-        help="Which of the scenarios of its testing phase, from 0 (default).",
+        help="Scenario of its testing phase, counted from 0 (default: 0).",
     ),
     click.option(
         "--threads", type=click.IntRange(1, 4096),
-        help="CPU threads (default all); changes no result."
+        help="CPU threads (default: all); does not change results."
     ),
 )  # fmt: skip
 

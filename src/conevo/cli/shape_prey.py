@@ -18,8 +18,10 @@ __all__ = ["shape_prey"]
 def shape_prey(**options: Any) -> None:
     """Run the six prey experiments in turn, each beginning with the populations of the one before.
 
-    Everything is written to one directory, the evolved prey in its prey.npz. Ctrl-C leaves what
-    conevo resume continues.
+    Everything is written to one directory; prey.npz there holds the evolved prey. After Ctrl-C,
+    continue with conevo resume.
+
+    Try: conevo shape-prey --preset smoke
     """
     from conevo.runs.evolved_prey import PREY_TASKS
 

@@ -16,14 +16,20 @@ __all__ = ["show"]
 @click.command(short_help="Print a finished or running run.")
 @click.argument("run")
 @click.option(
-    "--rows", type=click.IntRange(2, 1_000_000), default=12, show_default=True, help="Generations."
+    "--rows",
+    type=click.IntRange(2, 1_000_000),
+    default=12,
+    show_default=True,
+    help="Number of generations listed.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def show(run: str, rows: int, as_json: bool) -> None:
     """Print RUN: state, generations, castes, thresholds and testing phase.
 
-    Of a shaping: its stages, and its generations with the environment each has seen. A stage is a
-    run of its own: DIR/stage-1.
+    Of a shaping, it prints the stages, and the generations with the environment of each. A stage is
+    a run of its own: DIR/stage-1.
+
+    Try: conevo show runs/first --rows 20
     """
     from conevo.cli.find import find
     from conevo.cli.stages import shaping_text

@@ -137,8 +137,8 @@ def _next_commands(shaping: Shaping) -> list[str]:
     """Return the exact commands for what can be done now, each after a comment."""
     commands = {
         f"conevo show {shaping.path}": "its generations, stage by stage",
-        f"conevo replay {shaping.path}": "see the team of its last stage in the browser",
-        f"conevo test {shaping.path} --scenarios 100": "test the team of its last stage longer",
+        f"conevo replay {shaping.path}": "see its last team in the browser",
+        f"conevo test {shaping.path} --scenarios 100": "test its last team in more scenarios",
     }
     if len({run.champion.genes.shape for run in shaping.stages if run.champion}) == 1:
         every = f"conevo test {shaping.path} --stages"

@@ -75,14 +75,14 @@ def run_text(run: Run, n_rows: int) -> str:
     about = run.provenance
     parts = [title(run.outline), _state(run), *changes_text(sessions_of(about))]
     if changed := about.get("changed"):
-        parts.append(f"other than preset {run.outline.preset}: {', '.join(changed)}")
+        parts.append(f"changed from preset {run.outline.preset}: {', '.join(changed)}")
     if records:
         parts += [*exchange_text(records), *measures_text(about)]
         parts += ["", generations_table(spaced(records, n_rows))]
     if run.test_result:
         parts += ["", test_text(run.test_result)]
     if origin := run.provenance.get("origin"):
-        what = "Bred from the champion" if origin.get("of") else "Begun with the populations"
+        what = "Bred from the champion" if origin.get("of") else "Started from the populations"
         parts += ["", f"{what} of {origin['path']}, generation {origin['generation']}"]
     if lines := _former_ends(run):
         parts += ["", *lines]
@@ -219,7 +219,7 @@ def shrinkage_text(result: dict[str, Any]) -> str:
         for one in shrinkage(result)
     ]
     return (
-        f"The fittest team, of generation {about['chosen']}, is the best of "
+        f"The fittest team (generation {about['chosen']}) is the best of "
         f"{len(about['finalists'])} finalists in {about['scenarios']} validation scenarios\n"
         + table(["", "selection", "validation", "test", "test / selection"], rows)
     )
@@ -242,7 +242,7 @@ def next_commands(run: Run) -> list[str]:
     commands = {
         f"conevo show {run.path}": "its generations",
         f"conevo replay {run.path}": "see its team in the browser",
-        f"conevo test {run.path} --scenarios 100": "test its team longer",
+        f"conevo test {run.path} --scenarios 100": "test its team in more scenarios",
         f"conevo resume {run.path} --{_twice_as_long(run)}": "evolve it longer",
     }
     if "origin" not in run.provenance:  # which neither the file nor the options have
@@ -264,13 +264,13 @@ def _twice_as_long(run: Run) -> str:
 def _former_ends(run: Run) -> list[str]:
     """Return a line for each time the run was given another length."""
     return [
-        f"Given another length {former['at']}: it had {generations(former['generations'])}, "
+        f"Length changed {former['at']}: before, {generations(former['generations'])}, "
         + (
             f"finished {former['finished']} (stopped by: {former['stopped_by']})"
             if former["finished"]
             else "not finished"
         )
-        + f", as run {former['run_id']}"
+        + f", run {former['run_id']}"
         for former in run.provenance.get("extended", [])
     ]
 

@@ -11,31 +11,35 @@ from conevo.errors import UsageError
 __all__ = ["test"]
 
 
-@click.command(short_help="Re-execute a run's fittest team in fresh scenarios.")
+@click.command(short_help="Test a run's fittest team in fresh scenarios.")
 @click.argument("run")
 @click.option(
-    "--scenarios", type=click.IntRange(1, 10_000), help="How many (default: as the run's own test)."
+    "--scenarios",
+    type=click.IntRange(1, 10_000),
+    help="Number of scenarios (default: that of the run's own test).",
 )
 @click.option(
     "--seed",
     type=click.IntRange(0, 2**63 - 1),
-    help="Draw other scenarios than the run's own test.",
+    help="Seed of other scenarios (default: those of the run's own test).",
 )
 @click.option(
-    "--threads", type=click.IntRange(1, 4096), help="CPU threads (default all); changes no result."
+    "--threads",
+    type=click.IntRange(1, 4096),
+    help="CPU threads (default: all); does not change results.",
 )
-@click.option("--stages", is_flag=True, help="Of a shaping: in the environment of every stage.")
+@click.option("--stages", is_flag=True, help="For a shaping: test in every stage's environment.")
 @click.option(
     "--on", metavar="ENVIRONMENT",
-    help="Also in another environment: ENVIRONMENT of its world, or WORLD/ENVIRONMENT.",
+    help="Also test in another environment: ENVIRONMENT of its world, or WORLD/ENVIRONMENT.",
 )  # fmt: skip
 @click.option(
     "--set", "settings", metavar="world.KEY=VALUE", multiple=True,
-    help="Also with another setting of the world; may be repeated.",
+    help="Also test with this setting of the world; may be repeated.",
 )  # fmt: skip
 @click.option(
     "--robots", type=click.IntRange(1, 64),
-    help="Also in a team of N robots: the first N, or all of them repeated.",
+    help="Also test a team of N robots: the first N, or all of them repeated.",
 )  # fmt: skip
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON value.")
 def test(
@@ -49,11 +53,10 @@ def test(
     robots: int | None,
     as_json: bool,
 ) -> None:
-    """Re-execute the fittest team of RUN (finished or not) in fresh scenarios; writes nothing.
+    """Test the fittest team of RUN (finished or not) in fresh scenarios; nothing is written.
 
-    Of a shaping it is the team of the last stage that has one, in that stage's environment.
-    With --on, --set and --robots it is tested under changed conditions, too, and the difference is
-    printed.
+    Of a shaping, it tests the team of the last stage that has one, in that stage's environment.
+    With --on, --set or --robots it also tests under changed conditions and prints the difference.
 
     Try: conevo test runs/first --set world.iterations=500 --robots 10
     """
@@ -64,7 +67,7 @@ def test(
     is_changed = on is not None or bool(settings) or robots is not None
     if stages:
         if is_changed:
-            raise UsageError("--stages is of the stages' own conditions: no --on, --set, --robots")
+            raise UsageError("--stages and --on, --set or --robots are mutually exclusive")
         results = find_shaping(run).test(scenarios, seed, threads=threads)
         click.echo(json.dumps(results) if as_json else stages_test_text(results))
         return

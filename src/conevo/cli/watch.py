@@ -1,4 +1,4 @@
-"""``conevo watch``: a page that follows runs while they are at work."""
+"""``conevo watch``: a page that follows runs live."""
 
 from __future__ import annotations
 
@@ -24,18 +24,20 @@ __all__ = ["watch"]
     default=0,
     help="Port to serve on (default: any free port).",
 )
-@click.option("--no-browser", is_flag=True, help="Do not open it, only print its address.")
+@click.option("--no-browser", is_flag=True, help="Print the page's address; do not open it.")
 def watch(what: str | None, port: int, no_browser: bool) -> None:
     """Serve a page that follows RUN, CAMPAIGN, or everything in runs/ and campaigns/.
 
-    Only this machine can reach it. It reads files and writes none; end it with Ctrl-C.
+    Only this machine can reach it. It reads files and writes none; stop it with Ctrl-C.
+
+    Try: conevo watch runs/first
     """
     from conevo.replay.live.server import serve
 
     watched = _watched(what)
 
     def on_ready(address: str) -> None:
-        click.echo(f"{address}  (Ctrl-C ends it; the runs go on)")
+        click.echo(f"{address}  (Ctrl-C stops this page; runs continue)")
         if not no_browser:
             open_while_serving(address)
 

@@ -44,11 +44,11 @@ def hand_on(method: Method, layout: Layout, root: int, state: State) -> State:
         if old[axis] != new[axis]
     ]
     if state.fitness.ndim != fresh.fitness.ndim:
-        different.append("single neurons and whole networks are no genotypes of one kind")
+        different.append("genotypes that are neurons do not mix with whole networks")
     if different:
         raise UsageError(
-            f"these populations cannot be handed on: {'; '.join(different)}; sizes are the same "
-            f"with the settings of the run that they come from"
+            f"these populations cannot be handed on: {'; '.join(different)}; use the "
+            f"sizes in the settings of the run that they come from"
         )
     source = np.arange(new[0]) % old[0]
     active = state.active[source]

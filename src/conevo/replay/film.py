@@ -63,9 +63,9 @@ def choose_format(out: str | None, wanted: str = "") -> str:
     if out and ending != kind:
         raise UsageError(f"{out}: the name of a {kind.upper()} must end in .{kind}")
     if kind == "png" and not wanted:
-        raise UsageError(f"{out}: a picture is of one iteration, choose it with --poster T")
+        raise UsageError(f"{out}: a picture shows one iteration; choose it with --poster T")
     if kind not in ("gif", "mp4", "png"):
-        raise UsageError(f"{out}: a film's name ends in .gif or .mp4")
+        raise UsageError(f"{out}: a film's name must end in .gif or .mp4")
     if kind == "mp4" and not find_ffmpeg():
         raise UsageError(_NO_FFMPEG)
     return kind
@@ -291,7 +291,7 @@ def _running(command: list[str], said: IO[bytes]) -> Iterator[subprocess.Popen[b
 def _why(path: Path, said: str, draft: Path) -> str:
     """Return one line about why ffmpeg failed."""
     lines = [line.strip() for line in said.splitlines() if line.strip()]
-    reason = re.sub(r"^\[[^]]*\] ", "", lines[0]) if lines else "it said nothing"
+    reason = re.sub(r"^\[[^]]*\] ", "", lines[0]) if lines else "it gave no reason"
     reason = reason.replace(f"file:{draft.absolute()}", str(path)).replace(str(draft), str(path))
     return f"ffmpeg could not write {path}: {reason}"
 

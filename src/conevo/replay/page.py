@@ -33,7 +33,9 @@ def replay_page(stages: Sequence[Stage]) -> str:
         raise ValueError(f"a page shows one team or two, not {len(stages)}")
     lengths = sorted({stage.iterations for stage in stages})
     if len(lengths) > 1:
-        raise UsageError(f"epochs of {lengths[0]} and {lengths[1]} iterations: not side by side")
+        raise UsageError(
+            f"epochs of {lengths[0]} and {lengths[1]} iterations cannot be shown side by side"
+        )
     pool = Pool()
     teams = [pool.plain(stage) for stage in stages]
     about = {"format": FORMAT, "conevo": version("conevo"), "teams": teams}

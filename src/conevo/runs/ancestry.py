@@ -65,7 +65,7 @@ def refuse_other_controllers(origin: Run, world: World) -> None:
         if getattr(old, name) != getattr(new, name)
     ]
     if old.bias != new.bias:
-        different.append("a bias is in one of the two only")
+        different.append("only one of the two has a bias")
     if different:
         raise UsageError(
             f"the controllers of {origin.path} ({origin.config.task}) do not fit this world: "

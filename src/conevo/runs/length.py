@@ -88,8 +88,8 @@ def _check(path: Path, config: RunConfig, about: Record, records: Sequence[Recor
     settings = config.run
     if "stem_id" not in about and config.run_id != about["run_id"]:
         raise UsageError(
-            f"{path} was made by conevo {about['conevo']}, which could not give a run another "
-            f"length; begin another one with its populations: --from {path}"
+            f"{path} was made by conevo {about['conevo']}, whose runs cannot be "
+            f"extended; start another run from its populations: --from {path}"
         )
     if about.get("stem_id", config.stem_id) != config.stem_id:
         raise UsageError(f"{path} has other settings: it cannot be continued as this run")

@@ -493,7 +493,7 @@ class Run:
                 if device == "cpu":
                     raise
                 raise EnvironmentFailure(
-                    f"{self.path} was begun on {device} and goes on there only: {error}"
+                    f"{self.path} was started on {device} and continues only there: {error}"
                 ) from error
         if lab.rollout.kernel_hash != about["kernel_hash"]:
             raise UsageError(

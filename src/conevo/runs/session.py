@@ -152,8 +152,8 @@ def evolve_again(
     def keep(state: State, record: Record) -> None:
         if record["team_fitness"] != records[record["generation"]]["team_fitness"]:
             raise UsageError(
-                f"{store.path}: generation {record['generation']} does not come out again as its "
-                f"log says, so the team of generation {generation} is lost"
+                f"{store.path}: generation {record['generation']} evolves differently from its "
+                f"log, so the team of generation {generation} is lost"
             )
         teams[:] = [fittest_team(state, record["generation"])]
         if progress is not None:

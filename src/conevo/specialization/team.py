@@ -68,7 +68,7 @@ METRICS: dict[str, Metric] = {
     "specialized": Metric(
         lambda team: float(np.mean([name != NON_SPECIALIZED for name in team.labels])),
         "0 to 1",
-        "portion of the robots that are specialized to something",
+        "portion of the robots that are specialized",
         "Nitschke 2009, 3.2.3",
     ),
     "switching_index": Metric(
@@ -92,7 +92,7 @@ METRICS: dict[str, Metric] = {
     "mutual_information": Metric(
         lambda team: mutual_information(team.counts),
         "0 to log2 min(R, A) bits",
-        "what the robot tells about its actions; 0: all divide their work alike",
+        "between robots and actions; 0: all divide their work alike",
         "Gorelick et al. 2004",
     ),
     "division_by_action": Metric(
@@ -110,7 +110,7 @@ METRICS: dict[str, Metric] = {
     "hierarchic_social_entropy": Metric(
         lambda team: hierarchic_social_entropy(differences(team.counts)),
         "0 to log2 R bits",
-        "entropy of clusters, over all levels of difference; 0: all divide their work alike",
+        "entropy of clusters over all levels of difference; 0: all divide their work alike",
         "Balch 2000",
     ),
     "system_neural_diversity": Metric(

@@ -28,10 +28,10 @@ CAUSES = {
     signal.SIGILL: "an index lies outside its array",  # how Warp's assertions end
     signal.SIGABRT: "an index lies outside its array",
     signal.SIGTRAP: "an index lies outside its array",
-    signal.SIGSEGV: "memory is used that is not there",
-    signal.SIGBUS: "memory is used that is not there",
+    signal.SIGSEGV: "memory outside all arrays is accessed",
+    signal.SIGBUS: "memory outside all arrays is accessed",
     signal.SIGFPE: "an integer is divided by zero",
-    signal.SIGKILL: "nothing ends any more: a loop may run for ever",
+    signal.SIGKILL: "the check did not end: a loop may run forever",
 }
 
 

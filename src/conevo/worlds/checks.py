@@ -162,7 +162,7 @@ def _stepped(entry: WorldEntry, environment: str) -> Iterator[Finding]:
     trial = Trial(a_world, *mixed_teams(a_world), a_world.scenarios(KEYS[:2]))
     about = f"{trial.n_worlds} epochs of {a_world.params.iterations} iterations"
     trial.run()
-    yield Finding("ok", "memory", f"{about}: every array has the indices that are used")
+    yield Finding("ok", "memory", f"{about}: all array indices are in bounds")
     for topic, problems, fine in trial.seen():
         yield from _topic(topic, iter(problems), fine)
 

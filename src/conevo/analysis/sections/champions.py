@@ -43,7 +43,7 @@ def champions(scope: Scope) -> Section | None:
         "better, above 1 if smaller is) the champion was lucky when it was selected. "
         "n: runs in which all three are finite."
     )
-    title = "What champions were chosen by, and what is left of it"
+    title = "Champions: selection, validation and test"
     table = Table(f"{scope.stem}-chosen", title, note, columns, rows, is_open=len(rows) <= 12)
     return Section("How champions were chosen", text, [table])
 

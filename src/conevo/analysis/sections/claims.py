@@ -32,7 +32,7 @@ def claims(tables: Tables) -> Section:
     ]
     columns = [
         Column("place", "claim", plain),
-        Column("claim", "what the thesis says", plain, is_wide=True),
+        Column("claim", "claim of the thesis", plain, is_wide=True),
         Column("effect", "effect", plain, is_wide=True),
         Column("interval", "95 % interval", interval),
         Column("n", "n", plain),

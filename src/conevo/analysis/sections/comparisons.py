@@ -62,7 +62,8 @@ def comparisons(scope: Scope) -> Section | None:
         text.append(
             f"{names} exchanged next to nothing between populations in {len(idle)} of {len(made)} "
             f"cells, at most {most} in a generation: without it CONE is Multi-Agent ESP, with "
-            "type C fitness where that is on. These cells do not test what exchange is good for."
+            "type C fitness where that is on. Comparisons of these cells do not test the benefit "
+            "of exchange."
         )
     exhibits: list[Exhibit] = [
         *_map(scope, pairs),
@@ -164,7 +165,7 @@ def _pair_table(
         Column("p_mann_whitney", "p (MW)", p_value),
         Column("p_holm", "p (MW, Holm)", p_value),
         Column("a12", "A12"),
-        Column("verdict", "tests say", plain),
+        Column("verdict", "verdict", plain),
         Column("power", "power"),
     ]
     tests = TESTS.format(n=pairs[0].n_tests if pairs else 0, exact=EXACT_RUNS)

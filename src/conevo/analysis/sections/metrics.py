@@ -142,9 +142,9 @@ def definitions() -> Section:
     columns = [
         Column("name", "measure", plain),
         Column("span", "range", plain),
-        Column("what", "what it says", plain),
+        Column("what", "meaning", plain),
         Column("source", "source", plain),
     ]
     note = "R: robots of the team, A: actions of the world."
     table = Table("measures", "Measures of specialization: definitions", note, columns, rows)
-    return Section("What the measures of specialization say", (), [table])
+    return Section("Definitions of the measures of specialization", (), [table])

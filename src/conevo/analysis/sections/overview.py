@@ -109,8 +109,9 @@ def overview(tables: Tables, campaign: Campaign) -> Section:
         exhibits.insert(1, _failures(failed, campaign))
     if campaign.left_out:
         exhibits.insert(1, _left_out(campaign.left_out))
-        text.append(f"What could not be read is left out: {len(campaign.left_out):,}, see below.")
-    return Section("What was run", text, exhibits)
+        n = len(campaign.left_out)
+        text.append(f"Files that could not be read are left out: {n:,}, see below.")
+    return Section("Runs", text, exhibits)
 
 
 def _warnings(tables: Tables) -> list[str]:
@@ -145,7 +146,7 @@ def repetition(tables: Tables, campaign: Campaign) -> Section:
         "from the same runs the same report, byte for byte.",
     ]
     if any(preset != "night" for (preset,) in presets):
-        text.append("For more scale: conevo campaign start plan.toml --preset night")
+        text.append("At a larger scale: conevo campaign start plan.toml --preset night")
     commands = f"conevo campaign start plan.toml\nconevo report {campaign.name}\n\n# plan.toml\n"
     return Section("How to repeat it", text, preformatted=commands + campaign.plan)
 
@@ -180,7 +181,7 @@ def _cost(tables: Tables) -> Table:
         Column("core_hours", "core hours"),
     ]
     note = "Generations and team evaluations of a run, lowest to highest; the rest of all runs."
-    return Table("runs", "Runs and what they cost", note, shown, rows)
+    return Table("runs", "Runs and their cost", note, shown, rows)
 
 
 def _span(value: tuple[int, int]) -> str:
@@ -207,7 +208,8 @@ def _failures(failed: dict[str, dict[str, Any]], campaign: Campaign) -> Table:
         Column("message", "reason", plain, is_wide=True),
     ]
     note = (
-        "Origin: the machine refused, the request could not be carried out, or the program failed."
+        "Origin: machine, the environment failed; request, it could not be carried out; program, "
+        "conevo failed."
     )
     return Table("failures", "Runs that failed", note, columns, rows, is_open=len(rows) <= 12)
 
@@ -216,7 +218,7 @@ def _left_out(left_out: dict[str, str]) -> Table:
     columns = [Column("file", "run or file", plain), Column("why", "reason", plain, is_wide=True)]
     rows = [{"file": file, "why": why} for file, why in left_out.items()]
     note = "Damaged files; of a damaged run nothing counts below."
-    return Table("left-out", "What could not be read", note, columns, rows)
+    return Table("left-out", "Files that could not be read", note, columns, rows)
 
 
 def _versions(tables: Tables) -> Table:

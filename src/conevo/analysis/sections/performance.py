@@ -114,7 +114,7 @@ def _table(scope: Scope, rows: Sequence[Mapping[str, Any]]) -> Table:
         "exchanges": "exchange: pairs of sub-populations that recombined between populations in a "
         "generation, and percent of those that could have",
         "p_ks": "p (KS): Kolmogorov-Smirnov against the normal fitted to the runs, as in the "
-        "thesis, which is too large",
+        "thesis, which overstates normality",
         "p_lilliefors": "p (Lilliefors): the same distance with the corrected null distribution",
     }
     return Table(

@@ -146,13 +146,13 @@ class Subject:
         if self._config is None or self._config.stamp is None:
             self._kind, self._config, self._settings, self._logs = "", None, [], []
             if self.path.is_symlink():
-                raise UsageError("is a link, and links are not followed: watch what it leads to")
+                raise UsageError("is a link, and links are not followed: watch its target")
             if not (kind := kind_of(self.path)):
                 if self._is_planned:
                     return
                 raise UsageError("there is no run here any more")
             if kind == "campaign":
-                raise UsageError("is a campaign, and no run")
+                raise UsageError("is a campaign, not a run")
             self._kind = kind
             self._config = Whole(self.path / (CONFIG if kind == "run" else SHAPING), _configs)
         self._settings = self._config.read() or []

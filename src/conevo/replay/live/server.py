@@ -187,13 +187,13 @@ class Handler(BaseHTTPRequestHandler):
         if self.headers.get_all("Host", []) not in [[host] for host in self.server.hosts]:
             port = self.server.port
             return (
-                f"only http://{HOST}:{port}/ and http://localhost:{port}/ lead here; "
+                f"only http://{HOST}:{port}/ and http://localhost:{port}/ are served; "
                 f"from another machine forward the same port: ssh -L {port}:{HOST}:{port} MACHINE"
             )
         site = self.headers.get("Sec-Fetch-Site", "none")
         is_link = self.headers.get("Sec-Fetch-Dest") == "document"  # in a page that links here
         if site not in ("none", "same-origin") and not is_link:
-            return "requests of other sites are refused"
+            return "requests from other sites are refused"
         return None
 
     def _answer(self, path: str, query: str) -> None:

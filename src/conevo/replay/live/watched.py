@@ -44,7 +44,7 @@ class Watched:
         self._folders = [Path(folder).resolve() for folder in folders]
         for path in named:
             if not kind_of(path):
-                raise UsageError(f"{path} holds no run, no shaping and no campaign")
+                raise UsageError(f"{path} is not a run, a shaping or a campaign")
         names = ", ".join(path.name for path in (*named, *self._folders))
         self.title = readable(title or names)
         self._lock = threading.Lock()
@@ -105,7 +105,7 @@ class Watched:
 
     def _subject(self, label: str) -> Subject:
         if label not in self._by_label:
-            raise UsageError(f"no run is called {label!r} here")
+            raise UsageError(f"there is no run {label!r} here")
         return self._by_label[label]
 
     def _look(self, go_on: Callable[[], bool]) -> dict[str, Any]:
