@@ -288,7 +288,7 @@ def resolve(
     single, short = _split_keys(given, place, folder)
     if world is not None:
         world = _Value(world, place, folder).as_file
-    for name, asked in (("world", world), ("method", method), ("preset", preset)):
+    for name, asked in (("world", world), ("method", method), ("preset", preset), ("seed", seed)):
         if asked is not None and (twice := single.get("run", {}).get(name)):
             raise UsageError(
                 f"run.{name} = {shown(twice.value)} {twice.place}: the {name} is given as {asked}"
@@ -311,10 +311,6 @@ def resolve(
     for key, value in short.items():
         single.setdefault(_section_of(key, parts, place), {})[key] = value
     if seed is not None:
-        if twice := single.get("run", {}).get("seed"):
-            raise UsageError(
-                f"run.seed = {twice.value!r} {twice.place}: the seed is given as {seed}"
-            )
         single.setdefault("run", {})["seed"] = _Value(seed, "as the seed")
     base = _read_preset(names["preset"], entry.name, names["method"])
     if own_preset is not None and names["preset"] != own_preset.value:

@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 __all__ = ["RUNS", "Run", "evolve", "start"]
 
 RUNS = Path("runs")  # where runs are made and looked for unless told otherwise
-MOST_TESTS = 10_000  # scenarios of a test, as of ``RunSettings.n_tests``
 Record = dict[str, Any]
 Watch = Callable[["Run", Record], None]
 
@@ -416,14 +415,9 @@ class Run:
             UsageError: no generation has finished yet, made with other kernels, or numbers of
                 scenarios or a seed that are out of bounds.
         """
-        for name, value, least, most in (
-            ("scenarios", scenarios, 1, MOST_TESTS),
-            ("seed", seed, 0, 2**63 - 1),
-        ):
-            if value is not None and not (type(value) is int and least <= value <= most):
-                raise UsageError(
-                    f"{name} = {value!r}: must be a whole number from {least:,} to {most:,}"
-                )
+        from conevo.runs.testing import refuse_numbers
+
+        refuse_numbers(scenarios, seed)
         champion = team or self.champion
         if champion is None:
             raise self.without_team()

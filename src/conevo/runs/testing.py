@@ -12,13 +12,28 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from conevo.errors import UsageError
 from conevo.rng import fold
 from conevo.runs.champions import Finalists, Team
 from conevo.runs.evaluation import describe
 from conevo.worlds.protocol import World
 from conevo.worlds.rollout import Rollout
 
-__all__ = ["spread", "test_team", "validate"]
+__all__ = ["refuse_numbers", "spread", "test_team", "validate"]
+
+MOST_TESTS = 10_000  # scenarios of a test, as of ``RunSettings.n_tests``
+
+
+def refuse_numbers(scenarios: int | None, seed: int | None) -> None:
+    """Raise UsageError if a number of scenarios or a seed, where given, is out of bounds."""
+    for name, value, least, most in (
+        ("scenarios", scenarios, 1, MOST_TESTS),
+        ("seed", seed, 0, 2**63 - 1),
+    ):
+        if value is not None and not (type(value) is int and least <= value <= most):
+            raise UsageError(
+                f"{name} = {value!r}: must be a whole number from {least:,} to {most:,}"
+            )
 
 
 def validate(
