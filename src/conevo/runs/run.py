@@ -70,9 +70,8 @@ def evolve(
     settings = resolve(world, method, preset, seed, config, overrides)
     if origin is not None and not isinstance(origin, Run):
         origin = Run(origin)
-    run = start(
-        settings, out, threads=threads, device=device, origin=origin, of_champion=of_champion
-    )
+    how: dict[str, Any] = {"threads": threads, "device": device, "of_champion": of_champion}
+    run = start(settings, out, origin=origin, **how)
     return run.resume(threads=threads, watch=_print_line if progress else None)
 
 
@@ -247,8 +246,7 @@ class Run:
         if not 0 <= generation < len(records):
             last = f"0 to {len(records) - 1}" if records else "none yet"
             raise UsageError(f"{self.path} has no generation {generation} (it has {last})")
-        kept = self.team(generation)
-        if kept is not None:
+        if (kept := self.team(generation)) is not None:
             return kept
         from conevo.runs.session import evolve_again
 
@@ -391,9 +389,8 @@ class Run:
 
     def without_team(self) -> UsageError:
         """Return the error for a run that has no champion."""
-        if self.generations():
-            return UsageError(f"{self.path} has lost its champion.npz")
-        return UsageError(f"{self.path} has no finished generation yet, so there is no team")
+        lost = "lost its champion.npz" if self.generations() else "no finished generation yet"
+        return UsageError(f"{self.path} has {lost}, so there is no team")
 
     def test(
         self,
@@ -421,8 +418,7 @@ class Run:
         champion = team or self.champion
         if champion is None:
             raise self.without_team()
-        lab = self._equip(threads)
-        return self._test(lab, champion, scenarios, seed)
+        return self._test(self._equip(threads), champion, scenarios, seed)
 
     def test_under(
         self,
@@ -501,5 +497,5 @@ class Run:
 def _print_line(run: Run, record: Record) -> None:
     """Print one generation (``progress=True``)."""
     name, value = next(iter(record["performance"].items()))
-    total = run.outline.generations
-    print(f"generation {record['generation'] + 1}/{total}  {name} {value:g}", flush=True)  # noqa: T201 (asked for)
+    which = f"{record['generation'] + 1}/{run.outline.generations}"
+    print(f"generation {which}  {name} {value:g}", flush=True)  # noqa: T201 (asked for)
