@@ -232,10 +232,10 @@ class Run:
     def team_again(
         self, generation: int, lab: Lab, progress: Callable[[int, int], None] | None = None
     ) -> Team:
-        """Return the fittest team of a generation; one that was not kept is evolved again.
+        """Return the fittest team of a finished generation; one that was not kept is evolved again.
 
         Args:
-            generation: any finished one.
+            generation: of the team.
             lab: this run's.
             progress: told the generations done and wanted, if the team was not kept.
 
@@ -460,9 +460,8 @@ class Run:
         """Raise UsageError if there is nothing left to do."""
         if self._store.is_finished:
             raise UsageError(
-                f"{self.path} is finished; continue it with 'conevo resume {self.path} "
-                f"--generations N', N above {self.done()[0]}, or see it with "
-                f"'conevo show {self.path}'"
+                f"{self.path} is finished; see it with 'conevo show {self.path}', or continue it "
+                f"with 'conevo resume {self.path} --generations N', N above {self.done()[0]}"
             )
 
     def refuse_other_code(self) -> None:
@@ -497,5 +496,5 @@ class Run:
 def _print_line(run: Run, record: Record) -> None:
     """Print one generation (``progress=True``)."""
     name, value = next(iter(record["performance"].items()))
-    which = f"{record['generation'] + 1}/{run.outline.generations}"
-    print(f"generation {which}  {name} {value:g}", flush=True)  # noqa: T201 (asked for)
+    done, planned = record["generation"] + 1, run.outline.generations
+    print(f"generation {done}/{planned}  {name} {value:g}", flush=True)  # noqa: T201 (asked for)
