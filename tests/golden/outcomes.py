@@ -1,0 +1,108 @@
+"""What shipped worlds and methods gave before the seams moved: digests that must not change.
+
+``python tests/golden/outcomes.py`` prints them; a change of a world's or a method's version writes
+them anew, ``> tests/golden/outcomes.json``, and says why.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import conevo
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+# World, and the sizes of its controllers: neurons at the start, slots for them, genes of a neuron.
+WORLDS = {
+    "rover/simple-3": (10, 20, 31),
+    "rover/complex-5": (10, 20, 31),
+    "rover/extended-10": (10, 20, 31),
+    "pursuit/team-3": (6, 12, 24),
+    "pursuit/team-10": (6, 12, 24),
+    "prey/shaping-3": (5, 10, 10),
+    "prey/shaping-6": (5, 10, 10),
+    "gacc/simple-2": (10, 20, 45),
+    "gacc/complex-9": (10, 20, 45),
+    f"{EXAMPLES}/light.py:dark-1": (4, 8, 10),
+    f"{EXAMPLES}/ball.py:far-1": (4, 8, 12),
+}
+METHODS = ("homcne", "hetcne", "ccga", "mesp", "cone", "cone-1", "cone-2", "cone-3")
+RUNS = {
+    "rover/complex-1": {"world.n_robots": 3, "world.iterations": 40},
+    "pursuit/team-1": {"world.iterations": 40},
+    "gacc/complex-1": {"world.n_robots": 3, "world.iterations": 40},
+}
+RESTLESS = {"stagnation_v": 1, "stagnation_w": 1, "stagnation_y": 1, "gst": 1.0, "sst": 1.0}
+ITERATIONS = 120
+
+
+def digest(*arrays: Any) -> str:
+    """Return sixteen hex digits of arrays: their types, shapes and bytes."""
+    found = hashlib.blake2b(digest_size=8)
+    for array in map(np.ascontiguousarray, arrays):
+        found.update(f"{array.dtype.str} {array.shape}".encode() + array.tobytes())
+    return found.hexdigest()
+
+
+def teams_of(sizes: tuple[int, int, int], robots: int, n: int) -> tuple[Any, Any]:
+    """Return a pool of genotypes and teams of them, with holes in their slots."""
+    hidden, slots, genes = sizes
+    rng = np.random.default_rng(9)
+    pool = rng.uniform(-1, 1, (n * robots * hidden, genes)).astype(np.float32)
+    rows = np.full((n, robots, slots), -1, np.int32)
+    for team in range(n):
+        for robot in range(robots):
+            used = rng.choice(slots, rng.integers(1, slots + 1), replace=False)
+            rows[team, robot, used] = rng.integers(len(pool), size=len(used))
+    return pool, rows
+
+
+def of_worlds() -> Iterator[tuple[str, str]]:
+    """Yield what random teams do in every world, and how one of them is recorded."""
+    for path, sizes in WORLDS.items():
+        world = conevo.world(path, iterations=ITERATIONS)
+        rollout = conevo.Rollout(world, n_threads=2)
+        pool, teams = teams_of(sizes, world.n_robots, 6)
+        kinds = np.full(teams.shape[:2], -1, np.int32)
+        kinds[4] = np.arange(world.n_robots) % len(world.heuristics)
+        kinds[5, 0] = 0
+        scenarios = world.scenarios([3, 4, 5])
+        seen = rollout.evaluate(pool, teams, scenarios, kinds)
+        name = Path(path).name
+        performance = [seen.performance[key] for key in sorted(seen.performance)]
+        yield f"{name} evaluate", digest(seen.fitness, seen.counts, seen.switches, *performance)
+        record = rollout.record(pool, teams[1], world.scenarios([3]))
+        kept = [key for key in sorted(record) if key not in ("inputs", "sums", "outputs", "hidden")]
+        yield f"{name} record", digest(*(record[key] for key in kept))
+
+
+def of_methods() -> Iterator[tuple[str, str]]:
+    """Yield what every method evolves in five generations of a tiny run."""
+    for task, world in RUNS.items():
+        for method in METHODS:
+            known = conevo.METHODS[method].config_class.__dataclass_fields__
+            settings = {"run.generations": 5, "run.epochs": 2, "run.fittest_epochs": 2} | world
+            settings |= {"method.genotypes": 6, "run.n_tests": 2, "run.n_validations": 2}
+            settings |= {f"method.{k}": v for k, v in RESTLESS.items() if k in known}
+            with tempfile.TemporaryDirectory() as folder:
+                run = conevo.evolve(task, method, "smoke", 7, f"{folder}/run", overrides=settings)
+                lines = [line | {"seconds": 0} for line in run.generations()]
+                team, text = run.champion, json.dumps([lines, run.test_result], sort_keys=True)
+            assert team is not None
+            told = np.frombuffer(text.encode(), np.uint8)
+            yield f"{task} {method}", digest(team.genes, team.active, team.fitness, told)
+
+
+def outcomes() -> dict[str, str]:
+    """Return the digest of everything."""
+    return dict([*of_worlds(), *of_methods()])
+
+
+if __name__ == "__main__":
+    print(json.dumps(outcomes(), indent=1))
