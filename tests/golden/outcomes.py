@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import sys
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -105,4 +106,4 @@ def outcomes() -> dict[str, str]:
 
 
 if __name__ == "__main__":
-    print(json.dumps(outcomes(), indent=1))
+    sys.stdout.write(json.dumps(outcomes(), indent=1) + "\n")
