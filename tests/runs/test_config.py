@@ -174,7 +174,7 @@ BAD = [
     ({"overrides": {"run.generations": 2.5}}, ["run.generations = 2.5", "valid integer"]),
     ({"overrides": {"run.generations": True}}, ["run.generations = True", "valid integer"]),
     ({"overrides": {"run.credit": "me"}}, ["run.credit = 'me'", "'robot' or 'team'"]),
-    ({"overrides": {"run.target": float("nan")}}, ["run.target = nan", "must be finite"]),
+    ({"overrides": {"run.target": float("nan")}}, ["run.target = nan", "must be a finite number"]),
     ({"overrides": {"world.low_range": 3.0}}, ["world.low_range = 3.0", "must be less than"]),
     ({"overrides": {"world.low_accuracy": "x"}}, ["world.low_accuracy = 'x'", "valid number"]),
     ({"overrides": {"world.max_hidden": 4}}, ["max_hidden", "n_hidden"]),

@@ -51,7 +51,7 @@ DECLARED = {
     "bounds": ("step: Annotated[float, Gt(0), Le(0.1)]", "step: float", "parameters",
                "LightParams.step has no bounds; declare them, as in Annotated[float"),
     "default": ("Le(0.1)] = 0.01", "Le(0.1)] = 0.2", "parameters",
-                "LightParams.step = 0.2: must be less than or equal to 0.1"),
+                "world.step = 0.2: must be less than or equal to 0.1"),
     "no default": ("Le(64)] = 3", "Le(64)]", "parameters", "LightParams.n_robots needs a default"),
     "frozen": ("@dataclass(frozen=True)\nclass LightParams", "@dataclass\nclass LightParams",
                "parameters", "LightParams must be frozen"),

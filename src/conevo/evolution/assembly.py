@@ -7,13 +7,13 @@ Methods with one population (P = 1) fill every robot from it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Annotated, Literal
 
 import numpy as np
 from annotated_types import Ge, Le
 
 from conevo.evolution.protocol import BoolArray, IntArray
+from conevo.parameters import parameters
 
 __all__ = [
     "SchemeConfig",
@@ -28,7 +28,7 @@ __all__ = [
 ]
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters("method")
 class SchemeConfig:
     """How the genotypes of several populations are tried in teams, alike for all such methods.
 

@@ -6,18 +6,18 @@ of whole networks. S units, M genotypes each, L of them elite, G genes.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
 from annotated_types import Ge, Gt, Le
 
 from conevo.evolution.protocol import FloatArray, IntArray
+from conevo.parameters import parameters
 
 __all__ = ["VariationConfig", "across", "breed", "crossover", "mutate", "within"]
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters("method")
 class VariationConfig:
     """Selection and variation, alike for all methods (Nitschke 2009, section 3.4, table 5.5).
 

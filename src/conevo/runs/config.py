@@ -36,18 +36,17 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tomli_w
 from annotated_types import Ge, Le
-from pydantic import TypeAdapter, ValidationError
 
 from conevo.errors import UsageError, shown, unknown_name
+from conevo.parameters import WrongValue, parameters, refuse_unknown
 from conevo.reading import DamagedFile, parse_toml, read_toml
 from conevo.runs.outline import LENGTH, Outline, identify, outline_of
 
@@ -75,7 +74,7 @@ NAMES = {
 ANY = "any"  # the table of a preset for worlds without one of their own
 
 
-@dataclass(frozen=True)
+@parameters("run")
 class RunSettings:
     """How long and on how much evidence to evolve; belongs to no world and no method.
 
@@ -466,31 +465,18 @@ def _read_preset(preset: str, world: str, method: str) -> Layer:
 
 def _build(section: str, part: Any, layers: Iterable[Layer]) -> Any:
     """Return the component's dataclass with the layers' values over its defaults."""
-    hints = get_type_hints(part, include_extras=True)
     values: dict[str, Any] = {}
+    places: dict[str, str] = {}
     for layer in layers:
         for key, given in layer.get(section, {}).items():
-            if key not in hints:
-                known = [f"{section}.{name}" for name in hints]
-                raise unknown_name("key", f"{section}.{key}", known, given.place)
-            if f"{key}_digest" in hints:
-                given = dataclasses.replace(given, value=given.as_file)
-            values[key] = _check(f"{section}.{key}", hints[key], given)
+            refuse_unknown(part, section, key, given.place)
+            is_file = f"{key}_digest" in part.__dataclass_fields__
+            values[key] = given.as_file if is_file else given.value
+            places[key] = given.place
     try:
         return part(**values)
-    except ValueError as error:
-        raise UsageError(f"[{section}]: {error}") from error
-
-
-def _check(name: str, hint: Any, given: _Value) -> Any:
-    """Return the value as the type asks for it, or say what is allowed."""
-    problem = "must be finite"
-    if not isinstance(given.value, float) or math.isfinite(given.value):
-        try:
-            return TypeAdapter(hint).validate_python(given.value, strict=True)
-        except ValidationError as error:
-            problem = error.errors()[0]["msg"].replace("Input should be", "must be")
-    raise UsageError(f"{name} = {shown(given.value)} {given.place}: {problem}")
+    except WrongValue as error:
+        raise error.at(places[error.key]) if error.key in places else error from error
 
 
 def _set_fields(part: Any) -> dict[str, Any]:

@@ -15,6 +15,7 @@ from annotated_types import Ge, Gt, Le
 
 from conevo.errors import UsageError
 from conevo.kernels.khepera import RADIUS
+from conevo.parameters import parameters
 from conevo.rng import stream
 from conevo.worlds.protocol import Scenarios, Simulation
 from conevo.worlds.pursuit_bodies import N_OBSTACLES, Params, Scene, Team
@@ -24,7 +25,7 @@ __all__ = ["ArenaParams", "ArenaScenarios", "draw_scenarios", "simulate"]
 RECORDED = ("x", "y", "heading", "left", "right", "collided", "action", "fitness")
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters("world")
 class ArenaParams:
     """What both worlds have in common; lengths in cm, one iteration is 0.1 s.
 

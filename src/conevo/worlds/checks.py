@@ -11,9 +11,10 @@ from typing import Any, Literal, get_type_hints
 
 import numpy as np
 import numpy.typing as npt
-from pydantic import TypeAdapter, ValidationError
+from pydantic import ValidationError
 
-from conevo.errors import ConevoError
+from conevo.errors import ConevoError, UsageError
+from conevo.parameters import wrong_values
 from conevo.rng import fold, stream
 from conevo.worlds.contract import faults, scenario_faults
 from conevo.worlds.outside import line_of
@@ -94,7 +95,7 @@ def _declared(entry: WorldEntry, environment: str) -> Iterator[Finding]:
 
 def _of_parameters(params_class: Any) -> Iterator[str]:
     hints = get_type_hints(params_class, include_extras=True)
-    kind = params_class.__name__
+    kind, is_whole = params_class.__name__, True
     if not params_class.__dataclass_params__.frozen:
         yield f"{kind} must be frozen: @dataclass(frozen=True)"
     for field in fields(params_class):
@@ -104,12 +105,14 @@ def _of_parameters(params_class: Any) -> Iterator[str]:
             yield f"{name} has no bounds; declare them, as in {example}"
         if field.default is MISSING:
             yield f"{name} needs a default"
-            continue
+            is_whole = False
+    if is_whole:
         try:
-            TypeAdapter(hint).validate_python(field.default, strict=True)
-        except ValidationError as error:
-            why = error.errors()[0]["msg"].replace("Input should be", "must be")
-            yield f"{name} = {field.default!r}: {why}"
+            params_class()
+        except UsageError as error:
+            why = error.__cause__
+            several = wrong_values(why, "world") if isinstance(why, ValidationError) else [error]
+            yield from map(str, several)
 
 
 def _drawn(entry: WorldEntry, environment: str) -> Iterator[Finding]:

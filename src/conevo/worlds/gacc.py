@@ -92,6 +92,7 @@ from annotated_types import Ge, Gt, Le
 
 from conevo.controllers import ControllerSpec
 from conevo.errors import UsageError
+from conevo.parameters import parameters
 from conevo.rng import stream
 from conevo.worlds.gacc_dynamics import FUNCTIONS
 from conevo.worlds.gacc_plans import TYPES, Plan, plan
@@ -108,7 +109,7 @@ NonNegative = Annotated[float, Ge(0)]
 Range = Annotated[float, Gt(0), Le(0.5)]
 
 
-@dataclass(frozen=True)
+@parameters("world")
 class GaccParams:
     """Parameters of the world; lengths in sides of the square, energy in units.
 

@@ -37,6 +37,7 @@ from annotated_types import Ge, Le
 
 from conevo.controllers import ControllerSpec
 from conevo.errors import UsageError
+from conevo.parameters import parameters
 from conevo.worlds.arena import ArenaParams, ArenaScenarios, draw_scenarios, simulate
 from conevo.worlds.measures import Measure
 from conevo.worlds.protocol import Simulation
@@ -45,7 +46,7 @@ from conevo.worlds.pursuit_dynamics import ACTIONS, PREY_FUNCTIONS
 __all__ = ["PreyParams", "PreyWorld"]
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters("world")
 class PreyParams(ArenaParams):
     """Parameters of the world, beside those of the arena.
 

@@ -49,6 +49,7 @@ from annotated_types import Ge, Gt, Le
 
 from conevo.controllers import ControllerSpec
 from conevo.errors import UsageError, unknown_name
+from conevo.parameters import parameters
 from conevo.worlds import prey_sets
 from conevo.worlds.arena import ArenaParams, ArenaScenarios, draw_scenarios, simulate
 from conevo.worlds.measures import Measure
@@ -60,7 +61,7 @@ __all__ = ["PursuitParams", "PursuitWorld"]
 PREY_MODES = {"shaped": 0, "heuristic": 1, "random": 2}  # a file's prey are controlled as shaped
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters("world")
 class PursuitParams(ArenaParams):
     """Parameters of the world, beside those of the arena.
 

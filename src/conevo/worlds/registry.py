@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -46,9 +46,10 @@ class WorldEntry:
 
     @property
     def params_class(self) -> type[Any]:
-        """The dataclass of the world's parameters."""
-        found: type[Any] = getattr(import_module(self.module), self.params_name)
-        return found
+        """The dataclass of the world's parameters; it refuses what they do not allow."""
+        from conevo.parameters import checked
+
+        return checked(getattr(import_module(self.module), self.params_name), "world")
 
     def address(self, environment: str) -> str:
         """What ``resolve`` finds an environment of this world by."""
@@ -58,8 +59,12 @@ class WorldEntry:
         """Return one environment of this world.
 
         Raises:
-            UsageError: parameters that do not fit together.
+            UsageError: parameters that are not allowed, or do not fit together.
         """
+        part = self.params_class
+        if not isinstance(params, part):  # of a plain dataclass, which has checked nothing
+            given = {one.name: getattr(params, one.name) for one in fields(params) if one.init}
+            params = part(**given)
         make: Callable[[str, Any], World] = getattr(import_module(self.module), self.world_name)
         built = make(environment, params)
         _ = built.controller  # refuses fewer slots than neurons
@@ -169,11 +174,7 @@ def world(path: str, **params: Any) -> World:
     The path is one that ``resolve`` knows: "rover/complex-1", or "FILE.py:ENVIRONMENT".
 
     Raises:
-        UsageError: unknown world, environment or parameter.
+        UsageError: unknown world, environment or parameter, or a value that is not allowed.
     """
     entry, environment = resolve(path)
-    known = entry.params_class.__dataclass_fields__
-    for key in params:
-        if key not in known:
-            raise unknown_name("parameter", key, known, f"of world {entry.name!r}")
     return entry.build(environment, entry.params_class(**params))

@@ -47,6 +47,7 @@ from annotated_types import Ge, Gt, Le
 
 from conevo.controllers import ControllerSpec
 from conevo.kernels.geometry import COVER_WORDS
+from conevo.parameters import parameters
 from conevo.rng import stream
 from conevo.worlds import canals, rocks
 from conevo.worlds.measures import Measure
@@ -62,7 +63,7 @@ Share = Annotated[float, Ge(0), Le(1)]
 Range = Annotated[float, Gt(0), Le(0.5)]
 
 
-@dataclass(frozen=True)
+@parameters("world")
 class RoverParams:
     """Parameters of the world; lengths in sides of the square, energy in units.
 

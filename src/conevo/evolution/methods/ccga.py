@@ -30,12 +30,13 @@ from conevo.evolution.generation import (
 from conevo.evolution.population import elite_count
 from conevo.evolution.protocol import FloatArray, Layout, Scores, State, Trials
 from conevo.evolution.variation import VariationConfig
+from conevo.parameters import parameters
 from conevo.rng import stream
 
 __all__ = ["Ccga", "CcgaConfig"]
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters("method")
 class CcgaConfig(VariationConfig, SchemeConfig):
     """Parameters of CCGA; under the scheme "shared" no partners come from the elite.
 

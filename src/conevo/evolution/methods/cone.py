@@ -26,12 +26,13 @@ from conevo.evolution.population import ranking
 from conevo.evolution.protocol import BoolArray, IntArray, Layout, Scores, State, Trials
 from conevo.evolution.regulation import regulate_gst, regulate_sst
 from conevo.evolution.selection import pair_populations, pair_similar, pair_slots
+from conevo.parameters import parameters
 from conevo.rng import stream
 
 __all__ = ["Cone", "Cone1Config", "Cone2Config", "Cone3Config", "ConeConfig"]
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters("method")
 class ConeConfig(MespConfig):
     """Parameters of CONE: those of Multi-Agent ESP and its own.
 
@@ -75,21 +76,21 @@ class ConeConfig(MespConfig):
         return self.type_c_rounds or as_type_a
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters("method")
 class Cone1Config(ConeConfig):
     """Parameters of CONE-1: CONE without the genotype difference metric."""
 
     use_gdm: Literal[False] = False
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters("method")
 class Cone2Config(ConeConfig):
     """Parameters of CONE-2: CONE without the specialization difference metric."""
 
     use_sdm: Literal[False] = False
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters("method")
 class Cone3Config(Cone1Config):
     """Parameters of CONE-3: CONE without both metrics."""
 

@@ -37,12 +37,13 @@ from conevo.evolution.generation import (
 from conevo.evolution.population import elite_count
 from conevo.evolution.protocol import IntArray, Layout, Scores, State, Trials
 from conevo.evolution.variation import VariationConfig
+from conevo.parameters import parameters
 from conevo.rng import stream
 
 __all__ = ["HetCne", "HetCneConfig"]
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters("method")
 class HetCneConfig(VariationConfig):
     """Parameters of HetCNE.
 

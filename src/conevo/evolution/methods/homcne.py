@@ -26,11 +26,12 @@ from conevo.evolution.generation import (
 from conevo.evolution.population import elite_count
 from conevo.evolution.protocol import Layout, Scores, State, Trials
 from conevo.evolution.variation import VariationConfig
+from conevo.parameters import parameters
 
 __all__ = ["HomCne", "HomCneConfig"]
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters("method")
 class HomCneConfig(VariationConfig):
     """Parameters of HomCNE.
 

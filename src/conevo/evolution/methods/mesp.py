@@ -34,12 +34,13 @@ from conevo.evolution.protocol import (
 )
 from conevo.evolution.regulation import resized, stagnating
 from conevo.evolution.variation import VariationConfig, breed
+from conevo.parameters import parameters
 from conevo.rng import stream
 
 __all__ = ["Mesp", "MespConfig"]
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters("method")
 class MespConfig(VariationConfig, SchemeConfig):
     """Parameters of Multi-Agent ESP.
 

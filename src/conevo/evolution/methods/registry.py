@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import importlib
-import operator
-from dataclasses import asdict, dataclass, fields
-from typing import TYPE_CHECKING, Any, Literal, cast, get_args, get_origin, get_type_hints
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, cast
 
-from conevo.errors import UsageError, unknown_name
+from conevo.errors import unknown_name
 
 if TYPE_CHECKING:
     from conevo.evolution.protocol import Method
@@ -35,8 +34,10 @@ class MethodEntry:
 
     @property
     def config_class(self) -> type[Any]:
-        """The frozen dataclass of its parameters."""
-        return cast("type[Any]", self._load(2))
+        """The dataclass of its parameters; it refuses what they do not allow."""
+        from conevo.parameters import checked
+
+        return checked(self._load(2), "method")
 
     def build(self, config: Any) -> Method:
         """Return the method with the given parameters, an instance of ``config_class``."""
@@ -119,32 +120,9 @@ def method(name: str, **config: Any) -> Method:
         config: fields of its config class that differ from their defaults.
 
     Raises:
-        UsageError: an unknown name, an unknown field or a value out of bounds.
+        UsageError: an unknown name, an unknown parameter or a value that is not allowed.
     """
     if name not in METHODS:
         raise unknown_name("method", name, METHODS)
     entry = METHODS[name]
-    known = {field.name for field in fields(entry.config_class)}
-    for key in config:
-        if key not in known:
-            raise unknown_name("parameter", key, known, f"of method {name!r}")
-    built = entry.config_class(**config)
-    _check(built, name)
-    return entry.build(built)
-
-
-def _check(config: Any, name: str) -> None:
-    """Refuse values outside the bounds that the fields declare."""
-    for key, hint in get_type_hints(type(config), include_extras=True).items():
-        value = getattr(config, key)
-        if get_origin(hint) is Literal:
-            if value not in get_args(hint):
-                raise UsageError(f"{name}: {key} must be one of {get_args(hint)}, got {value!r}")
-            continue
-        kind, *bounds = get_args(hint) or (hint,)
-        if not isinstance(value, (int, float) if kind is float else kind):
-            raise UsageError(f"{name}: {key} must be {kind.__name__}, got {value!r}")
-        for bound in bounds:
-            test, limit = next(iter(asdict(bound).items()))
-            if not getattr(operator, test)(value, limit):
-                raise UsageError(f"{name}: {key} must be {test} {limit}, got {value!r}")
+    return entry.build(entry.config_class(**config))

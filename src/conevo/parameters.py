@@ -1,0 +1,111 @@
+"""Parameters: dataclasses whose values are checked when one is made, whoever makes it.
+
+A parameter is one field, with its type, its bounds and its default::
+
+    @parameters("world")
+    class LightParams:
+        step: Annotated[float, Gt(0), Le(0.1)] = 0.01
+
+``LightParams(step=1)``, ``conevo.world("light/dark-1", step=1)``, ``--set world.step=1``, and a
+configuration or plan with ``step = 1`` are refused in the same words.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import fields
+from functools import cache
+from typing import Any, TypeVar, cast, dataclass_transform
+
+from pydantic import ConfigDict, ValidationError
+from pydantic.dataclasses import dataclass, is_pydantic_dataclass
+
+from conevo.errors import UsageError, shown, unknown_name
+
+__all__ = ["WrongValue", "checked", "parameters", "refuse_unknown", "wrong_values"]
+
+Part = TypeVar("Part")
+CONFIG = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, validate_default=True)
+
+
+class WrongValue(UsageError):
+    """A parameter has a value that it does not allow.
+
+    Attributes:
+        key: the parameter's name, empty if several values do not fit together.
+    """
+
+    def __init__(self, key: str, what: str, problem: str) -> None:
+        super().__init__(f"{what}: {problem}")
+        self.key, self._what, self._problem = key, what, problem
+
+    def at(self, place: str) -> UsageError:
+        """Return the error with the place that the value is from, "on the command line"."""
+        return UsageError(f"{self._what} {place}: {self._problem}")
+
+
+@dataclass_transform(frozen_default=True, kw_only_default=True)
+def parameters(section: str) -> Callable[[type[Part]], type[Part]]:
+    """Make a class a frozen dataclass that holds only values which its fields allow.
+
+    Types are strict (but a whole number is a number) and numbers finite. ``UsageError`` names the
+    first unknown key or wrong value.
+
+    Args:
+        section: table of a configuration that the fields are keys of: "world", "method", "run".
+    """
+
+    def decorate(part: type[Part]) -> type[Part]:
+        made: Any = dataclass(part, frozen=True, kw_only=True, config=CONFIG)
+        return cast("type[Part]", _refusing(made, section))
+
+    return decorate
+
+
+@cache
+def checked(part: type[Any], section: str) -> type[Any]:
+    """Return a class of parameters; for a plain dataclass, a subclass that checks its values."""
+    if is_pydantic_dataclass(part):
+        return part
+    config = ConfigDict(**CONFIG, arbitrary_types_allowed=True)
+    frozen = part.__dataclass_params__.frozen
+    return _refusing(dataclass(part, frozen=frozen, config=config), section)
+
+
+def _refusing(part: type[Any], section: str) -> type[Any]:
+    """Make a pydantic dataclass refuse in conevo's words."""
+    validate = part.__init__
+
+    def __init__(self: Any, **values: Any) -> None:
+        for key in values:
+            refuse_unknown(part, section, key)
+        try:
+            validate(self, **values)
+        except ValidationError as error:
+            raise wrong_values(error, section)[0] from error
+
+    part.__init__ = __init__
+    return part
+
+
+def refuse_unknown(part: type[Any], section: str, key: str, place: str = "") -> None:
+    """Raise UsageError if a class of parameters has no ``key``."""
+    known = [field.name for field in fields(part)]
+    if key not in known:
+        raise unknown_name("key", f"{section}.{key}", [f"{section}.{one}" for one in known], place)
+
+
+def wrong_values(error: ValidationError, section: str) -> list[WrongValue]:
+    """Return what pydantic found as one error for each value."""
+    found = []
+    for one in error.errors(include_url=False):
+        problem = one["msg"].replace("Input should be", "must be").removeprefix("Value error, ")
+        if not one["loc"]:  # a class' own check
+            found.append(WrongValue("", f"[{section}]", problem))
+        elif one["type"] == "missing":
+            key = str(one["loc"][0])
+            found.append(WrongValue(key, f"{section}.{key}", "must be given, it has no default"))
+        else:
+            key = str(one["loc"][0])
+            found.append(WrongValue(key, f"{section}.{key} = {shown(one['input'])}", problem))
+    return found
