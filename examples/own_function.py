@@ -35,14 +35,15 @@ def main(name: str = "cone") -> None:
     """Evolve for 60 generations and print how the fittest team comes along."""
     chosen = method(name, genotypes=20)
     state = chosen.init(Layout(n_robots=4, n_hidden=3, max_hidden=3, n_genes=2), root=1)
-    while state.generation < 60:
+    while state.progress.generation < 60:
         trials = chosen.ask(state)
-        if trials.phase == "fittest" and state.generation % 10 == 9:
+        if trials.portrait and trials.generation % 10 == 9:
             worth = evaluate(trials).fitness[0, 0]
-            print(f"generation {state.generation + 1}: the fittest team is worth {worth:.3f}")
+            number = trials.generation + 1
+            print(f"generation {number}: the fittest team is worth {worth:.3f}")
             last = positions(trials)[0]
         state = chosen.tell(state, trials, evaluate(trials))
-    print(f"after {state.team_evaluations} team evaluations the agents stand at")
+    print(f"after {state.progress.team_evaluations} team evaluations the agents stand at")
     print(last.round(2))
 
 

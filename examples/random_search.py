@@ -14,9 +14,9 @@ from annotated_types import Ge
 
 from conevo.evolution import credit
 from conevo.evolution.assembly import rows
-from conevo.evolution.generation import advance, begin, count, crown, grade, trials
+from conevo.evolution.generation import Populations, advance, begin, count, crown, grade, trials
 from conevo.evolution.population import elite_count, random_genes
-from conevo.evolution.protocol import Layout, Scores, State, Trials
+from conevo.evolution.protocol import Layout, Scores, Trials
 from conevo.evolution.variation import VariationConfig
 from conevo.rng import stream
 
@@ -42,20 +42,21 @@ class RandomSearch:
     name: str = "random-search"
     title: str = "random search"
 
-    def init(self, layout: Layout, root: int) -> State:
+    def init(self, layout: Layout, root: int) -> Populations:
         """Return generation 0 with random genotypes."""
+        genotypes = self.config.genotypes
         return begin(
-            layout, root, n_populations=1, n_genotypes=self.config.genotypes, networks=True
+            Populations, layout, root, n_populations=1, n_genotypes=genotypes, networks=True
         )
 
-    def ask(self, state: State) -> Trials:
+    def ask(self, state: Populations) -> Trials:
         """Return a team of clones of every genotype, then of the fittest."""
-        m, robots = self.config.genotypes, state.fittest_fitness.size
+        m, robots = self.config.genotypes, state.progress.fittest_fitness.size
         chosen = np.arange(m) if state.phase == "genotypes" else state.elite[0, :1]
         clones = np.broadcast_to(chosen[:, None, None], (len(chosen), robots, 1))
         return trials(state, rows(state.active, clones, m))
 
-    def tell(self, state: State, trials: Trials, scores: Scores) -> State:
+    def tell(self, state: Populations, trials: Trials, scores: Scores) -> Populations:
         """Return the state after these scores."""
         state = count(state, trials, scores)
         if state.phase == "genotypes":
@@ -81,8 +82,8 @@ def main() -> None:
         while state.generation < 60:
             asked = chosen.ask(state)
             state = chosen.tell(state, asked, evaluate(asked))
-        worth = state.fittest_fitness[0]
-        print(f"{chosen.title}: {worth:.3f} after {state.team_evaluations} team evaluations")
+        worth, cost = state.progress.fittest_fitness[0], state.progress.team_evaluations
+        print(f"{chosen.title}: {worth:.3f} after {cost} team evaluations")
 
 
 if __name__ == "__main__":

@@ -1,14 +1,18 @@
-"""What every method promises; a registry entry enrols it."""
+"""What every method promises; a registry entry enrols it.
 
-import io
-import json
-from dataclasses import fields, replace
+Nothing in the first part knows what a genotype is: it may be a neuron, a network or a whole team.
+The second part is for methods that have populations of neurons or networks.
+"""
+
+from dataclasses import fields, is_dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 import pytest
 
-from conevo.evolution import METHODS, Layout, Scores, State, method
+from conevo.evolution import METHODS, Layout, Scores, method
+from conevo.evolution.generation import Populations
+from conevo.runs.checkpoint import difference, load_like, refuse_unkept, save
 
 LAYOUT = Layout(n_robots=3, n_hidden=3, max_hidden=5, n_genes=4)
 GENOTYPES = 6
@@ -19,8 +23,9 @@ def variants():
     """Return (name, config) for every method and evaluation scheme, with short windows."""
     for name, entry in METHODS.items():
         names = {field.name for field in fields(entry.config_class)}
-        windows = {"stagnation_v", "stagnation_w", "stagnation_y"} & names
-        config = dict.fromkeys(sorted(windows), 1)
+        small = {"genotypes": GENOTYPES, "elite_portion": 0.5}
+        small |= dict.fromkeys(("stagnation_v", "stagnation_w", "stagnation_y"), 1)
+        config = {key: value for key, value in small.items() if key in names}
         if "evaluation" not in names:
             yield name, config
             continue
@@ -40,7 +45,7 @@ every_variant = pytest.mark.parametrize(("name", "config"), VARIANTS, ids=IDS)
 
 
 def build(name, config):
-    return method(name, genotypes=GENOTYPES, elite_portion=0.5, **config)
+    return method(name, **config)
 
 
 def judge(trials):
@@ -54,70 +59,212 @@ def run(learner, generations, root=3, score=judge, state=None):
     """Return all states on the way."""
     state = learner.init(LAYOUT, root) if state is None else state
     states = [state]
-    while state.generation < generations:
+    while state.progress.generation < generations:
         trials = learner.ask(state)
         state = learner.tell(state, trials, score(trials))
         states.append(state)
     return states
 
 
+def is_end(before, after):
+    """Whether a generation has ended between two states."""
+    return after.progress.generation > before.progress.generation
+
+
+def contents(record, prefix=""):
+    """Return what a dataclass holds, by name."""
+    found = {}
+    for field in fields(record):
+        value, name = getattr(record, field.name), prefix + field.name
+        found |= contents(value, f"{name}.") if is_dataclass(value) else {name: value}
+    return found
+
+
 def assert_same(a, b):
-    for field in fields(a):
-        left, right = getattr(a, field.name), getattr(b, field.name)
-        assert type(left) is type(right), field.name
-        if isinstance(left, np.ndarray):
-            assert left.dtype == right.dtype, field.name
-        np.testing.assert_array_equal(left, right, err_msg=field.name)
+    assert type(a) is type(b)
+    left, right = contents(a), contents(b)
+    assert left.keys() == right.keys()
+    for name, value in left.items():
+        assert type(value) is type(right[name]), name
+        if isinstance(value, np.ndarray):
+            assert value.dtype == right[name].dtype, name
+        np.testing.assert_equal(value, right[name], err_msg=name)
 
 
-def copied(state):
+def copied(record):
+    """Return a dataclass with copies of its arrays."""
+    values = {field.name: getattr(record, field.name) for field in fields(record)}
     return replace(
-        state,
-        **{
-            f.name: getattr(state, f.name).copy()
-            for f in fields(state)
-            if isinstance(getattr(state, f.name), np.ndarray)
-        },
+        record,
+        **{k: copied(v) for k, v in values.items() if is_dataclass(v)},
+        **{k: v.copy() for k, v in values.items() if isinstance(v, np.ndarray)},
     )
+
+
+# --- every method ---------------------------------------------------------------------------------
 
 
 @every_variant
 def test_state_is_plain_and_keeps_its_types(name, config):
     states = run(build(name, config), 6)
-    dtypes = {
-        f.name: getattr(states[0], f.name).dtype for f in fields(State) if f.type.endswith("Array")
-    }
+    first = contents(states[0])
     for state in states:
-        for field in fields(state):
-            value = getattr(state, field.name)
-            if field.name in dtypes:
-                assert value.dtype == dtypes[field.name], field.name
-                assert value.ndim == getattr(states[0], field.name).ndim, field.name
-            else:
-                assert type(value).__name__ == field.type, field.name
+        refuse_unkept(state, name)
+        assert difference(state, states[0]) == ""
+        found = contents(state)
+        assert found.keys() == first.keys()
+        assert {k: type(v) for k, v in found.items()} == {k: type(v) for k, v in first.items()}
+    for before, after in pairwise(states):
+        if is_end(before, after):  # such states are kept, and looked at when they are read
+            assert after.progress.problem(states[0].progress) == ""
+            assert getattr(after, "problem", lambda _: "")(states[0]) == ""
 
 
 @every_variant
+def test_teams_are_rows_of_a_pool_of_genotypes_in_range(name, config):
+    learner = build(name, config)
+    for state in run(learner, 8):
+        trials = learner.ask(state)
+        assert trials.generation == state.progress.generation
+        assert trials.teams.dtype == np.int32
+        assert trials.genes.dtype == np.float32
+        assert trials.teams.shape[1:] == (LAYOUT.n_robots, LAYOUT.max_hidden)
+        assert trials.genes.shape[1:] == (LAYOUT.n_genes,)
+        assert ((trials.teams >= -1) & (trials.teams < len(trials.genes))).all()
+        assert (trials.teams >= 0).any(axis=2).all()  # nobody is without a neuron
+        assert np.abs(trials.genes).max() <= 1
+        assert len(trials.teams) % trials.rounds == 0
+        assert trials.scenarios in ("fresh", "fixed")
+
+
+@every_variant
+def test_every_team_evaluated_is_counted(name, config):
+    learner = build(name, config)
+    spent = 0
+    for before, after in pairwise(run(learner, 6)):
+        spent += len(learner.ask(before).teams)
+        assert after.progress.team_evaluations == spent
+        assert after.progress.generation - before.progress.generation in (0, 1)
+
+
+@every_variant
+def test_ask_and_tell_are_pure(name, config):
+    learner = build(name, config)
+    for state in run(learner, 4):
+        before = copied(state)
+        trials = learner.ask(state)
+        assert_same(trials, learner.ask(state))
+        asked, scores = copied(trials), judge(trials)
+        told = copied(scores)
+        assert_same(learner.tell(state, trials, scores), learner.tell(state, trials, scores))
+        assert_same(state, before)
+        assert_same(scores, told)
+        assert_same(trials, asked)
+
+
+@every_variant
+def test_the_seed_decides_everything(name, config):
+    learner = build(name, config)
+    first, second, other = (run(learner, 5, root)[-1] for root in (3, 3, 4))
+    assert_same(first, second)
+    genes = [learner.ask(state).networks() for state in (first, other)]
+    assert (genes[0][:1] != genes[1][:1]).mean() > 0.3
+
+
+@every_variant
+def test_a_stored_state_resumes_bit_for_bit(name, config, tmp_path):
+    learner = build(name, config)
+    states = run(learner, 6)
+    for stop in (1, len(states) // 2):
+        save(tmp_path / "state.npz", states[stop], {"method": name})
+        stored = load_like(learner.init(LAYOUT, 3), tmp_path / "state.npz", {"method": name})
+        assert_same(stored, states[stop])
+        assert_same(run(learner, 6, state=stored)[-1], states[-1])
+
+
+@every_variant
+def test_every_generation_has_a_portrait_of_its_fittest_team(name, config):
+    learner = build(name, config)
+    states = run(learner, 5)
+    shown = 0
+    for before, after in pairwise(states):
+        trials = learner.ask(before)
+        if trials.portrait:
+            shown += 1
+            team, scores = trials.teams[0], judge(trials)
+        if is_end(before, after):
+            ended = after.progress
+            assert shown == ended.generation
+            np.testing.assert_array_equal(ended.fittest_active, team >= 0)
+            np.testing.assert_array_equal(ended.fittest_fitness, scores.fitness[0])
+            np.testing.assert_array_equal(ended.fittest_specialization, scores.specialization[0])
+            assert not ended.fittest_genes[~ended.fittest_active].any()
+            assert ended.best_fitness >= ended.mean_fitness
+    assert shown == 5
+
+
+@every_variant
+def test_the_fittest_team_is_kept_with_its_genes(name, config):
+    learner = build(name, config)
+    kept = None
+    for before, after in pairwise(run(learner, 5)):
+        trials = learner.ask(before)
+        kept = trials.networks()[0] if trials.portrait else kept
+        if is_end(before, after):
+            np.testing.assert_array_equal(after.progress.fittest_genes, kept)
+
+
+@every_variant
+def test_scores_that_are_not_finite_are_counted_and_spoil_nothing(name, config):
+    def spoiled(trials):
+        scores = judge(trials)
+        fitness = scores.fitness.copy()
+        fitness[0] = [np.nan, np.inf, -np.inf]
+        return replace(scores, fitness=fitness)
+
+    learner = build(name, config)
+    count = 0
+    for before, after in pairwise(run(learner, 5, score=spoiled)):
+        count += 3
+        assert after.progress.n_nonfinite == count
+        assert np.isfinite(after.progress.best_fitness)
+        assert np.isfinite(after.progress.mean_fitness)
+        assert np.isfinite(learner.ask(after).genes).all()
+        if is_end(before, after):
+            count = 0
+
+
+# --- methods with populations of neurons or networks ----------------------------------------------
+
+populations = pytest.mark.parametrize(
+    ("name", "config"),
+    [
+        pytest.param(name, config, id=label)
+        for (name, config), label in zip(VARIANTS, IDS, strict=True)
+        if isinstance(build(name, config).init(LAYOUT, 1), Populations)
+    ],
+)
+
+
+@populations
 def test_genotypes_stay_in_range_and_empty_slots_empty(name, config):
     sizes = set()
     for state in run(build(name, config), 8):
         assert np.abs(state.genes).max() <= 1
         assert not state.genes[~state.active].any()
-        assert state.active.sum(axis=1).tolist() == state.n_hidden.tolist()
-        sizes.update(state.n_hidden.tolist())
+        assert state.active.sum(axis=1).tolist() == state.progress.n_hidden.tolist()
+        sizes.update(state.progress.n_hidden.tolist())
     adapts = "stagnation_y" in config
     assert (sizes == {3}) == (not adapts)
     assert min(sizes) >= 2
 
 
-@every_variant
+@populations
 def test_every_genotype_is_tried_exactly_as_often_as_promised(name, config):
     learner = build(name, config)
     for state in run(learner, 5):
         trials = learner.ask(state)
         n, r = np.indices(trials.teams.shape[:2])
-        in_range = (trials.teams >= -1) & (trials.teams < len(trials.genes))
-        assert in_range.all()
         if state.phase != "genotypes":
             continue
         own = np.arange(state.genes[..., 0].size).reshape(state.genes.shape[:3])
@@ -143,107 +290,42 @@ def test_every_genotype_is_tried_exactly_as_often_as_promised(name, config):
             np.testing.assert_array_equal(robot, np.nonzero(np.isfinite(told.fitness))[0])
 
 
-@every_variant
-def test_every_team_evaluated_is_counted(name, config):
-    learner = build(name, config)
-    states = run(learner, 6)
-    spent = 0
+@populations
+def test_the_phases_of_a_generation(name, config):
+    states = run(build(name, config), 6)
     for before, after in pairwise(states):
-        spent += len(learner.ask(before).teams)
-        assert after.team_evaluations == spent
-        assert after.generation - before.generation == (after.phase == "genotypes")
+        assert is_end(before, after) == (after.phase == "genotypes")
     phases = {state.phase for state in states}
     has_type_c = name.startswith("cone") and config.get("type_c") != "off"
     assert ("elites" in phases) == has_type_c
     assert ("lesion" in phases) == ("stagnation_y" in config)
 
 
-@every_variant
-def test_ask_and_tell_are_pure(name, config):
-    learner = build(name, config)
-    for state in run(learner, 4):
-        before = copied(state)
-        trials, again = learner.ask(state), learner.ask(state)
-        np.testing.assert_array_equal(trials.teams, again.teams)
-        np.testing.assert_array_equal(trials.genes, again.genes)
-        assert trials.teams.dtype == np.int32
-        assert trials.genes.dtype == np.float32
-        scores = judge(trials)
-        kept = scores.fitness.copy(), scores.specialization.copy(), trials.teams.copy()
-        assert_same(learner.tell(state, trials, scores), learner.tell(state, trials, scores))
-        assert_same(state, before)
-        np.testing.assert_array_equal(scores.fitness, kept[0])
-        np.testing.assert_array_equal(scores.specialization, kept[1])
-        np.testing.assert_array_equal(trials.teams, kept[2])
-
-
-@every_variant
-def test_the_seed_decides_everything(name, config):
-    learner = build(name, config)
-    first, second, other = (run(learner, 5, root)[-1] for root in (3, 3, 4))
-    assert_same(first, second)
-    assert (first.genes != other.genes).mean() > 0.3
-
-
-@every_variant
-def test_a_stored_state_resumes_bit_for_bit(name, config):
-    learner = build(name, config)
-    states = run(learner, 6)
-    for stop in (1, len(states) // 2):
-        arrays, rest = io.BytesIO(), {}
-        for field in fields(State):
-            value = getattr(states[stop], field.name)
-            if not isinstance(value, np.ndarray):
-                rest[field.name] = value
-        named = {f.name: getattr(states[stop], f.name) for f in fields(State) if f.name not in rest}
-        np.savez(arrays, **named)
-        arrays.seek(0)
-        with np.load(arrays, allow_pickle=False) as loaded:
-            resumed = State(**loaded, **json.loads(json.dumps(rest)))
-        assert_same(run(learner, 6, state=resumed)[-1], states[-1])
-
-
-@every_variant
+@populations
 def test_the_finished_generation_is_described(name, config):
     learner = build(name, config)
-    finished = 0
-    for before in run(learner, 5):
-        trials = learner.ask(before)
-        scores = judge(trials)
-        after = learner.tell(before, trials, scores)
+    for before, after in pairwise(run(learner, 5)):
         if before.phase == "genotypes":
             tried = after.fitness[np.isfinite(after.fitness)]
-            assert (after.best_fitness, after.mean_fitness) == (tried.max(), tried.mean())
-        if before.phase == "fittest":
-            finished += 1
-            np.testing.assert_array_equal(after.fittest_genes, trials.networks()[0])
-            np.testing.assert_array_equal(after.fittest_active, trials.teams[0] >= 0)
-            np.testing.assert_array_equal(after.fittest_fitness, scores.fitness[0])
-            np.testing.assert_array_equal(after.fittest_specialization, scores.specialization[0])
-    assert finished == 5
+            told = after.progress
+            assert (told.best_fitness, told.mean_fitness) == (tried.max(), tried.mean())
+        trials = learner.ask(before)
+        assert trials.portrait == (before.phase == "fittest")
+        assert (trials.scenarios == "fixed") == (before.phase in ("fittest", "lesion"))
 
 
-@every_variant
-def test_scores_that_are_not_finite_rank_last_and_are_counted(name, config):
+@populations
+def test_scores_that_are_not_finite_rank_last(name, config):
     def spoiled(trials):
         scores = judge(trials)
         fitness = scores.fitness.copy()
         fitness[0] = [np.nan, np.inf, -np.inf]
         return replace(scores, fitness=fitness)
 
-    learner = build(name, config)
-    states = run(learner, 5, score=spoiled)
-    rounds = 0
-    for before, after in pairwise(states):
-        rounds += 3
-        assert after.n_nonfinite == rounds
+    for before, after in pairwise(run(build(name, config), 5, score=spoiled)):
         if before.phase == "genotypes":
             bad = ~np.isfinite(after.fitness)
             n_good = (~bad).sum(axis=-1)
             in_elite = np.take_along_axis(bad, after.elite.astype(int), axis=-1).sum(axis=-1)
             expected = np.maximum(after.elite.shape[-1] - n_good, 0)
             assert in_elite.tolist() == expected.tolist()
-            assert np.isfinite(after.best_fitness)
-            assert np.isfinite(after.mean_fitness)
-        if after.phase == "genotypes":
-            rounds = 0

@@ -1,7 +1,7 @@
 """Whole generations of each method with scripted scores, worked by hand."""
 
 import time
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -32,7 +32,7 @@ def play(learner, state, generations, fitness=1.0, specialization=0.0, lesion=1.
         trials = learner.ask(state)
         f, s = (v(state.generation) if callable(v) else v for v in (fitness, specialization))
         before = state.generation
-        if trials.phase == "lesion":  # the first team is whole
+        if trials.purpose == "lesion":  # the first team is whole
             f = np.array(np.broadcast_to(f, trials.teams.shape[:2]))
             f[1:] = lesion
         state = learner.tell(state, trials, scores(trials, f, s))
@@ -51,16 +51,16 @@ def test_homcne_clones_and_averages():
     state = learner.tell(state, trials, Scores(credit, np.zeros((4, 2))))
     assert state.fitness.tolist() == [[2, 5, 4, -0.5]]
     assert state.elite.tolist() == [[1, 2]]
-    assert (state.best_fitness, state.mean_fitness) == (5, 2.625)
+    assert (state.progress.best_fitness, state.progress.mean_fitness) == (5, 2.625)
     final = learner.ask(state)
-    assert final.phase == "fittest"
+    assert final.purpose == "fittest"
     assert final.teams.tolist() == [[[1, 5, -1], [1, 5, -1]]]
     after = learner.tell(state, final, Scores(np.array([[6.0, 7.0]]), np.array([[0.25, 0.5]])))
-    assert (after.generation, after.phase, after.team_evaluations) == (1, "genotypes", 5)
-    assert after.fittest_fitness.tolist() == [6, 7]
-    assert after.fittest_specialization.tolist() == [0.25, 0.5]
-    np.testing.assert_array_equal(after.fittest_genes[1, :2], state.genes[0, :2, 1])
-    assert after.fittest_active.tolist() == [[True, True, False]] * 2
+    assert (after.generation, after.phase, after.progress.team_evaluations) == (1, "genotypes", 5)
+    assert after.progress.fittest_fitness.tolist() == [6, 7]
+    assert after.progress.fittest_specialization.tolist() == [0.25, 0.5]
+    np.testing.assert_array_equal(after.progress.fittest_genes[1, :2], state.genes[0, :2, 1])
+    assert after.progress.fittest_active.tolist() == [[True, True, False]] * 2
     assert not after.genes[0, 2].any()
 
 
@@ -137,7 +137,7 @@ def test_cone_type_c_reorders_the_elite_and_only_the_elite():
     state = learner.tell(state, trials, Scores(type_c, np.zeros((4, 2))))
     assert state.elite[:, 0].tolist() == [[3, 1], [0, 2]]
     assert state.fitness[:, 0].tolist() == [[1, 0.25, 2, 0.5], [0.5, 7, 0.25, 6]]
-    assert (state.best_fitness, state.phase) == (9, "fittest")  # best and mean are type A
+    assert (state.progress.best_fitness, state.phase) == (9, "fittest")  # best and mean are type A
     assert learner.ask(state).teams.tolist() == [[[3], [4]]]
 
 
@@ -164,7 +164,7 @@ def test_type_c_is_a_mean_over_as_many_trials_as_type_a(type_c, p0, p1):
     state = learner.tell(state, trials, Scores(type_a, np.zeros((8, 2))))
     assert state.elite[:, 0].tolist() == [[1, 3], [0, 2]]
     trials = learner.ask(state)
-    assert (trials.phase, trials.rounds, trials.teams.shape) == ("elites", 2, (8, 2, 1))
+    assert (trials.purpose, trials.rounds, trials.teams.shape) == ("elites", 2, (8, 2, 1))
     for part in np.split(trials.teams[:, :, 0], 2):  # each round tries every rank of both
         assert part[:2, 0].tolist() == [1, 3]
         assert part[2:, 1].tolist() == [4, 6]
@@ -172,7 +172,7 @@ def test_type_c_is_a_mean_over_as_many_trials_as_type_a(type_c, p0, p1):
     assert told.elite[:, 0].tolist() == [p0[0], p1[0]]
     assert np.take(told.fitness[0, 0], told.elite[0, 0]).tolist() == p0[1]
     assert np.take(told.fitness[1, 0], told.elite[1, 0]).tolist() == p1[1]
-    assert told.team_evaluations == 16
+    assert told.progress.team_evaluations == 16
 
 
 @pytest.mark.parametrize(
@@ -190,7 +190,7 @@ def test_how_often_and_in_how_many_parts_the_elite_is_tried(config, n_rounds, pa
     state = learner.init(SMALL, root=3)
     trials = learner.ask(state)
     trials = learner.ask(learner.tell(state, trials, scores(trials)))
-    assert (trials.phase, len(trials.teams), trials.rounds) == ("elites", 4 * n_rounds, parts)
+    assert (trials.purpose, len(trials.teams), trials.rounds) == ("elites", 4 * n_rounds, parts)
 
 
 def test_without_type_c_the_elite_keeps_the_order_of_type_a_and_nothing_is_spent():
@@ -198,7 +198,7 @@ def test_without_type_c_the_elite_keeps_the_order_of_type_a_and_nothing_is_spent
     state = learner.init(replace(SMALL, n_hidden=1, max_hidden=1), root=3)
     type_a = np.array([[1, 0], [4, 0], [2, 0], [3, 0], [0, 9], [0, 7], [0, 8], [0, 6]], float)
     state = learner.tell(state, learner.ask(state), Scores(type_a, np.zeros((8, 2))))
-    assert (state.phase, state.team_evaluations) == ("fittest", 8)
+    assert (state.phase, state.progress.team_evaluations) == ("fittest", 8)
     assert state.elite[:, 0].tolist() == [[1, 3], [0, 2]]
     assert learner.ask(state).teams.tolist() == [[[1], [4]]]
 
@@ -238,7 +238,7 @@ def parents_of(state, population):
 def test_recombination_between_populations(name, config, families, recombinations):
     state = marked_generation(name, [0.1, 0.15, 0.9], **config)
     assert [parents_of(state, p) for p in range(3)] == families
-    assert state.recombinations == recombinations
+    assert state.progress.numbers["recombinations"] == recombinations
 
 
 def test_first_children_go_to_the_first_population():
@@ -273,7 +273,7 @@ def test_cone_regulates_its_thresholds_over_moving_windows():
 
 def test_variants_have_no_threshold_they_do_not_use():
     found = {}
-    for name in ("cone", "cone-1", "cone-2", "cone-3", "mesp"):
+    for name in ("cone", "cone-1", "cone-2", "cone-3"):
         state = method(name, genotypes=2).init(SMALL, root=1)
         found[name] = (np.isnan(state.sst), np.isnan(state.gst))
     assert found == {
@@ -281,8 +281,32 @@ def test_variants_have_no_threshold_they_do_not_use():
         "cone-1": (False, True),
         "cone-2": (True, False),
         "cone-3": (True, True),
-        "mesp": (True, True),
     }
+
+
+def test_a_method_remembers_only_what_it_needs():
+    common = {"progress", "phase", "genes", "active", "fitness", "elite"}
+    windows = {"past_fitness", "watched_since"}
+    thresholds = {"past_specialization", "past_recombinations", "sst", "gst"}
+    own = {
+        "homcne": set(),
+        "hetcne": {"partners"},
+        "ccga": {"partners"},
+        "mesp": windows,
+        "cone": windows | thresholds,
+    }
+    for name, more in own.items():
+        state = method(name, genotypes=2).init(SMALL, root=1)
+        assert {field.name for field in fields(state)} == common | more, name
+
+
+def test_the_log_has_the_thresholds_that_a_generation_was_bred_with():
+    learner = method("cone", genotypes=2, stagnation_v=3, sst=0.05)
+    states = play(learner, learner.init(SMALL, root=1), 6, specialization=lambda g: 0.01 * g)
+    logged = [state.progress.numbers["sst"] for state in states]
+    assert logged == [0.05, *(state.sst for state in states[:-1])]
+    assert states[-1].sst < 0.05
+    assert states[-1].progress.numbers["type_c_evaluations"] == 4  # robots x elite genotypes
 
 
 @pytest.mark.parametrize(
@@ -304,7 +328,7 @@ def test_stagnating_controllers_grow_when_every_neuron_is_needed(name, config, p
         fitness=lambda g: np.array([1.0, 1.0 + g]),
         lesion=0.0,
     )
-    sizes = [s.n_hidden.tolist() for s in states]
+    sizes = [s.progress.n_hidden.tolist() for s in states]
     # The window spans `patience` generations first after generation `patience` (counted from 0),
     # restarts in the next and is full again `patience` later.
     grown, again = patience, 2 * patience + 1
@@ -315,7 +339,7 @@ def test_stagnating_controllers_grow_when_every_neuron_is_needed(name, config, p
     assert len(np.unique(new)) == new.size
     assert not states[grown].genes[1, 2].any()
     # Lesions are paid for: the whole team, two neurons of robot 0, later three.
-    cost = np.diff([s.team_evaluations for s in states])
+    cost = np.diff([s.progress.team_evaluations for s in states])
     assert cost[grown - 1] - cost[grown - 2] == 3
 
 
@@ -333,7 +357,7 @@ def test_a_neuron_that_nobody_misses_goes_and_its_slot_is_emptied():
     left = np.array([[1, 1], [0.5, 1], [0.95, 1], [0.1, 1], [1, 0.0], [1, 0.1], [1, 0.8]])
     state = learner.tell(state, trials, Scores(left, np.zeros((7, 2))))
     assert state.active.tolist() == [[True, False, True, False], [True, True, True, True]]
-    assert state.n_hidden.tolist() == [2, 4]
+    assert state.progress.n_hidden.tolist() == [2, 4]
     assert not state.genes[0, 1].any()
     assert state.genes[1, 3].any()
     teams = learner.ask(state).teams

@@ -2,31 +2,31 @@
 
 from __future__ import annotations
 
-from dataclasses import fields, replace
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 
 import numpy as np
 import pytest
 
 from conevo.errors import UsageError
-from conevo.evolution import METHODS, Layout, Scores, State, method
+from conevo.evolution import METHODS, Layout, Progress, Scores, State, method
 from conevo.evolution.inheritance import breed_from, hand_on
 
 LAYOUT = Layout(n_robots=2, n_hidden=3, max_hidden=5, n_genes=4)
-TAKEN = {"genes", "active", "n_hidden"}
+TAKEN = {"genes", "active", "progress.n_hidden"}
 every_method = pytest.mark.parametrize("name", METHODS)
 
 
 def build(name: str):
     """Return a method with short windows, so that thresholds and sizes change soon."""
-    known = {field.name for field in fields(METHODS[name].config_class)}
+    known = {one.name for one in fields(METHODS[name].config_class)}
     windows = {"stagnation_v", "stagnation_w", "stagnation_y"} & known
     return method(name, genotypes=6, elite_portion=0.5, **dict.fromkeys(sorted(windows), 1))
 
 
 def evolve(learner, state: State, generations: int) -> State:
     """Return the state after so many generations of falling scores."""
-    end = state.generation + generations
-    while state.generation < end:
+    end = state.progress.generation + generations
+    while state.progress.generation < end:
         trials = learner.ask(state)
         networks = trials.networks().astype(np.float64)
         fitness = np.sin(5 * networks).sum(axis=(2, 3)) - 5 * trials.generation
@@ -35,12 +35,21 @@ def evolve(learner, state: State, generations: int) -> State:
     return state
 
 
+def contents(record: object, prefix: str = "") -> dict[str, object]:
+    """Return what a state holds, by name, its header's fields as "progress.root"."""
+    found: dict[str, object] = {}
+    for one in fields(record):
+        value, name = getattr(record, one.name), prefix + one.name
+        found |= contents(value, f"{name}.") if is_dataclass(value) else {name: value}
+    return found
+
+
 def same(a: State, b: State, names: set[str]) -> None:
     """Check that two states agree in some fields, to the bit and the type."""
+    left, right = contents(a), contents(b)
     for name in names:
-        left, right = getattr(a, name), getattr(b, name)
-        assert np.asarray(left).dtype == np.asarray(right).dtype, name
-        np.testing.assert_array_equal(left, right, err_msg=name)
+        assert np.asarray(left[name]).dtype == np.asarray(right[name]).dtype, name
+        np.testing.assert_equal(left[name], right[name], err_msg=name)
 
 
 @every_method
@@ -48,11 +57,11 @@ def test_genes_and_slots_are_taken_over_and_all_else_begins_anew(name: str) -> N
     learner = build(name)
     old = evolve(learner, learner.init(LAYOUT, 3), 8)
     if "stagnation_y" in METHODS[name].config_class.__dataclass_fields__:
-        while (old.n_hidden == LAYOUT.n_hidden).all():  # until a changed size is at stake
+        while (old.progress.n_hidden == LAYOUT.n_hidden).all():  # until a changed size is at stake
             old = evolve(learner, old, 1)
     new, fresh = hand_on(learner, LAYOUT, 7, old), learner.init(LAYOUT, 7)
     same(new, old, TAKEN)
-    same(new, fresh, {field.name for field in fields(State)} - TAKEN)
+    same(new, fresh, contents(fresh).keys() - TAKEN)
 
 
 @every_method
@@ -66,14 +75,14 @@ def test_a_team_of_another_size_is_filled_in_turn(name: str, n_robots: int) -> N
     for p in range(n_populations):
         np.testing.assert_array_equal(new.genes[p], old.genes[p % len(old.genes)])
         np.testing.assert_array_equal(new.active[p], old.active[p % len(old.genes)])
-    assert new.fittest_fitness.shape == (n_robots,)
+    assert new.progress.fittest_fitness.shape == (n_robots,)
     trials = learner.ask(new)
     assert trials.teams.shape[1] == n_robots
     rows = {row.tobytes() for row in old.genes.reshape(-1, LAYOUT.n_genes)}
     played = trials.networks()[trials.teams >= 0]
     assert {row.tobytes() for row in played} <= rows
     later = evolve(learner, new, 4)
-    assert later.generation == 4
+    assert later.progress.generation == 4
     assert np.abs(later.genes).max() <= 1
     assert not later.genes[~later.active].any()
 
@@ -106,7 +115,7 @@ def test_populations_that_do_not_fit_are_refused(name: str) -> None:
 
 def test_neurons_are_no_networks() -> None:
     mesp, ccga = build("mesp"), build("ccga")
-    with pytest.raises(UsageError, match="single neurons and whole networks"):
+    with pytest.raises(UsageError, match="neurons do not mix with whole networks"):
         hand_on(ccga, LAYOUT, 3, mesp.init(LAYOUT, 3))
 
 
@@ -119,7 +128,7 @@ def test_populations_bred_from_a_team_have_it_whole_and_vary_around_it(name: str
     genes = np.linspace(-0.9, 0.9, 2 * 5 * 4, dtype=np.float32).reshape(2, 5, 4)
     genes = np.where(active[..., None], genes, np.float32(0))
     state = breed_from(learner, LAYOUT, 3, genes, active)
-    same(state, fresh, {field.name for field in fields(State)} - TAKEN)
+    same(state, fresh, contents(fresh).keys() - TAKEN)
     one_population = len(state.genes) == 1
     for p, m in ((0, 0), (0, 1)) if one_population else ((0, 0), (1, 0)):
         np.testing.assert_array_equal(state.genes[p, :, m], genes[m if one_population else p])
@@ -131,7 +140,7 @@ def test_populations_bred_from_a_team_have_it_whole_and_vary_around_it(name: str
             assert changed.mean() < 0.5
     assert (state.genes != breed_from(learner, LAYOUT, 4, genes, active).genes).any()
     assert np.unique(state.genes[0].swapaxes(0, 1).reshape(6, -1), axis=0).shape[0] > 2
-    same(breed_from(learner, LAYOUT, 3, genes, active), state, {"genes", "active", "n_hidden"})
+    same(breed_from(learner, LAYOUT, 3, genes, active), state, TAKEN)
     assert learner.ask(state).teams.shape == learner.ask(fresh).teams.shape
 
 
@@ -140,6 +149,40 @@ def test_a_team_of_other_sizes_is_refused() -> None:
     with pytest.raises(UsageError, match="3 genes per neuron became 4"):
         breed_from(build("mesp"), LAYOUT, 3, genes, active)
     genes = np.zeros((2, 5, 4), dtype=np.float32)
-    assert breed_from(build("mesp"), LAYOUT, 3, genes, active).n_hidden.tolist() == [5, 5]
+    assert breed_from(build("mesp"), LAYOUT, 3, genes, active).progress.n_hidden.tolist() == [5, 5]
     with pytest.raises(UsageError, match="has networks of 3 neurons, which never grow"):
         breed_from(build("ccga"), LAYOUT, 3, genes, active)
+
+
+@dataclass(frozen=True)
+class Alone:
+    """A state without populations."""
+
+    progress: Progress
+
+
+@dataclass(frozen=True)
+class Hermit:
+    """A method whose state has no populations."""
+
+    config: object = field(default_factory=object)
+    name: str = "hermit"
+    title: str = "Hermit"
+
+    def init(self, layout: Layout, root: int) -> Alone:
+        """Return generation 0."""
+        return Alone(Progress.first(layout, root))
+
+
+def test_a_method_without_populations_begins_with_nobody_elses() -> None:
+    hermit, mesp = Hermit(), build("mesp")
+    for learner, old, words in (
+        (hermit, mesp.init(LAYOUT, 3), "Hermit has none that another run could begin with"),
+        (mesp, hermit.init(LAYOUT, 3), "the method it is from has none"),
+    ):
+        with pytest.raises(UsageError, match=words) as caught:
+            hand_on(learner, LAYOUT, 3, old)
+        assert "\n" not in str(caught.value)
+    genes, active = np.zeros((2, 5, 4), dtype=np.float32), np.ones((2, 5), dtype=bool)
+    with pytest.raises(UsageError, match="no population can be bred from this team: Hermit has"):
+        breed_from(hermit, LAYOUT, 3, genes, active)

@@ -26,13 +26,13 @@ def test_error_halves(name, config, generations):
     learner = method(name, elite_portion=0.25, **config)
     state = learner.init(LAYOUT, root=11)
     error = []
-    while state.generation < generations:
+    while state.progress.generation < generations:
         trials = learner.ask(state)
         distance = np.abs(trials.networks() - target).mean(axis=(2, 3))
-        before = state.generation
+        before = state.progress.generation
         # Robots differ in S by more than any threshold: nobody is taken for another.
         specialization = np.broadcast_to([0.0, 0.5, 1.0], distance.shape)
         state = learner.tell(state, trials, Scores(1 - distance, specialization))
-        if state.generation > before:
-            error.append((1 - state.fittest_fitness).mean())
+        if state.progress.generation > before:
+            error.append((1 - state.progress.fittest_fitness).mean())
     assert np.mean(error[-3:]) < error[0] / 2

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,8 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from conevo.runs.checkpoint import UnusableFile, load, save
+from conevo.errors import UsageError
+from conevo.runs.checkpoint import UnusableFile, difference, load, load_like, save
 
 IDENTITY = {"run_id": "abc", "method": "cone"}
 
@@ -131,3 +133,72 @@ def test_pickles_are_not_opened(saved: Path) -> None:
 def test_another_versions_fields_are_refused(saved: Path) -> None:
     with pytest.raises(UnusableFile, match="another version of conevo"):
         load(saved, Newer, IDENTITY)
+
+
+@dataclass(frozen=True)
+class Inner:
+    root: int
+    fitness: npt.NDArray[np.float64]
+    numbers: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Outer:
+    inner: Inner
+    is_open: bool
+    step: float
+    mean: npt.NDArray[np.float64]
+    any: Any = None
+
+
+def outer(**changes: Any) -> Outer:
+    inner = Inner(3, np.array([np.nan, 1 / 3]), {"sst": float("nan"), "a.b": 2})
+    return replace(Outer(inner, True, 0.1 + 0.2, np.array([1e-320]), "x"), **changes)
+
+
+def test_dataclasses_within_dataclasses_come_back_bit_for_bit(tmp_path: Path) -> None:
+    path = tmp_path / "outer.npz"
+    save(path, outer(), IDENTITY)
+    with np.load(path) as archive:
+        assert set(archive) == {"about", "field.mean", "field.inner.fitness"}
+    like = outer(inner=Inner(0, np.zeros(2), {}), mean=np.zeros(1), step=0.0)
+    found = load_like(like, path, IDENTITY)
+    assert type(found) is Outer
+    assert is_same(found.inner, outer().inner)
+    assert is_same(replace(found, inner=None), replace(outer(), inner=None))
+    assert difference(found, like) == ""
+    assert difference(found, outer(mean=np.zeros((1, 1)))) == "mean"
+    assert difference(found, outer(inner=Inner(0, np.zeros(2, np.float32), {}))) == "inner.fitness"
+
+
+def test_what_is_not_of_the_examples_kind_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "outer.npz"
+    save(path, outer(), IDENTITY)
+    for like, words in (
+        (outer(step=1), r"damaged: step is 0\.3"),
+        (outer(is_open=1), "damaged: is_open is True"),
+        (outer(mean=1.0), "damaged: mean is"),
+        (outer(mean={}), "another version"),
+        (outer(inner=Newer(1, np.zeros(1))), "another version"),
+        (example(), "another version"),
+    ):
+        with pytest.raises(UnusableFile, match=words) as caught:
+            load_like(like, path, IDENTITY)
+        assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("value", "what"),
+    [
+        (np.random.default_rng(1), "Generator"),
+        ([1, 2], "list"),
+        (None, "NoneType"),
+        ({1: 2.0}, "dict"),
+        (np.array([{}], dtype=object), "an array of objects"),
+        (np.ma.masked_array([1.0], [True]), "MaskedArray"),
+    ],
+)
+def test_a_field_that_cannot_be_kept_is_named(value: Any, what: str, tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match=f"the state of Outer cannot be kept: any is {what};"):
+        save(tmp_path / "outer.npz", outer(any=value), IDENTITY)
+    assert list(tmp_path.iterdir()) == []

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from conevo.evolution.protocol import Trials
@@ -54,7 +56,7 @@ def test_a_portrait_names_castes_by_the_most_executed_action() -> None:
     np.testing.assert_allclose(portrait.specialization, [0, 1, 0.3])
 
 
-def test_a_generation_shares_scenarios_and_all_fittest_teams_share_others() -> None:
+def test_a_generation_shares_scenarios_and_fixed_ones_are_the_same_in_all() -> None:
     task = world("rover/complex-1", n_robots=3, iterations=60, n_hidden=2, max_hidden=2)
     evaluate = make_evaluator(
         Rollout(task, n_threads=1), task, seed=1, epochs=2, fittest_epochs=3, credit="robot"
@@ -62,15 +64,15 @@ def test_a_generation_shares_scenarios_and_all_fittest_teams_share_others() -> N
     genes = stream(1, "genes").uniform(-1, 1, (6, 23)).astype(np.float32)
     team = np.arange(6, dtype=np.int32).reshape(1, 3, 2)
 
-    def counts(phase: str, generation: int) -> np.ndarray:
-        return evaluate(Trials(phase, generation, genes, team)).outcome.counts
+    def counts(generation: int, **request: Any) -> np.ndarray:
+        return evaluate(Trials(generation, genes, team, **request)).outcome.counts
 
-    assert counts("genotypes", 4).shape[1] == 2
-    np.testing.assert_array_equal(counts("genotypes", 4), counts("elites", 4))
-    assert not np.array_equal(counts("genotypes", 4), counts("genotypes", 5))
-    assert counts("fittest", 4).shape[1] == 3
-    np.testing.assert_array_equal(counts("fittest", 4), counts("fittest", 5))
-    np.testing.assert_array_equal(counts("fittest", 4), counts("lesion", 6))
+    assert counts(4).shape[1] == 2
+    np.testing.assert_array_equal(counts(4), counts(4, purpose="elites", portrait=True))
+    assert not np.array_equal(counts(4), counts(5))
+    assert counts(4, scenarios="fixed").shape[1] == 3
+    fixed = counts(5, scenarios="fixed", purpose="lesion", portrait=True)
+    np.testing.assert_array_equal(counts(4, scenarios="fixed"), fixed)
 
 
 def test_each_round_of_trials_meets_scenarios_of_its_own() -> None:
@@ -82,8 +84,8 @@ def test_each_round_of_trials_meets_scenarios_of_its_own() -> None:
     genes = stream(1, "genes").uniform(-1, 1, (6, 23)).astype(np.float32)
     team = np.arange(6, dtype=np.int32).reshape(1, 3, 2)
     same = np.repeat(team, 4, axis=0)
-    in_rounds = evaluate(Trials("genotypes", 4, genes, same, rounds=2))
-    at_once = evaluate(Trials("genotypes", 4, genes, same))
+    in_rounds = evaluate(Trials(4, genes, same, rounds=2))
+    at_once = evaluate(Trials(4, genes, same))
     played = in_rounds.outcome.counts
     assert played.shape[:2] == (4, 2)
     np.testing.assert_array_equal(played[:2], at_once.outcome.counts[:2])

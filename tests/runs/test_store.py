@@ -13,9 +13,11 @@ import pytest
 
 import conevo
 from conevo.errors import EnvironmentFailure, UsageError
+from conevo.evolution.methods.cone import ConeState
 from conevo.runs.champions import Finalists
 from conevo.runs.checkpoint import save
 from conevo.runs.config import resolve
+from conevo.runs.lab import Lab
 from conevo.runs.provenance import describe_machine
 from conevo.runs.store import Store, create
 from replay.followed import record
@@ -212,14 +214,22 @@ def test_teams_and_states_of_other_shapes_are_refused_however_whole_their_files(
     store.save_champion(small)
     with pytest.raises(UsageError, match=r"a team of \(2, 4, \d+\) robots, neurons and genes"):
         conevo.Run(run.path).test(1, threads=1)
-    state, _ = store.load_checkpoint("cone")
-    assert state is not None
+    blank = Lab.equip(run.config, 1, "cpu").blank_state()
+    state, _ = store.load_checkpoint("cone", blank)
+    assert isinstance(state, ConeState)
+    header = state.progress
     (run.path / "DONE").unlink()
     for changes, name in (
         ({"genes": state.genes[:, :, :2]}, "genes"),
         ({"active": state.active[..., None]}, "active"),
         ({"past_fitness": state.past_fitness.astype(np.float32)}, "past_fitness"),
-        ({"root": 7}, "root"),
+        ({"progress": replace(header, root=7)}, "root"),
+        ({"progress": replace(header, team_evaluations=-1)}, "team_evaluations"),
+        ({"progress": replace(header, n_hidden=header.n_hidden[:2])}, "n_hidden"),
+        ({"progress": replace(header, fittest_genes=header.fittest_genes + 3)}, "fittest_genes"),
+        ({"progress": replace(header, fittest_fitness=np.zeros(7))}, "fittest_fitness"),
+        ({"genes": state.genes + 3}, "genes"),
+        ({"phase": "elites"}, "phase"),
         ({"elite": state.elite + 100}, "elite"),
     ):
         for file in run.path.glob("checkpoint-?.npz"):

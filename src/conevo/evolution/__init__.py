@@ -7,7 +7,7 @@ however you like, ``tell`` turns the scores into the next state::
 
     mesp = method("mesp", genotypes=20, evaluation="shared")
     state = mesp.init(Layout(n_robots=3, n_hidden=4, max_hidden=8, n_genes=6), root=1)
-    while state.generation < 50:
+    while state.progress.generation < 50:
         trials = mesp.ask(state)
         state = mesp.tell(state, trials, my_scores(trials.networks()))
 """
@@ -19,9 +19,19 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from conevo.evolution.methods.registry import METHODS, MethodEntry, method
-    from conevo.evolution.protocol import Layout, Method, Scores, State, Trials
+    from conevo.evolution.protocol import Layout, Method, Progress, Scores, State, Trials
 
-__all__ = ["METHODS", "Layout", "Method", "MethodEntry", "Scores", "State", "Trials", "method"]
+__all__ = [
+    "METHODS",
+    "Layout",
+    "Method",
+    "MethodEntry",
+    "Progress",
+    "Scores",
+    "State",
+    "Trials",
+    "method",
+]
 
 _REGISTRY = ("METHODS", "MethodEntry", "method")
 

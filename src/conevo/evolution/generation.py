@@ -1,9 +1,15 @@
-"""The life of a generation, common to all methods: begin, count, grade, crown, turn the page."""
+"""The life of a generation of populations: begin, count, grade, crown, turn the page.
+
+Nitschke 2009, chapter 3. A generation has several phases: "genotypes" (type A fitness), for CONE
+"elites" (type C), "fittest" (each population's fittest controller, together once more) and, when a
+controller's size is in question, "lesion".
+"""
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import Any
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -14,107 +20,162 @@ from conevo.evolution.protocol import (
     FloatArray,
     IntArray,
     Layout,
+    Progress,
     Scores,
-    State,
     Trials,
 )
 from conevo.evolution.variation import VariationConfig, breed
 from conevo.rng import stream
 
-__all__ = ["advance", "begin", "breed_networks", "count", "crown", "grade", "pool", "trials"]
+__all__ = [
+    "Populations",
+    "advance",
+    "begin",
+    "breed_networks",
+    "count",
+    "crown",
+    "grade",
+    "note",
+    "pool",
+    "push",
+    "trials",
+]
+
+FITTEST = ("fittest", "lesion")  # phases in which the fittest team plays
+
+
+@dataclass(frozen=True)
+class Populations:
+    """What methods with populations of neurons or networks remember; some of them add to it.
+
+    Arrays with a U axis have all ``max_hidden`` slots; empty slots hold zeros. Where genotypes are
+    whole networks (HomCNE, HetCNE, CCGA) they have one fitness each: there ``fitness`` and
+    ``elite`` lack the U axis.
+
+    Attributes:
+        progress: the header.
+        phase: what ``ask`` will ask for.
+        genes: [P, U, M, G] float32 genotypes in [-1, 1].
+        active: [P, U] the slots (sub-populations) in use.
+        fitness: [P, U, M] or [P, M] float64 fitness of this generation (type A; C overwrites it).
+        elite: [P, U, L] or [P, L] int32 genotypes of the elite portion, the fittest first; L = 0
+            before the first generation is graded.
+    """
+
+    progress: Progress
+    phase: str
+    genes: FloatArray
+    active: BoolArray
+    fitness: FloatArray
+    elite: IntArray
+
+    @property
+    def root(self) -> int:
+        """The seed of every random decision."""
+        return self.progress.root
+
+    @property
+    def generation(self) -> int:
+        """The generation being evaluated, from 0."""
+        return self.progress.generation
+
+    def problem(self, first: Populations) -> str:
+        """Return the field that cannot be that of a state between generations, if there is one.
+
+        Args:
+            first: generation 0 of the same run.
+        """
+        grows = {"elite": -1, "partners": -2}  # there are none in generation 0
+        for field in fields(self):
+            found, right = getattr(self, field.name), getattr(first, field.name)
+            if isinstance(right, np.ndarray):
+                length = grows.get(field.name)
+                if found.shape[:length] != right.shape[:length]:
+                    return field.name
+                if field.name in ("genes", "partners") and not (np.abs(found) <= 1).all():
+                    return field.name
+        if not ((self.elite >= 0) & (self.elite < self.genes.shape[2])).all():
+            return "elite"
+        if self.progress.n_hidden.shape != first.progress.n_hidden.shape:
+            return "n_hidden"
+        return "phase" if self.phase != first.phase else ""
+
+
+Kind = TypeVar("Kind", bound=Populations)
 
 
 def begin(
+    kind: type[Kind],
     layout: Layout,
     root: int,
     *,
     n_populations: int,
     n_genotypes: int,
     networks: bool = False,
-    window: int = 0,
-    sst: float = float("nan"),
-    gst: float = float("nan"),
-) -> State:
+    **own: Any,
+) -> Kind:
     """Return generation 0: random genotypes in the first ``n_hidden`` slots.
 
     Args:
+        kind: the method's state.
         layout: the size of the problem.
         root: the seed of every random decision.
         n_populations: P, one per robot or 1.
         n_genotypes: M, genotypes per slot.
         networks: whether a genotype is a whole network, so that fitness has no U axis.
-        window: H, generations of history that the method looks back on.
-        sst: initial specialization similarity threshold.
-        gst: initial genotype similarity threshold.
+        own: fields that the method's state has of its own.
     """
     shape = (n_populations, layout.max_hidden, n_genotypes, layout.n_genes)
     active = np.zeros(shape[:2], dtype=np.bool_)
     active[:, : layout.n_hidden] = True
     graded = (n_populations,) if networks else active.shape
-    robots, nan = layout.n_robots, float("nan")
-    return State(
-        root=root,
-        generation=0,
+    return kind(
+        progress=Progress.first(layout, root, n_populations),
         phase="genotypes",
-        team_evaluations=0,
         genes=random_genes(stream(root, "genotypes"), shape) * active[:, :, None, None],
         active=active,
-        fitness=np.full((*graded, n_genotypes), nan),
+        fitness=np.full((*graded, n_genotypes), np.nan),
         elite=np.zeros((*graded, 0), dtype=np.int32),
-        partners=np.zeros((*shape[:2], 0, layout.n_genes), dtype=np.float32),
-        past_fitness=np.full((window, robots), nan),
-        past_specialization=np.full(window, nan),
-        past_recombinations=np.full(window, nan),
-        watched_since=np.zeros(n_populations, dtype=np.int64),
-        sst=float(sst),
-        gst=float(gst),
-        fittest_genes=np.zeros((robots, layout.max_hidden, layout.n_genes), dtype=np.float32),
-        fittest_active=np.zeros((robots, layout.max_hidden), dtype=np.bool_),
-        fittest_fitness=np.full(robots, nan),
-        fittest_specialization=np.full(robots, nan),
-        best_fitness=nan,
-        mean_fitness=nan,
-        n_nonfinite=0,
-        recombinations=0,
-        n_hidden=active.sum(axis=1),
+        **own,
     )
 
 
-def pool(state: State) -> FloatArray:
+def pool(state: Populations) -> FloatArray:
     """Return the neuron genotypes as one list of rows, [P * U * M, G]."""
     return state.genes.reshape(-1, state.genes.shape[-1])
 
 
 def trials(
-    state: State, teams: IntArray, genes: FloatArray | None = None, rounds: int = 1
+    state: Populations, teams: IntArray, genes: FloatArray | None = None, rounds: int = 1
 ) -> Trials:
-    """Return ``teams`` as the state's trials, over its own pool unless another is given."""
-    genes = pool(state) if genes is None else genes
-    return Trials(state.phase, state.generation, genes, teams, rounds)
+    """Return ``teams`` as the state's trials, over its own pool unless another is given.
 
-
-def count(state: State, asked: Trials, scores: Scores) -> State:
-    """Return the state with the evaluation counted, after checking that it answers the question."""
-    if (asked.phase, asked.generation) != (state.phase, state.generation):
-        raise UsageError(
-            f"these scores are for phase {asked.phase!r} of generation {asked.generation}, "
-            f"the state waits for {state.phase!r} of {state.generation}"
-        )
-    expected = asked.teams.shape[:2]
-    for name in ("fitness", "specialization"):
-        shape = np.shape(getattr(scores, name))
-        if shape != expected:
-            raise UsageError(f"scores.{name} has shape {shape}, teams x robots is {expected}")
-    bad = int(np.count_nonzero(~np.isfinite(scores.fitness)))
-    earlier = 0 if state.phase == "genotypes" else state.n_nonfinite
-    return replace(
-        state,
-        team_evaluations=state.team_evaluations + expected[0],
-        n_nonfinite=earlier + bad,
+    The fittest teams of all generations meet the same scenarios.
+    Choice: so do their lesions, so that no neuron is removed by the luck of one scenario.
+    """
+    return Trials(
+        generation=state.generation,
+        genes=pool(state) if genes is None else genes,
+        teams=teams,
+        scenarios="fixed" if state.phase in FITTEST else "fresh",
+        portrait=state.phase == "fittest",
+        rounds=rounds,
+        purpose=state.phase,
     )
 
 
-def grade(state: State, fitness: FloatArray, n_elite: int, phase: str) -> State:
+def count(state: Kind, asked: Trials, scores: Scores) -> Kind:
+    """Return the state with the evaluation counted, after checking that it answers the question."""
+    if (asked.purpose, asked.generation) != (state.phase, state.generation):
+        raise UsageError(
+            f"these scores are for phase {asked.purpose!r} of generation {asked.generation}, "
+            f"the state waits for {state.phase!r} of {state.generation}"
+        )
+    is_first = state.phase == "genotypes"
+    return replace(state, progress=state.progress.counted(asked, scores, is_first=is_first))
+
+
+def grade(state: Kind, fitness: FloatArray, n_elite: int, phase: str) -> Kind:
     """Return the state with type A fitness given and the elite portion named.
 
     Args:
@@ -123,32 +184,28 @@ def grade(state: State, fitness: FloatArray, n_elite: int, phase: str) -> State:
         n_elite: L.
         phase: what comes next.
     """
-    finite = fitness[np.isfinite(fitness)]
     return replace(
         state,
+        progress=state.progress.graded(fitness),
         phase=phase,
         fitness=fitness,
         elite=ranking(fitness)[..., :n_elite],
-        best_fitness=float(finite.max()) if finite.size else float("nan"),
-        mean_fitness=float(finite.mean()) if finite.size else float("nan"),
     )
 
 
-def crown(state: State, asked: Trials, scores: Scores) -> State:
-    """Return the state with the fittest team on record: it is evaluated together once more."""
-    team: IntArray = asked.teams[0]
-    return replace(
-        state,
-        fittest_genes=asked.networks()[0].astype(np.float32),
-        fittest_active=team >= 0,
-        fittest_fitness=np.array(scores.fitness[0], dtype=np.float64),
-        fittest_specialization=np.array(scores.specialization[0], dtype=np.float64),
-        past_fitness=_push(state.past_fitness, scores.fitness[0]),
-        past_specialization=_push(state.past_specialization, np.mean(scores.specialization[0])),
-    )
+def crown(state: Kind, asked: Trials, scores: Scores, **changes: Any) -> Kind:
+    """Return the state with the fittest team on record: it is evaluated together once more.
+
+    Args:
+        state: in phase "fittest".
+        asked: the fittest team.
+        scores: of it.
+        changes: further fields that change (windows).
+    """
+    return replace(state, progress=state.progress.crowned(asked, scores), **changes)
 
 
-def breed_networks(state: State, elite: IntArray, config: VariationConfig) -> FloatArray:
+def breed_networks(state: Populations, elite: IntArray, config: VariationConfig) -> FloatArray:
     """Return children [P, U, M, G] of methods whose genotypes are whole networks.
 
     Args:
@@ -157,36 +214,47 @@ def breed_networks(state: State, elite: IntArray, config: VariationConfig) -> Fl
         config: how to vary.
     """
     _, n_slots, _, n_genes = state.genes.shape
-    networks = join(state.genes, int(state.n_hidden[0]))
+    networks = join(state.genes, int(state.progress.n_hidden[0]))
     children = breed(networks, elite, stream(state.root, "breed", state.generation), config)
     return split(children, n_slots, n_genes)
 
 
 def advance(
-    state: State, genes: FloatArray, active: BoolArray, recombinations: int = 0, **changes: Any
-) -> State:
+    state: Kind,
+    genes: FloatArray,
+    active: BoolArray,
+    numbers: Mapping[str, float] | None = None,
+    **changes: Any,
+) -> Kind:
     """Return the first state of the next generation.
 
     Args:
         state: the generation that ends.
         genes: [P, U, M, G] children.
         active: [P, U] slots in use from now on; all others are emptied.
-        recombinations: sub-population pairs recombined between populations.
-        changes: further fields that change (thresholds, windows, partners).
+        numbers: what else the log says of the generation that ends.
+        changes: further fields that change (windows, partners).
     """
+    progress = replace(
+        state.progress.with_numbers(**(numbers or {})),
+        generation=state.generation + 1,
+        n_hidden=active.sum(axis=1),
+    )
     return replace(
         state,
-        generation=state.generation + 1,
+        progress=progress,
         phase="genotypes",
         genes=genes * active[:, :, None, None],
         active=active,
-        n_hidden=active.sum(axis=1),
-        recombinations=recombinations,
-        past_recombinations=_push(state.past_recombinations, recombinations),
         **changes,
     )
 
 
-def _push(past: FloatArray, newest: Any) -> FloatArray:
-    """Drop the oldest entry, append the newest; a history of length 0 stays empty."""
+def note(state: Kind, **numbers: float) -> Kind:
+    """Return the state with further numbers that the log says of the generation."""
+    return replace(state, progress=state.progress.with_numbers(**numbers))
+
+
+def push(past: FloatArray, newest: Any) -> FloatArray:
+    """Return a window without its oldest entry and with a new one; one of length 0 stays empty."""
     return np.concatenate([past, np.asarray(newest, dtype=np.float64)[None]])[1:]

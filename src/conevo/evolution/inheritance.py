@@ -7,13 +7,14 @@ from dataclasses import replace
 import numpy as np
 
 from conevo.errors import UsageError
+from conevo.evolution.generation import Populations
 from conevo.evolution.protocol import BoolArray, FloatArray, Layout, Method, State
 from conevo.evolution.variation import VariationConfig, mutate
 from conevo.rng import stream
 
 __all__ = ["breed_from", "hand_on"]
 
-AXES = {"slots": 1, "genotypes per slot": 2, "genes per neuron": 3}  # of State.genes
+AXES = {"slots": 1, "genotypes per slot": 2, "genes per neuron": 3}  # of Populations.genes
 
 
 def hand_on(method: Method, layout: Layout, root: int, state: State) -> State:
@@ -33,10 +34,16 @@ def hand_on(method: Method, layout: Layout, root: int, state: State) -> State:
         state: what to begin with; it is not changed.
 
     Raises:
-        UsageError: slots, genotypes or genes are not as many as before, or genotypes are whole
-            networks in one of the two only.
+        UsageError: slots, genotypes or genes are not as many as before, genotypes are whole
+            networks in one of the two only, or one of the two has no populations.
     """
     fresh = method.init(layout, root)
+    if not (isinstance(fresh, Populations) and isinstance(state, Populations)):
+        who = "the method it is from" if isinstance(fresh, Populations) else method.title
+        raise UsageError(
+            f"these populations cannot be handed on: {who} has none that another run could begin "
+            f"with (its state is not a {Populations.__module__}.{Populations.__name__})"
+        )
     old, new = state.genes.shape, fresh.genes.shape
     different = [
         f"{old[axis]} {name} became {new[axis]}"
@@ -52,7 +59,7 @@ def hand_on(method: Method, layout: Layout, root: int, state: State) -> State:
         )
     source = np.arange(new[0]) % old[0]
     active = state.active[source]
-    return replace(fresh, genes=state.genes[source], active=active, n_hidden=active.sum(axis=1))
+    return _with(fresh, state.genes[source], active)
 
 
 def breed_from(
@@ -73,9 +80,14 @@ def breed_from(
 
     Raises:
         UsageError: slots or genes are not as many as in the task, or the method's networks, which
-            keep their size, have another one.
+            keep their size, have another one, or it has no populations.
     """
     fresh = method.init(layout, root)
+    if not isinstance(fresh, Populations):
+        raise UsageError(
+            f"no population can be bred from this team: {method.title} has none that a run could "
+            f"begin with (its state is not a {Populations.__module__}.{Populations.__name__})"
+        )
     n_populations, n_slots, n_genotypes, n_genes = fresh.genes.shape
     n_robots = len(genes)
     different = [
@@ -103,6 +115,10 @@ def breed_from(
     bred = mutate(copies, probability, scale, stream(root, "champion"))
     bred[:, :, :n_kept] = copies[:, :, :n_kept]
     kept = fresh.active if is_whole else active[source[:, 0] % n_robots]
-    return replace(
-        fresh, genes=bred * kept[:, :, None, None], active=kept, n_hidden=kept.sum(axis=1)
-    )
+    return _with(fresh, bred * kept[:, :, None, None], kept)
+
+
+def _with(fresh: Populations, genes: FloatArray, active: BoolArray) -> Populations:
+    """Return generation 0 with these genotypes [P, U, M, G] and slots [P, U] in use."""
+    progress = replace(fresh.progress, n_hidden=active.sum(axis=1))
+    return replace(fresh, progress=progress, genes=genes, active=active)

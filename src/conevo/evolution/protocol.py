@@ -1,21 +1,33 @@
-"""What a method is: init / ask / tell on one flat state, the same for all methods.
+"""What a method is: init / ask / tell on a state of its own, of which others see only the header.
 
-Nitschke 2009, chapter 3. A generation is several rounds of ask and tell, told apart by the state's
-``phase``: "genotypes" (type A fitness), for CONE "elites" (type C), "fittest" (each population's
-fittest controller, together once more) and, when a controller's size is in question, "lesion".
+A state is a frozen dataclass of arrays, plain values and further dataclasses of them: that is what
+a checkpoint can keep. Its field ``progress`` is the header, which is all that the loop and the
+store look at. A generation is as many rounds of ask and tell as a method likes; each request says
+in which scenarios its teams are to play and whether the first of them is to be described.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any, Protocol
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from conevo.errors import UsageError
 
-__all__ = ["BoolArray", "FloatArray", "IntArray", "Layout", "Method", "Scores", "State", "Trials"]
+__all__ = [
+    "BoolArray",
+    "FloatArray",
+    "IntArray",
+    "Layout",
+    "Method",
+    "Progress",
+    "Scores",
+    "State",
+    "Trials",
+]
 
 FloatArray = npt.NDArray[np.floating[Any]]
 IntArray = npt.NDArray[np.integer[Any]]
@@ -51,19 +63,23 @@ class Trials:
     """What to evaluate.
 
     Attributes:
-        phase: the state's phase they belong to.
         generation: the generation they belong to.
-        genes: [K, G] float32 pool of neuron genotypes.
+        genes: [K, G] float32 pool of genotypes of neurons, in [-1, 1].
         teams: [N, R, U] int32 rows of ``genes``: the neuron in robot r's slot k, -1 = empty slot.
-        rounds: the teams come in so many parts of equal length, each of which tries every genotype
-            once; each part is to be played in scenarios of its own.
+        scenarios: "fresh" ones of the generation, or those that are "fixed" for the whole run.
+        portrait: whether what the first team does is the generation's description.
+        rounds: the teams come in so many parts of equal length, each of which is to be played in
+            scenarios of its own.
+        purpose: what for, in the method's own words; nobody else looks at it.
     """
 
-    phase: str
     generation: int
     genes: FloatArray
     teams: IntArray
+    scenarios: Literal["fresh", "fixed"] = "fresh"
+    portrait: bool = False
     rounds: int = 1
+    purpose: str = ""
 
     def networks(self) -> FloatArray:
         """Return the genes of every neuron of every robot, [N, R, U, G]; empty slots are zero."""
@@ -87,66 +103,142 @@ class Scores:
 
 
 @dataclass(frozen=True)
-class State:
-    """Everything a method remembers, as arrays and plain values: enough to resume bit for bit.
-
-    Arrays must not be written to. Arrays with a U axis have all ``max_hidden`` slots; empty slots
-    hold zeros. Whole-network methods (HomCNE, HetCNE, CCGA) have one fitness per network: there
-    ``fitness`` and ``elite`` lack the U axis.
+class Progress:
+    """The header of a state: what the loop and the store know of it, whatever the method.
 
     Attributes:
         root: the seed of every random decision.
         generation: the generation being evaluated, from 0.
-        phase: what ``ask`` will ask for.
-        team_evaluations: teams evaluated so far, in all phases.
-        genes: [P, U, M, G] float32 genotypes in [-1, 1].
-        active: [P, U] the slots (sub-populations) in use.
-        fitness: [P, U, M] or [P, M] float64 fitness of this generation (type A; C overwrites it).
-        elite: [P, U, L] or [P, L] int32 genotypes of the elite portion, the fittest first.
-        partners: [P, U, L, G] float32 last generation's elite, for methods that take partners from
-            it; L = 0 otherwise.
-        past_fitness: [H, R] float64 ``fittest_fitness`` of the last H generations, the newest last,
-            NaN before the first. H is what the method's windows need.
-        past_specialization: [H] float64 mean S of the fittest team.
-        past_recombinations: [H] float64 recombinations between populations.
-        watched_since: [P] int64 generation at which the controller-size window started.
-        sst: specialization similarity threshold, NaN for methods without.
-        gst: genotype similarity threshold, NaN for methods without.
-        fittest_genes: [R, U, G] float32 fittest team of the last finished generation.
-        fittest_active: [R, U] its slots in use.
-        fittest_fitness: [R] float64 its credits when evaluated together once more.
-        fittest_specialization: [R] float64 its degrees of specialization.
-        best_fitness: the best type A fitness of the generation.
-        mean_fitness: the mean type A fitness of the generation (of the finite ones).
-        n_nonfinite: scores of the generation that were not finite; they rank last.
-        recombinations: sub-population pairs recombined between populations.
+        team_evaluations: teams evaluated so far.
         n_hidden: [P] int64 hidden neurons of each population's controllers.
+        fittest_genes: [R, U, G] float32 fittest team of the last finished generation; G genes of a
+            neuron in each of U slots, zero in empty ones.
+        fittest_active: [R, U] its slots in use.
+        fittest_fitness: [R] float64 its credits.
+        fittest_specialization: [R] float64 its degrees of specialization.
+        best_fitness: the best fitness of the generation.
+        mean_fitness: the mean fitness of the generation (of the finite ones).
+        n_nonfinite: scores of the generation that were not finite; they rank last.
+        numbers: what else the method says of the generation, by name: further columns of the log.
     """
 
     root: int
     generation: int
-    phase: str
     team_evaluations: int
-    genes: FloatArray
-    active: BoolArray
-    fitness: FloatArray
-    elite: IntArray
-    partners: FloatArray
-    past_fitness: FloatArray
-    past_specialization: FloatArray
-    past_recombinations: FloatArray
-    watched_since: IntArray
-    sst: float
-    gst: float
+    n_hidden: IntArray
     fittest_genes: FloatArray
     fittest_active: BoolArray
     fittest_fitness: FloatArray
     fittest_specialization: FloatArray
-    best_fitness: float
-    mean_fitness: float
-    n_nonfinite: int
-    recombinations: int
-    n_hidden: IntArray
+    best_fitness: float = float("nan")
+    mean_fitness: float = float("nan")
+    n_nonfinite: int = 0
+    numbers: Mapping[str, float] = field(default_factory=dict)
+
+    @staticmethod
+    def first(layout: Layout, root: int, n_populations: int = 1) -> Progress:
+        """Return the header of generation 0, in which nothing has been evaluated."""
+        robots, slots = layout.n_robots, layout.max_hidden
+        return Progress(
+            root=root,
+            generation=0,
+            team_evaluations=0,
+            n_hidden=np.full(n_populations, layout.n_hidden, dtype=np.int64),
+            fittest_genes=np.zeros((robots, slots, layout.n_genes), dtype=np.float32),
+            fittest_active=np.zeros((robots, slots), dtype=np.bool_),
+            fittest_fitness=np.full(robots, np.nan),
+            fittest_specialization=np.full(robots, np.nan),
+        )
+
+    def counted(self, asked: Trials, scores: Scores, *, is_first: bool) -> Progress:
+        """Return the header with an evaluation counted.
+
+        Args:
+            asked: what was evaluated.
+            scores: what came back.
+            is_first: whether it is the generation's first; what is known of the last one goes.
+
+        Raises:
+            UsageError: the scores are those of other trials.
+        """
+        if asked.generation != self.generation:
+            raise UsageError(
+                f"these scores are for generation {asked.generation}, the state waits for those "
+                f"of {self.generation}"
+            )
+        expected = asked.teams.shape[:2]
+        for name in ("fitness", "specialization"):
+            shape = np.shape(getattr(scores, name))
+            if shape != expected:
+                raise UsageError(f"scores.{name} has shape {shape}, teams x robots is {expected}")
+        return replace(
+            self,
+            team_evaluations=self.team_evaluations + expected[0],
+            n_nonfinite=int(np.count_nonzero(~np.isfinite(scores.fitness)))
+            + (0 if is_first else self.n_nonfinite),
+            numbers={} if is_first else self.numbers,
+        )
+
+    def graded(self, fitness: FloatArray) -> Progress:
+        """Return the header with the best and the mean of a generation's fitness, of any shape."""
+        finite = fitness[np.isfinite(fitness)]
+        return replace(
+            self,
+            best_fitness=float(finite.max()) if finite.size else float("nan"),
+            mean_fitness=float(finite.mean()) if finite.size else float("nan"),
+        )
+
+    def crowned(self, asked: Trials, scores: Scores) -> Progress:
+        """Return the header with the first team of some trials as the generation's fittest."""
+        team: IntArray = asked.teams[0]
+        return replace(
+            self,
+            fittest_genes=np.where((team >= 0)[..., None], asked.genes[team], np.float32(0)).astype(
+                np.float32
+            ),
+            fittest_active=team >= 0,
+            fittest_fitness=np.array(scores.fitness[0], dtype=np.float64),
+            fittest_specialization=np.array(scores.specialization[0], dtype=np.float64),
+        )
+
+    def with_numbers(self, **numbers: float) -> Progress:
+        """Return the header with further numbers of the generation."""
+        return replace(self, numbers={**self.numbers, **numbers})
+
+    def problem(self, first: Progress) -> str:
+        """Return the field that cannot be that of a state of a run, nothing if all can.
+
+        Args:
+            first: the header of generation 0 of that run.
+        """
+        for name in ("generation", "team_evaluations", "n_nonfinite"):
+            if getattr(self, name) < 0:
+                return name
+        for name in (
+            "fittest_genes",
+            "fittest_active",
+            "fittest_fitness",
+            "fittest_specialization",
+        ):
+            if np.shape(getattr(self, name)) != np.shape(getattr(first, name)):
+                return name
+        if not (np.abs(self.fittest_genes) <= 1).all():
+            return "fittest_genes"
+        return "root" if self.root != first.root else ""
+
+
+class State(Protocol):
+    """What a method remembers: a frozen dataclass, enough to resume bit for bit.
+
+    Its arrays must not be written to. It may have a function ``problem(first)`` that returns the
+    name of a field which cannot be that of a state between two generations, given generation 0 of
+    the same run; it is asked when a checkpoint is read, after types and dimensions of all fields
+    have been compared.
+    """
+
+    @property
+    def progress(self) -> Progress:
+        """The header."""
 
 
 class Method(Protocol):
@@ -167,8 +259,8 @@ class Method(Protocol):
     def init(self, layout: Layout, root: int) -> State:
         """Return generation 0 with random genotypes."""
 
-    def ask(self, state: State) -> Trials:
-        """Return the teams to evaluate next."""
+    def ask(self, state: Any) -> Trials:
+        """Return the teams to evaluate next, given one of its own states."""
 
-    def tell(self, state: State, trials: Trials, scores: Scores) -> State:
-        """Return the state after these scores; ``generation`` has grown if one was finished."""
+    def tell(self, state: Any, trials: Trials, scores: Scores) -> State:
+        """Return the state after these scores; its generation has grown if one was finished."""

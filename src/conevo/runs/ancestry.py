@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from conevo.errors import UsageError
 from conevo.runs.champions import Team
+from conevo.runs.lab import layout_of, refuse_other_state
 from conevo.runs.store import Store
 from conevo.worlds.protocol import World
 
 if TYPE_CHECKING:
     from conevo.evolution.protocol import State
+    from conevo.runs.config import RunConfig
     from conevo.runs.run import Run
 
 __all__ = ["ancestor_of", "refuse_other_controllers"]
@@ -24,13 +27,13 @@ SIZES = {
 
 
 def ancestor_of(
-    store: Store, method: str, of_champion: bool = False
+    store: Store, config: Callable[[], RunConfig], of_champion: bool = False
 ) -> tuple[State | Team, dict[str, Any]]:
     """Return what a finished run hands on, and what its descendants say about it.
 
     Args:
         store: of the run.
-        method: of the run.
+        config: called for its settings if its state is wanted; this loads its world and method.
         of_champion: its champion instead of the state that it ended with.
 
     Raises:
@@ -52,8 +55,12 @@ def ancestor_of(
         team, digest = store.load_final_champion()
         about |= {"generation": team.generation, "checkpoint": digest, "of": "champion"}
         return team, {"origin": about}
-    state, digest = store.load_final(method)
-    return state, {"origin": about | {"generation": state.generation, "checkpoint": digest}}
+    settings = config()
+    blank = settings.build_method().init(layout_of(settings.build_world()), settings.run.seed)
+    state, digest = store.load_final(settings.method, blank)
+    refuse_other_state(state, blank, path)
+    generation = state.progress.generation
+    return state, {"origin": about | {"generation": generation, "checkpoint": digest}}
 
 
 def refuse_other_controllers(origin: Run, world: World) -> None:

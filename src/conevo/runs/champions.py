@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from conevo.evolution.protocol import State
+from conevo.evolution.protocol import Progress
 
 __all__ = ["Finalists", "Team", "finalists", "fittest_team", "sampled_generations"]
 
@@ -140,16 +140,16 @@ def finalists(teams: Sequence[Team], newest: Team, most: int) -> list[Team]:
     return ranked[:most]
 
 
-def fittest_team(state: State, generation: int) -> Team:
-    """Return the fittest team of the generation that ``state`` has just finished."""
-    active = np.asarray(state.fittest_active, dtype=np.bool_)
-    genes = np.where(active[..., None], state.fittest_genes, 0).astype(np.float32)
+def fittest_team(progress: Progress, generation: int) -> Team:
+    """Return the fittest team of the generation that has just been finished."""
+    active = np.asarray(progress.fittest_active, dtype=np.bool_)
+    genes = np.where(active[..., None], progress.fittest_genes, 0).astype(np.float32)
     return Team(
         generation=generation,
         genes=genes,
         active=active,
-        fitness=np.asarray(state.fittest_fitness, dtype=np.float64),
-        specialization=np.asarray(state.fittest_specialization, dtype=np.float64),
+        fitness=np.asarray(progress.fittest_fitness, dtype=np.float64),
+        specialization=np.asarray(progress.fittest_specialization, dtype=np.float64),
     )
 
 

@@ -1,8 +1,10 @@
-"""One flat dataclass in one file, whole or refused.
+"""One dataclass in one file, whole or refused.
 
-Arrays go into an uncompressed npz (never pickled), everything else as JSON beside them, with a
-digest over all of it: a flipped bit anywhere is noticed, not only where zip's CRC looks. The file
-says what it is (``identity``), so that another method's or another run's file is refused.
+Its fields are arrays, plain values (int, float, bool, str), mappings from names to plain values and
+further dataclasses of all these, whose fields are named with dots ("progress.generation"). Arrays
+go into an uncompressed npz (never pickled), everything else as JSON next to them, with a digest
+over all of it: a flipped bit anywhere is noticed, not only where zip's CRC looks. The file says
+what it is (``identity``), so that another method's or another run's file is refused.
 """
 
 from __future__ import annotations
@@ -15,13 +17,22 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, TypeVar, get_type_hints
 
-from conevo.errors import shown
+from conevo.errors import UsageError, shown
 from conevo.reading import DamagedFile, check, read_arrays
 from conevo.runs.durable import replace_file
 
-__all__ = ["UnusableFile", "content_digest", "load", "save"]
+__all__ = [
+    "UnusableFile",
+    "content_digest",
+    "difference",
+    "load",
+    "load_like",
+    "refuse_unkept",
+    "save",
+]
 
 FORMAT = 1
+PLAIN = (int, float, bool, str)
 Record = TypeVar("Record")
 
 
@@ -30,22 +41,23 @@ class UnusableFile(DamagedFile):
 
 
 def save(path: Path, record: Any, identity: Mapping[str, str]) -> None:
-    """Write a dataclass whose fields are arrays, ints, floats and strings.
+    """Write a dataclass.
 
     Args:
         path: the file; it is replaced at once.
         record: a dataclass instance.
         identity: what the file belongs to; ``load`` asks for the same.
+
+    Raises:
+        UsageError: a field holds what cannot be kept.
+        EnvironmentFailure: the file cannot be written.
     """
     import numpy as np
 
-    fields = {field.name: getattr(record, field.name) for field in dataclasses.fields(record)}
-    arrays = {name: value for name, value in fields.items() if isinstance(value, np.ndarray)}
-    rest = {
-        name: value.item() if isinstance(value, np.generic) else value
-        for name, value in fields.items()
-        if name not in arrays
-    }
+    refuse_unkept(record, type(record).__name__)
+    leaves = _leaves(record)
+    arrays = {name: value for name, value in leaves.items() if isinstance(value, np.ndarray)}
+    rest = {name: value for name, value in leaves.items() if name not in arrays}
     about = {"format": FORMAT, "identity": dict(identity), "fields": rest}
     about["digest"] = _digest(about, arrays)
     buffer = io.BytesIO()
@@ -54,8 +66,53 @@ def save(path: Path, record: Any, identity: Mapping[str, str]) -> None:
     replace_file(path, buffer.getvalue())
 
 
+def refuse_unkept(record: Any, owner: str) -> None:
+    """Raise UsageError if a dataclass has a field that a file cannot hold.
+
+    Args:
+        record: the dataclass.
+        owner: whose it is, for the message.
+    """
+    import numpy as np
+
+    for name, value in _leaves(record).items():
+        is_array = type(value) is np.ndarray and not value.dtype.hasobject
+        if not is_array and type(value) not in PLAIN:
+            what = "an array of objects" if type(value) is np.ndarray else type(value).__name__
+            raise UsageError(
+                f"the state of {owner} cannot be kept: {name} is {what}; a state has arrays of "
+                f"numbers, int, float, bool, str and dataclasses of these"
+            )
+
+
+def _leaves(record: Any, prefix: str = "") -> dict[str, Any]:
+    """Return what a dataclass holds, by name; fields of fields have names with dots."""
+    found: dict[str, Any] = {}
+    for field in _stored(record):
+        name, value = f"{prefix}{field.name}", getattr(record, field.name)
+        if dataclasses.is_dataclass(value) and not isinstance(value, type):
+            found |= _leaves(value, f"{name}.")
+        elif isinstance(value, Mapping) and all(isinstance(key, str) for key in value):
+            found |= {f"{name}.{key}": _plain(one) for key, one in value.items()}
+        else:
+            found[name] = _plain(value)
+    return found
+
+
+def _stored(record: Any) -> list[dataclasses.Field[Any]]:
+    """Return the fields that make a dataclass; others follow from them."""
+    return [field for field in dataclasses.fields(record) if field.init]
+
+
+def _plain(value: Any) -> Any:
+    """Return a number of numpy as one of Python."""
+    import numpy as np
+
+    return value.item() if isinstance(value, np.generic) else value
+
+
 def load(path: Path, record_class: type[Record], identity: Mapping[str, str]) -> Record:
-    """Return the dataclass written by ``save``, to the bit.
+    """Return the dataclass written by ``save``, bit for bit; one without others in it.
 
     Raises:
         UnusableFile: the file is damaged, or belongs to something else than ``identity``.
@@ -63,6 +120,82 @@ def load(path: Path, record_class: type[Record], identity: Mapping[str, str]) ->
     """
     import numpy as np
 
+    leaves = _read(path, identity)
+    if {field.name for field in dataclasses.fields(record_class)} != leaves.keys():  # type: ignore[arg-type]
+        raise UnusableFile(f"{path} was written by another version of conevo")
+    for name, hint in get_type_hints(record_class).items():
+        kinds = {float: (float, int)}.get(hint, (hint if isinstance(hint, type) else np.ndarray,))
+        if type(leaves[name]) not in kinds:
+            raise UnusableFile(f"{path} is damaged: {name} is {shown(leaves[name])}")
+    return record_class(**leaves)
+
+
+def load_like(example: Record, path: Path, identity: Mapping[str, str]) -> Record:
+    """Return the dataclass written by ``save``, bit for bit: one of an example's kind.
+
+    Its fields have the types of the example's; dimensions of arrays are not looked at, see
+    ``difference``. A mapping may have other names than the example's.
+
+    Raises:
+        UnusableFile: the file is damaged, or belongs to something else than ``identity``.
+        EnvironmentFailure: the file cannot be read.
+    """
+    leaves = _read(path, identity)
+    try:
+        found: Record = _rebuilt(example, leaves, path)
+    except KeyError as error:
+        raise UnusableFile(f"{path} was written by another version of conevo") from error
+    if leaves:
+        raise UnusableFile(f"{path} was written by another version of conevo")
+    return found
+
+
+def _rebuilt(example: Any, leaves: dict[str, Any], path: Path, prefix: str = "") -> Any:
+    """Return a dataclass like an example, made of what a file holds; that is taken from it."""
+    values: dict[str, Any] = {}
+    for field in _stored(example):
+        name, like = f"{prefix}{field.name}", getattr(example, field.name)
+        if dataclasses.is_dataclass(like):
+            values[field.name] = _rebuilt(like, leaves, path, f"{name}.")
+        elif isinstance(like, Mapping):
+            keys = [key for key in leaves if key.startswith(f"{name}.")]
+            values[field.name] = {key[len(name) + 1 :]: leaves.pop(key) for key in keys}
+        else:
+            values[field.name] = leaves.pop(name)
+            if type(values[field.name]) is not type(_plain(like)):
+                found = shown(values[field.name])
+                raise UnusableFile(f"{path} is damaged: {name} is {found}")
+    return type(example)(**values)
+
+
+def difference(record: Any, example: Any) -> str:
+    """Return the first array of a dataclass that has another type or other dimensions.
+
+    Args:
+        record: as ``load_like`` returns it.
+        example: the one that it was read for.
+
+    Returns:
+        The name of a field, nothing if all are alike.
+    """
+    import numpy as np
+
+    leaves = _leaves(record)
+    for name, like in _leaves(example).items():
+        if isinstance(like, np.ndarray):
+            found = leaves.get(name)
+            if found is None or (found.dtype, found.ndim) != (like.dtype, like.ndim):
+                return name
+    return ""
+
+
+def _read(path: Path, identity: Mapping[str, str]) -> dict[str, Any]:
+    """Return what the dataclass in a file holds, by name.
+
+    Raises:
+        UnusableFile: as ``load``.
+        EnvironmentFailure: as ``load``.
+    """
     from conevo.runs.records import FileText
 
     try:
@@ -85,15 +218,9 @@ def load(path: Path, record_class: type[Record], identity: Mapping[str, str]) ->
             raise UnusableFile(
                 f"{path} is foreign: {key} is {found.get(key)!r}, not {identity.get(key)!r}"
             )
-    expected = {field.name for field in dataclasses.fields(record_class)}  # type: ignore[arg-type]
-    if version != FORMAT or expected != fields.keys() | arrays.keys():
+    if version != FORMAT or fields.keys() & arrays.keys():
         raise UnusableFile(f"{path} was written by another version of conevo")
-    for name, hint in get_type_hints(record_class).items():
-        value = arrays.get(name, fields.get(name))
-        kinds = {float: (float, int)}.get(hint, (hint if isinstance(hint, type) else np.ndarray,))
-        if type(value) not in kinds:
-            raise UnusableFile(f"{path} is damaged: {name} is {shown(value)}")
-    return record_class(**fields, **arrays)
+    return {**fields, **arrays}
 
 
 def content_digest(path: Path) -> str:

@@ -51,6 +51,7 @@ from conevo.reading import DamagedFile, parse_toml, read_toml
 from conevo.runs.outline import LENGTH, Outline, identify, outline_of
 
 if TYPE_CHECKING:
+    from conevo.evolution.protocol import Method
     from conevo.worlds.protocol import World
     from conevo.worlds.registry import WorldEntry
 
@@ -149,6 +150,12 @@ class RunConfig:
     def build_world(self) -> World:
         """Return the world of this run."""
         return self.entry.build(self.environment, self.world_params)
+
+    def build_method(self) -> Method:
+        """Return the method of this run."""
+        from conevo.evolution.methods.registry import METHODS
+
+        return METHODS[self.method].build(self.method_config)
 
     @functools.cached_property
     def run_id(self) -> str:

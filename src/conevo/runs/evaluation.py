@@ -14,7 +14,7 @@ from conevo.specialization import individual
 from conevo.worlds.protocol import Outcome, World
 from conevo.worlds.rollout import Rollout
 
-__all__ = ["FITTEST", "Evaluation", "Portrait", "describe", "join", "make_evaluator", "score"]
+__all__ = ["Evaluation", "Portrait", "describe", "join", "make_evaluator", "score"]
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,6 @@ class Evaluation:
 
 
 Evaluate = Callable[[Trials], Evaluation]
-FITTEST = ("fittest", "lesion")  # phases in which the fittest team plays
 
 
 def make_evaluator(
@@ -53,13 +52,12 @@ def make_evaluator(
 
     All trials of a generation meet the same ``epochs`` scenarios, addressed by seed, generation
     and epoch, so a score depends neither on the batch nor on when it is computed; if the trials
-    have rounds, so many further ones in each. The fittest teams of all generations meet the same
-    ``fittest_epochs`` scenarios.
-    Choice: so do their lesions, so that no neuron is removed by the luck of one scenario.
+    have rounds, so many further ones in each. Those that ask for fixed scenarios meet the same
+    ``fittest_epochs`` of them in all generations.
     """
 
     def keys(trials: Trials, part: int) -> list[int]:
-        if trials.phase in FITTEST:
+        if trials.scenarios == "fixed":
             return [fold(seed, "fittest", epoch) for epoch in range(fittest_epochs)]
         met = range(part * epochs, (part + 1) * epochs)
         return [fold(seed, "epoch", trials.generation, epoch) for epoch in met]

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
-
-import numpy as np
 
 from conevo.errors import EnvironmentFailure
 from conevo.evolution.inheritance import breed_from, hand_on
-from conevo.evolution.methods.registry import METHODS
 from conevo.evolution.protocol import Layout, Method, State
 from conevo.reading import DamagedFile
+from conevo.runs import checkpoint
 from conevo.runs.champions import Team
 from conevo.runs.config import RunConfig
 from conevo.runs.evaluation import Evaluate, make_evaluator
@@ -20,7 +18,7 @@ from conevo.runs.loop import check_budget, price
 from conevo.worlds.protocol import World
 from conevo.worlds.rollout import Rollout
 
-__all__ = ["Lab", "Price", "check_memory", "layout_of", "price_of"]
+__all__ = ["Lab", "Price", "check_memory", "layout_of", "price_of", "refuse_other_state"]
 
 
 def layout_of(world: World) -> Layout:
@@ -57,7 +55,7 @@ def price_of(config: RunConfig, ancestor: State | Team | None = None) -> Price:
         UsageError: the budget does not pay for one generation, or the ancestor does not fit.
     """
     world, run = config.build_world(), config.run
-    method = METHODS[config.method].build(config.method_config)
+    method = config.build_method()
     check_memory(config, layout_of(world))
     state = _first(method, layout_of(world), run.seed, ancestor)
     check_budget(method, state, run.budget_evaluations)
@@ -127,7 +125,7 @@ class Lab:
         return Lab(
             config=config,
             world=world,
-            method=METHODS[config.method].build(config.method_config),
+            method=config.build_method(),
             rollout=rollout,
             evaluate=make_evaluator(
                 rollout,
@@ -149,29 +147,9 @@ class Lab:
                 f"{self.config.task}, which has {fits}"
             )
 
-    def refuse_other_state(self, state: State, path: Path) -> None:
-        """Raise DamagedFile if a state, of the run at ``path``, is not one of this method's here.
-
-        It begins a generation, and has the arrays and the seed of the first one.
-        """
-        first = self.method.init(layout_of(self.world), self.config.run.seed)
-        for field in fields(first):
-            right, found = getattr(first, field.name), getattr(state, field.name)
-            if isinstance(right, np.ndarray):
-                # There is neither an elite nor partners before the first generation is graded.
-                length = {"elite": -1, "partners": -2}.get(field.name)
-                is_right = right.shape[:length] == found.shape[:length]
-                is_right &= right.ndim == found.ndim and right.dtype == found.dtype
-                if field.name in ("genes", "partners", "fittest_genes"):
-                    is_right &= bool((np.abs(found) <= 1).all())
-            elif field.name in ("root", "phase"):
-                is_right = right == found
-            else:
-                is_right = not isinstance(right, int) or found >= 0
-            if not is_right:
-                raise DamagedFile(f"{path}: {field.name} of its checkpoint is not one of this run")
-        if not ((state.elite >= 0) & (state.elite < state.genes.shape[2])).all():
-            raise DamagedFile(f"{path}: elite of its checkpoint names genotypes that are not there")
+    def blank_state(self) -> State:
+        """Return generation 0 of random populations: what all states of this run are like."""
+        return self.method.init(layout_of(self.world), self.config.run.seed)
 
     def first_state(self, ancestor: State | Team | None = None) -> State:
         """Return the state before generation 0, after checking that it can be paid.
@@ -181,12 +159,27 @@ class Lab:
                 random ones by default.
 
         Raises:
-            UsageError: the budget does not pay for one generation, the ancestor does not fit, or
-                the world has no room for what belongs in it.
+            UsageError: the budget does not pay for one generation, the ancestor does not fit, the
+                method's state cannot be kept, or the world has no room for what belongs in it.
         """
         layout, seed = layout_of(self.world), self.config.run.seed
         check_memory(self.config, layout)
         state = _first(self.method, layout, seed, ancestor)
+        checkpoint.refuse_unkept(state, self.method.title)
         check_budget(self.method, state, self.config.run.budget_evaluations)
         self.world.scenarios([seed])  # says so now if there is no room for what belongs in it
         return state
+
+
+def refuse_other_state(state: State, blank: State, path: Path) -> None:
+    """Raise DamagedFile if a state, of the run at ``path``, is not one of its own.
+
+    It begins a generation, and has the types, the dimensions and the seed of the first one.
+    """
+    problem = (
+        checkpoint.difference(state, blank)
+        or state.progress.problem(blank.progress)
+        or getattr(state, "problem", lambda _: "")(blank)
+    )
+    if problem:
+        raise DamagedFile(f"{path}: {problem} of its checkpoint is not one of this run")

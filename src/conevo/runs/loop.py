@@ -4,21 +4,21 @@ from __future__ import annotations
 
 import math
 import time
-from collections import Counter
 from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 
 from conevo.errors import UsageError
-from conevo.evolution.protocol import Method, Scores, State
+from conevo.evolution.protocol import Method, Progress, Scores, State
 from conevo.runs.config import RunSettings
-from conevo.runs.evaluation import FITTEST, Evaluate, Portrait, describe
+from conevo.runs.evaluation import Evaluate, Portrait, describe
 from conevo.worlds.measures import Measure
 
 __all__ = ["check_budget", "evolve_generations", "has_reached", "price"]
 
 Record = dict[str, Any]
+OF_METHODS = {"type_c_evaluations", "sst", "gst", "recombinations"}  # every log has them
 
 
 def evolve_generations(
@@ -54,17 +54,18 @@ def evolve_generations(
     while True:
         if last is not None and has_reached(settings.target, main, last["performance"]):
             return "target"
-        if state.generation >= settings.generations:
+        if state.progress.generation >= settings.generations:
             return "generations"
         if not has_time():
             return "time"
         started = time.perf_counter()
-        finished = _run_generation(method, state, evaluate, castes, settings.budget_evaluations)
+        finished = _run_generation(method, state, evaluate, castes, settings)
         if finished is None:
             return "budget"
-        began, (state, portrait, spent) = state, finished
-        steps = _team_steps(spent, settings, iterations) + (last["team_steps"] if last else 0)
-        last = _record(began, state, portrait, spent, steps, time.perf_counter() - started)
+        began, (state, portrait, epochs) = state.progress, finished
+        steps = epochs * iterations + (last["team_steps"] if last else 0)
+        seconds = time.perf_counter() - started
+        last = _record(method, began, state.progress, portrait, steps, seconds)
         on_generation(state, last)
 
 
@@ -73,11 +74,11 @@ def price(method: Method, state: State) -> int:
 
     ask and tell are pure, so it can be priced with empty scores.
     """
-    while state.generation == 0:
+    while state.progress.generation == 0:
         trials = method.ask(state)
         empty = np.zeros(trials.teams.shape[:2])
         state = method.tell(state, trials, Scores(fitness=empty, specialization=empty))
-    return int(state.team_evaluations)
+    return int(state.progress.team_evaluations)
 
 
 def check_budget(method: Method, state: State, budget: int) -> None:
@@ -94,71 +95,81 @@ def check_budget(method: Method, state: State, budget: int) -> None:
 
 
 def _run_generation(
-    method: Method, state: State, evaluate: Evaluate, castes: tuple[str, ...], budget: int
-) -> tuple[State, Portrait, Counter[str]] | None:
+    method: Method,
+    state: State,
+    evaluate: Evaluate,
+    castes: tuple[str, ...],
+    settings: RunSettings,
+) -> tuple[State, Portrait, int] | None:
     """Return what one generation leaves, None if it cannot be paid.
 
-    That is the state after it, its fittest team's portrait, and the team evaluations by phase.
+    That is the state after it, its fittest team's portrait, and the epochs that teams played.
 
-    Choice: a phase that the budget cannot pay is not begun, and a generation that could not be
+    Choice: trials that the budget cannot pay are not begun, and a generation that could not be
     finished does not count, so that a run never spends more than its budget.
     """
-    generation = state.generation
+    generation, budget = state.progress.generation, settings.budget_evaluations
     portrait: Portrait | None = None
-    spent: Counter[str] = Counter()
-    while state.generation == generation:
+    epochs = 0
+    while state.progress.generation == generation:
         trials = method.ask(state)
-        if budget and state.team_evaluations + len(trials.teams) > budget:
+        n_teams = len(trials.teams)
+        if budget and state.progress.team_evaluations + n_teams > budget:
             return None
-        spent[trials.phase] += len(trials.teams)
+        is_fixed = trials.scenarios == "fixed"
+        epochs += n_teams * (settings.fittest_epochs if is_fixed else settings.epochs)
         evaluation = evaluate(trials)
-        if trials.phase == "fittest":
+        if trials.portrait:
             portrait = describe(evaluation.outcome, castes)
         state = method.tell(state, trials, evaluation.scores)
     if portrait is None:
-        raise RuntimeError(f"{method.name} finished a generation without its fittest team")
-    return state, portrait, spent
-
-
-def _team_steps(spent: Mapping[str, int], settings: RunSettings, iterations: int) -> int:
-    """Return the team-steps of one generation, given its team evaluations by phase."""
-    epochs = sum(
-        n * (settings.fittest_epochs if phase in FITTEST else settings.epochs)
-        for phase, n in spent.items()
-    )
-    return epochs * iterations
+        raise UsageError(
+            f"{method.title} has finished generation {generation} without a portrait: "
+            f"one of its trials must ask for that of the fittest team (Trials.portrait)"
+        )
+    return state, portrait, epochs
 
 
 def _record(
-    began: State,
-    state: State,
+    method: Method,
+    began: Progress,
+    ended: Progress,
     portrait: Portrait,
-    spent: Mapping[str, int],
     team_steps: int,
     seconds: float,
 ) -> Record:
-    """Return what the run's log says about a generation, given the states before and after it.
+    """Return what the run's log says about a generation, given the headers before and after it.
 
-    Team evaluations and team-steps are the run's so far, those for type C the generation's own.
-    Thresholds and sizes are those the generation was played and bred with, not the next one's.
+    Team evaluations and team-steps are the run's so far. Sizes are those that the generation was
+    played and bred with, not the next one's. A method's own numbers follow; of a method without
+    some of CONE's, the log has those as null or 0.
+
+    Raises:
+        UsageError: a number of the method has the name of another entry.
     """
-    return {
+    record = {
         "generation": began.generation,
-        "team_evaluations": int(state.team_evaluations),
-        "type_c_evaluations": spent.get("elites", 0),
+        "team_evaluations": int(ended.team_evaluations),
+        "type_c_evaluations": 0,
         "team_steps": team_steps,
         "seconds": round(seconds, 4),
-        "best_fitness": _finite(state.best_fitness),
-        "mean_fitness": _finite(state.mean_fitness),
-        "team_fitness": _finite(np.mean(state.fittest_fitness)),
+        "best_fitness": _finite(ended.best_fitness),
+        "mean_fitness": _finite(ended.mean_fitness),
+        "team_fitness": _finite(np.mean(ended.fittest_fitness)),
         "performance": {name: _finite(value) for name, value in portrait.performance.items()},
         "castes": portrait.castes,
-        "specialization": _finite(np.mean(state.fittest_specialization)),
-        "sst": _finite(began.sst),
-        "gst": _finite(began.gst),
-        "recombinations": int(state.recombinations),
+        "specialization": _finite(np.mean(ended.fittest_specialization)),
+        "sst": None,
+        "gst": None,
+        "recombinations": 0,
         "n_hidden": [int(n) for n in np.atleast_1d(began.n_hidden)],
-        "n_nonfinite": int(state.n_nonfinite),
+        "n_nonfinite": int(ended.n_nonfinite),
+    }
+    if taken := sorted(ended.numbers.keys() & (record.keys() - OF_METHODS)):
+        raise UsageError(f"{method.title} gives a number the name {taken[0]}, which the log has")
+    return record | {
+        name: value if isinstance(value, int) else _finite(value)
+        for name, value in ended.numbers.items()
     }
 
 

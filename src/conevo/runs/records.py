@@ -239,7 +239,7 @@ class FileText(TypedDict):
 
     format: int
     identity: dict[str, str]
-    fields: dict[str, int | Annotated[float, AllowInfNan()] | str]
+    fields: dict[str, bool | int | Annotated[float, AllowInfNan()] | str]
 
 
 class ShapingText(TypedDict):

@@ -136,7 +136,7 @@ def beginning(
     ancestor: State | Team | None = None
     ancestry: Record = {}
     if origin is not None:
-        ancestor, ancestry = ancestor_of(origin._store, origin.outline.method, of_champion)
+        ancestor, ancestry = ancestor_of(origin._store, lambda: origin.config, of_champion)
     suffix = f"-from-{ancestry['origin']['checkpoint'][:6]}" if ancestry else ""
     path = Path(out) if out is not None else RUNS / f"{config.label}{suffix}"
     refuse_existing(path)

@@ -10,7 +10,7 @@ from conevo.errors import UsageError
 from conevo.evolution.protocol import State
 from conevo.runs import provenance
 from conevo.runs.champions import Team, finalists, fittest_team, sampled_generations
-from conevo.runs.lab import Lab
+from conevo.runs.lab import Lab, refuse_other_state
 from conevo.runs.loop import evolve_generations
 from conevo.runs.store import Store
 from conevo.runs.testing import test_team, validate
@@ -46,22 +46,23 @@ def evolve_on(
         UsageError: a file that is needed is lost or damaged.
         EnvironmentFailure: the machine refused.
     """
-    settings, method = lab.config.run, lab.config.method
-    state, problem = store.load_checkpoint(method)
+    settings, method, blank = lab.config.run, lab.config.method, lab.blank_state()
+    state, problem = store.load_checkpoint(method, blank)
     if state is None:
-        state = store.load_origin(method) or lab.first_state()
-    lab.refuse_other_state(state, store.path)
+        state = store.load_origin(method, blank) or lab.first_state()
+    refuse_other_state(state, blank, store.path)
+    generation = state.progress.generation
     if problem and remark is not None:
-        remark(f"{problem}; going on from generation {state.generation} instead")
-    records = store.cut_generations(state.generation)
+        remark(f"{problem}; going on from generation {generation} instead")
+    records = store.cut_generations(generation)
     champion, best = store.load_champion(), _best_so_far(store) if records else []
-    best = [team for team in best if team.generation < state.generation]  # others come again
+    best = [team for team in best if team.generation < generation]  # others come again
     newest = saved = state
     seconds: list[float] = []  # of the generations of this session
     about = store.read_provenance()
     session = {
         "started": provenance.now(),
-        "from_generation": state.generation,
+        "from_generation": generation,
         "threads": lab.rollout.n_threads,
         **provenance.describe_machine(about["device"]),
     }
@@ -69,19 +70,20 @@ def evolve_on(
 
     def keep(state: State, record: Record) -> None:
         nonlocal champion, best, newest, saved
-        team = fittest_team(state, record["generation"])
+        progress = state.progress
+        team = fittest_team(progress, record["generation"])
         best = finalists(best, team, settings.n_finalists)
         if any(one is team for one in best):
             store.save_finalists(best)
         if champion is None or champion.generation != best[0].generation:
             champion = best[0]
             store.save_champion(champion)
-        if team.generation in sampled_generations(state.generation):
+        if team.generation in sampled_generations(progress.generation):
             store.save_team(team)
         store.append(record)
         newest = state
         seconds.append(record["seconds"])
-        if state.generation % settings.checkpoint_every == 0:
+        if progress.generation % settings.checkpoint_every == 0:
             store.save_checkpoint(state, method)
             saved = state
         watch(record)
@@ -155,13 +157,13 @@ def evolve_again(
                 f"{store.path}: generation {record['generation']} evolves differently from its "
                 f"log, so the team of generation {generation} is lost"
             )
-        teams[:] = [fittest_team(state, record["generation"])]
+        teams[:] = [fittest_team(state.progress, record["generation"])]
         if progress is not None:
             progress(record["generation"] + 1, generation + 1)
 
     evolve_generations(
         lab.method,
-        store.load_origin(lab.config.method) or lab.first_state(),
+        store.load_origin(lab.config.method, lab.blank_state()) or lab.first_state(),
         lab.evaluate,
         settings=replace(lab.config.run, generations=generation + 1, target=None),
         main=measures_of(lab.world)[0],

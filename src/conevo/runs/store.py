@@ -336,8 +336,12 @@ class Store(Directory):
         checkpoint.save(path, state, self._identity() | {"method": method})
         self._next_checkpoint = 1 - self._next_checkpoint
 
-    def load_checkpoint(self, method: str) -> tuple[State | None, str]:
+    def load_checkpoint(self, method: str, blank: State) -> tuple[State | None, str]:
         """Return the newest usable state and a remark on those that are not usable.
+
+        Args:
+            method: of the run.
+            blank: a state of that method, whose fields those of the file must be.
 
         Returns:
             The state, None if no checkpoint was written yet; the remark is empty if all is well.
@@ -345,8 +349,6 @@ class Store(Directory):
         Raises:
             UsageError: there are checkpoints, but none is usable.
         """
-        from conevo.evolution.protocol import State
-
         states: dict[int, State] = {}
         problems: list[str] = []
         for slot, name in enumerate(CHECKPOINTS):
@@ -354,7 +356,7 @@ class Store(Directory):
             if os.path.lexists(path):
                 try:
                     identity = self._identity() | {"method": method}
-                    states[slot] = checkpoint.load(path, State, identity)
+                    states[slot] = checkpoint.load_like(blank, path, identity)
                 except checkpoint.UnusableFile as error:
                     problems.append(str(error))
         if problems and not states:
@@ -364,30 +366,35 @@ class Store(Directory):
             )
         if not states:
             return None, ""
-        newest = max(states, key=lambda slot: states[slot].generation)
+        newest = max(states, key=lambda slot: states[slot].progress.generation)
         self._next_checkpoint = 1 - newest
         return states[newest], "; ".join(problems)
 
-    def load_origin(self, method: str) -> State | None:
+    def load_origin(self, method: str, blank: State) -> State | None:
         """Return the state the run began with, None if that is the method's own.
+
+        Args:
+            method, blank: as for ``load_checkpoint``.
 
         Raises:
             UsageError: the file is damaged or foreign.
             EnvironmentFailure: the file is lost.
         """
-        from conevo.evolution.protocol import State
-
         if "origin" not in self.read_provenance():
             return None
-        return checkpoint.load(self.path / ORIGIN, State, self._identity() | {"method": method})
+        identity = self._identity() | {"method": method}
+        return checkpoint.load_like(blank, self.path / ORIGIN, identity)
 
-    def load_final(self, method: str) -> tuple[State, str]:
+    def load_final(self, method: str, blank: State) -> tuple[State, str]:
         """Return the state a finished run ended with, and the digest of its checkpoint.
+
+        Args:
+            method, blank: as for ``load_checkpoint``.
 
         Raises:
             UsageError: the checkpoint is lost or unusable.
         """
-        state, _ = self.load_checkpoint(method)
+        state, _ = self.load_checkpoint(method, blank)
         if state is None:
             raise UsageError(f"{self.path} has lost its last checkpoint")
         file = self.path / CHECKPOINTS[1 - self._next_checkpoint]

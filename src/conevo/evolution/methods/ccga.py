@@ -18,6 +18,7 @@ from annotated_types import Ge, Le
 from conevo.evolution import credit
 from conevo.evolution.assembly import SchemeConfig, best_team, rows, shared
 from conevo.evolution.generation import (
+    Populations,
     advance,
     begin,
     breed_networks,
@@ -28,12 +29,12 @@ from conevo.evolution.generation import (
     trials,
 )
 from conevo.evolution.population import elite_count
-from conevo.evolution.protocol import FloatArray, Layout, Scores, State, Trials
+from conevo.evolution.protocol import FloatArray, Layout, Scores, Trials
 from conevo.evolution.variation import VariationConfig
 from conevo.parameters import parameters
 from conevo.rng import stream
 
-__all__ = ["Ccga", "CcgaConfig"]
+__all__ = ["Ccga", "CcgaConfig", "CcgaState"]
 
 
 @parameters("method")
@@ -48,6 +49,17 @@ class CcgaConfig(VariationConfig, SchemeConfig):
 
 
 @dataclass(frozen=True)
+class CcgaState(Populations):
+    """What CCGA remembers.
+
+    Attributes:
+        partners: [P, U, L, G] float32 last generation's elite; L = 0 in the first.
+    """
+
+    partners: FloatArray
+
+
+@dataclass(frozen=True)
 class Ccga:
     """Cooperative co-evolutionary genetic algorithm; see the module."""
 
@@ -55,17 +67,20 @@ class Ccga:
     name: str = "ccga"
     title: str = "CCGA"
 
-    def init(self, layout: Layout, root: int) -> State:
+    def init(self, layout: Layout, root: int) -> CcgaState:
         """Return generation 0 with random genotypes."""
+        nobody = (layout.n_robots, layout.max_hidden, 0, layout.n_genes)
         return begin(
+            CcgaState,
             layout,
             root,
             n_populations=layout.n_robots,
             n_genotypes=self.config.genotypes,
             networks=True,
+            partners=np.zeros(nobody, dtype=np.float32),
         )
 
-    def ask(self, state: State) -> Trials:
+    def ask(self, state: CcgaState) -> Trials:
         """Return the teams that try every genotype, then the fittest team."""
         config, m = self.config, self.config.genotypes
         if state.phase == "fittest":
@@ -84,7 +99,7 @@ class Ccga:
         genes = np.concatenate([pool(state), state.partners.reshape(-1, state.genes.shape[-1])])
         return trials(state, teams, genes)
 
-    def tell(self, state: State, trials: Trials, scores: Scores) -> State:
+    def tell(self, state: CcgaState, trials: Trials, scores: Scores) -> CcgaState:
         """Return the state after these scores."""
         state = count(state, trials, scores)
         config = self.config
@@ -99,7 +114,7 @@ class Ccga:
         partners = state.genes[population, :, state.elite].swapaxes(1, 2)
         return advance(state, children, state.active, partners=partners)
 
-    def _fitness(self, trials: Trials, scores: Scores, state: State) -> FloatArray:
+    def _fitness(self, trials: Trials, scores: Scores, state: CcgaState) -> FloatArray:
         """Return type A fitness [P, M]."""
         m = self.config.genotypes
         if self.config.evaluation == "shared":

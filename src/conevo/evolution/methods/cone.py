@@ -20,16 +20,16 @@ from annotated_types import Ge, Le
 
 from conevo.evolution import credit
 from conevo.evolution.assembly import elite_teams
-from conevo.evolution.generation import begin, count, trials
-from conevo.evolution.methods.mesp import Mesp, MespConfig
+from conevo.evolution.generation import begin, count, note, push, trials
+from conevo.evolution.methods.mesp import Mesp, MespConfig, MespState
 from conevo.evolution.population import ranking
-from conevo.evolution.protocol import BoolArray, IntArray, Layout, Scores, State, Trials
+from conevo.evolution.protocol import BoolArray, FloatArray, IntArray, Layout, Scores, Trials
 from conevo.evolution.regulation import regulate_gst, regulate_sst
 from conevo.evolution.selection import pair_populations, pair_similar, pair_slots
 from conevo.parameters import parameters
 from conevo.rng import stream
 
-__all__ = ["Cone", "Cone1Config", "Cone2Config", "Cone3Config", "ConeConfig"]
+__all__ = ["Cone", "Cone1Config", "Cone2Config", "Cone3Config", "ConeConfig", "ConeState"]
 
 
 @parameters("method")
@@ -98,27 +98,45 @@ class Cone3Config(Cone1Config):
 
 
 @dataclass(frozen=True)
-class Cone(Mesp):
+class ConeState(MespState):
+    """What CONE remembers.
+
+    Attributes:
+        past_specialization: [H] float64 mean S of the fittest team, as ``past_fitness``.
+        past_recombinations: [H] float64 recombinations between populations.
+        sst: specialization similarity threshold, NaN without the SDM.
+        gst: genotype similarity threshold, NaN without the GDM.
+    """
+
+    past_specialization: FloatArray
+    past_recombinations: FloatArray
+    sst: float
+    gst: float
+
+
+@dataclass(frozen=True)
+class Cone(Mesp[ConeState]):
     """Collective Neuro-Evolution; see the module."""
 
     config: ConeConfig = field(default_factory=ConeConfig)
     name: str = "cone"
     title: str = "CONE"
 
-    def init(self, layout: Layout, root: int) -> State:
+    def init(self, layout: Layout, root: int) -> ConeState:
         """Return generation 0 with random genotypes."""
         config = self.config
         return begin(
+            ConeState,
             layout,
             root,
-            n_populations=layout.n_robots,
-            n_genotypes=config.genotypes,
-            window=self.patience + 1,
-            sst=config.sst if config.use_sdm else np.nan,
-            gst=config.gst if config.use_gdm else np.nan,
+            **self.beginning(layout),
+            past_specialization=np.full(self.patience + 1, np.nan),
+            past_recombinations=np.full(self.patience + 1, np.nan),
+            sst=float(config.sst if config.use_sdm else np.nan),
+            gst=float(config.gst if config.use_gdm else np.nan),
         )
 
-    def ask(self, state: State) -> Trials:
+    def ask(self, state: ConeState) -> Trials:
         """Return the teams of the state's phase."""
         if state.phase != "elites":
             return super().ask(state)
@@ -132,15 +150,16 @@ class Cone(Mesp):
         )
         return trials(state, teams, rounds=config.n_elite_rounds if config.fresh_rounds else 1)
 
-    def tell(self, state: State, trials: Trials, scores: Scores) -> State:
+    def tell(self, state: ConeState, trials: Trials, scores: Scores) -> ConeState:
         """Return the state after these scores."""
         if state.phase == "elites":
-            return self.type_c(count(state, trials, scores), scores)
+            told = self.type_c(count(state, trials, scores), scores)
+            return note(told, type_c_evaluations=len(trials.teams))
         told = super().tell(state, trials, scores)
         has_elites = state.phase == "genotypes" and self.config.type_c != "off"
         return replace(told, phase="elites") if has_elites else told
 
-    def type_c(self, state: State, scores: Scores) -> State:
+    def type_c(self, state: ConeState, scores: Scores) -> ConeState:
         """Return the state with the elite ranked by type C fitness.
 
         Choice: the elite portion stays the elite portion, whatever type C says of it; ranks with
@@ -165,11 +184,11 @@ class Cone(Mesp):
         config = self.config
         return config.stagnation_v + config.stagnation_w + config.stagnation_y
 
-    def pairs(self, state: State) -> IntArray:
+    def pairs(self, state: ConeState) -> IntArray:
         """Return the sub-populations [Q, 2] that recombine between populations."""
         config = self.config
         if config.use_sdm:
-            candidates = pair_populations(state.fittest_specialization, state.sst)
+            candidates = pair_populations(state.progress.fittest_specialization, state.sst)
         elif config.use_gdm:
             candidates = np.stack(np.triu_indices(len(state.active), k=1), axis=1)
         else:
@@ -179,9 +198,11 @@ class Cone(Mesp):
         elites = np.take_along_axis(state.genes, state.elite[..., None], axis=2)
         return pair_similar(elites, state.active, candidates, state.gst, config.gd_aggregate)
 
-    def finish(self, state: State, active: BoolArray, judged: BoolArray | None = None) -> State:
+    def finish(
+        self, state: ConeState, active: BoolArray, judged: BoolArray | None = None
+    ) -> ConeState:
         """Return the next generation, with its thresholds regulated."""
-        state = super().finish(state, active, judged)
+        state = self.remember(super().finish(state, active, judged))
         v, w = self.config.stagnation_v, self.config.stagnation_w
         fitness, step = state.past_fitness.mean(axis=1), self.config.threshold_step
         sst, gst = state.sst, state.gst
@@ -191,4 +212,14 @@ class Cone(Mesp):
         if state.generation > v + w:
             recent = slice(-(v + w + 1), None)
             gst = regulate_gst(gst, fitness[recent], state.past_recombinations[recent], step)
-        return replace(state, sst=sst, gst=gst)
+        return note(replace(state, sst=sst, gst=gst), sst=state.sst, gst=state.gst)
+
+    def remember(self, state: ConeState) -> ConeState:
+        """Return the state with the generation that has ended in the windows of its thresholds."""
+        ended = state.progress
+        specialization = np.mean(ended.fittest_specialization)
+        return replace(
+            state,
+            past_specialization=push(state.past_specialization, specialization),
+            past_recombinations=push(state.past_recombinations, ended.numbers["recombinations"]),
+        )

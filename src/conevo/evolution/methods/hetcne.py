@@ -25,6 +25,7 @@ from conevo.errors import UsageError
 from conevo.evolution import credit
 from conevo.evolution.assembly import distinct, rows
 from conevo.evolution.generation import (
+    Populations,
     advance,
     begin,
     breed_networks,
@@ -35,12 +36,12 @@ from conevo.evolution.generation import (
     trials,
 )
 from conevo.evolution.population import elite_count
-from conevo.evolution.protocol import IntArray, Layout, Scores, State, Trials
+from conevo.evolution.protocol import FloatArray, IntArray, Layout, Scores, Trials
 from conevo.evolution.variation import VariationConfig
 from conevo.parameters import parameters
 from conevo.rng import stream
 
-__all__ = ["HetCne", "HetCneConfig"]
+__all__ = ["HetCne", "HetCneConfig", "HetCneState"]
 
 
 @parameters("method")
@@ -56,6 +57,17 @@ class HetCneConfig(VariationConfig):
 
 
 @dataclass(frozen=True)
+class HetCneState(Populations):
+    """What HetCNE remembers.
+
+    Attributes:
+        partners: [1, U, L, G] float32 last generation's elite; L = 0 in the first.
+    """
+
+    partners: FloatArray
+
+
+@dataclass(frozen=True)
 class HetCne:
     """Heterogeneous conventional neuro-evolution; see the module."""
 
@@ -63,7 +75,7 @@ class HetCne:
     name: str = "hetcne"
     title: str = "HetCNE"
 
-    def init(self, layout: Layout, root: int) -> State:
+    def init(self, layout: Layout, root: int) -> HetCneState:
         """Return generation 0 with random genotypes."""
         if self.config.genotypes < layout.n_robots:
             raise UsageError(
@@ -71,12 +83,18 @@ class HetCne:
                 f"({self.config.genotypes}) must be at least the robots ({layout.n_robots})"
             )
         return begin(
-            layout, root, n_populations=1, n_genotypes=self.config.genotypes, networks=True
+            HetCneState,
+            layout,
+            root,
+            n_populations=1,
+            n_genotypes=self.config.genotypes,
+            networks=True,
+            partners=np.zeros((1, layout.max_hidden, 0, layout.n_genes), dtype=np.float32),
         )
 
-    def ask(self, state: State) -> Trials:
+    def ask(self, state: HetCneState) -> Trials:
         """Return every genotype among different partners, then the team of the fittest."""
-        m, n_robots = self.config.genotypes, state.fittest_fitness.size
+        m, n_robots = self.config.genotypes, state.progress.fittest_fitness.size
         if state.phase == "fittest":
             fittest = state.elite[:, :n_robots, None]
             return trials(state, rows(state.active, fittest, m))
@@ -95,7 +113,7 @@ class HetCne:
         first = rows(state.active, own[:, :, None], m)
         return trials(state, np.concatenate([first, partners], axis=1), genes)
 
-    def tell(self, state: State, trials: Trials, scores: Scores) -> State:
+    def tell(self, state: HetCneState, trials: Trials, scores: Scores) -> HetCneState:
         """Return the state after these scores; a genotype's fitness is robot 0's credit."""
         state = count(state, trials, scores)
         config = self.config

@@ -15,6 +15,7 @@ from annotated_types import Ge, Le
 from conevo.evolution import credit
 from conevo.evolution.assembly import rows
 from conevo.evolution.generation import (
+    Populations,
     advance,
     begin,
     breed_networks,
@@ -24,7 +25,7 @@ from conevo.evolution.generation import (
     trials,
 )
 from conevo.evolution.population import elite_count
-from conevo.evolution.protocol import Layout, Scores, State, Trials
+from conevo.evolution.protocol import Layout, Scores, Trials
 from conevo.evolution.variation import VariationConfig
 from conevo.parameters import parameters
 
@@ -52,22 +53,26 @@ class HomCne:
     name: str = "homcne"
     title: str = "HomCNE"
 
-    def init(self, layout: Layout, root: int) -> State:
+    def init(self, layout: Layout, root: int) -> Populations:
         """Return generation 0 with random genotypes."""
         return begin(
-            layout, root, n_populations=1, n_genotypes=self.config.genotypes, networks=True
+            Populations,
+            layout,
+            root,
+            n_populations=1,
+            n_genotypes=self.config.genotypes,
+            networks=True,
         )
 
-    def ask(self, state: State) -> Trials:
+    def ask(self, state: Populations) -> Trials:
         """Return a team of clones of every genotype, then of the fittest."""
         m = self.config.genotypes
         chosen = np.arange(m) if state.phase == "genotypes" else state.elite[0, :1]
-        clones = np.broadcast_to(
-            chosen[:, None, None], (len(chosen), state.fittest_fitness.size, 1)
-        )
+        robots = state.progress.fittest_fitness.size
+        clones = np.broadcast_to(chosen[:, None, None], (len(chosen), robots, 1))
         return trials(state, rows(state.active, clones, m))
 
-    def tell(self, state: State, trials: Trials, scores: Scores) -> State:
+    def tell(self, state: Populations, trials: Trials, scores: Scores) -> Populations:
         """Return the state after these scores; a genotype's fitness is its clones' mean credit."""
         state = count(state, trials, scores)
         config = self.config

@@ -7,7 +7,7 @@ sub-populations, fitness is type A only, and controllers grow or shrink when the
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import Annotated
+from typing import Annotated, Any, Generic, TypeVar, cast
 
 import numpy as np
 from annotated_types import Ge, Gt, Le
@@ -21,7 +21,16 @@ from conevo.evolution.assembly import (
     shared,
     systematic,
 )
-from conevo.evolution.generation import advance, begin, count, crown, grade, trials
+from conevo.evolution.generation import (
+    Populations,
+    advance,
+    begin,
+    count,
+    crown,
+    grade,
+    push,
+    trials,
+)
 from conevo.evolution.population import elite_count, random_genes
 from conevo.evolution.protocol import (
     BoolArray,
@@ -29,7 +38,6 @@ from conevo.evolution.protocol import (
     IntArray,
     Layout,
     Scores,
-    State,
     Trials,
 )
 from conevo.evolution.regulation import resized, stagnating
@@ -37,7 +45,7 @@ from conevo.evolution.variation import VariationConfig, breed
 from conevo.parameters import parameters
 from conevo.rng import stream
 
-__all__ = ["Mesp", "MespConfig"]
+__all__ = ["Mesp", "MespConfig", "MespState"]
 
 
 @parameters("method")
@@ -58,24 +66,35 @@ class MespConfig(VariationConfig, SchemeConfig):
 
 
 @dataclass(frozen=True)
-class Mesp:
+class MespState(Populations):
+    """What Multi-Agent ESP remembers.
+
+    Attributes:
+        past_fitness: [H, R] float64 credits of the fittest team in the last H generations, the
+            newest last, NaN before the first. H is what the window needs.
+        watched_since: [P] int64 generation at which the controller-size window started.
+    """
+
+    past_fitness: FloatArray
+    watched_since: IntArray
+
+
+Kind = TypeVar("Kind", bound=MespState)
+
+
+@dataclass(frozen=True)
+class Mesp(Generic[Kind]):
     """Multi-Agent ESP; see the module. CONE overrides the steps below ``tell``."""
 
     config: MespConfig = field(default_factory=MespConfig)
     name: str = "mesp"
     title: str = "Multi-Agent ESP"
 
-    def init(self, layout: Layout, root: int) -> State:
+    def init(self, layout: Layout, root: int) -> Kind:
         """Return generation 0 with random genotypes."""
-        return begin(
-            layout,
-            root,
-            n_populations=layout.n_robots,
-            n_genotypes=self.config.genotypes,
-            window=self.patience + 1,
-        )
+        return cast("Kind", begin(MespState, layout, root, **self.beginning(layout)))
 
-    def ask(self, state: State) -> Trials:
+    def ask(self, state: Kind) -> Trials:
         """Return the teams of the state's phase."""
         m = self.config.genotypes
         if state.phase == "genotypes":
@@ -89,29 +108,39 @@ class Mesp:
             return trials(state, lesion_teams(fittest[0], self.suspects(state))[0])
         return trials(state, fittest)
 
-    def tell(self, state: State, trials: Trials, scores: Scores) -> State:
+    def tell(self, state: Kind, trials: Trials, scores: Scores) -> Kind:
         """Return the state after these scores."""
         state = count(state, trials, scores)
         if state.phase == "genotypes":
             n_elite = elite_count(self.config.elite_portion, self.config.genotypes)
             return grade(state, self.type_a(state, trials, scores), n_elite, phase="fittest")
         if state.phase == "fittest":
-            state = crown(state, trials, scores)
+            past = push(state.past_fitness, scores.fitness[0])
+            state = crown(state, trials, scores, past_fitness=past)
             if self.suspects(state).any():
                 return replace(state, phase="lesion")
             return self.finish(state, state.active)
         return self.finish(state, self.resize(state, scores), self.suspects(state))
+
+    def beginning(self, layout: Layout) -> dict[str, Any]:
+        """Return the sizes of populations and the windows that they begin with."""
+        return {
+            "n_populations": layout.n_robots,
+            "n_genotypes": self.config.genotypes,
+            "past_fitness": np.full((self.patience + 1, layout.n_robots), np.nan),
+            "watched_since": np.zeros(layout.n_robots, dtype=np.int64),
+        }
 
     @property
     def patience(self) -> int:
         """Generations without progress before a controller's size is questioned."""
         return self.config.stagnation_y
 
-    def suspects(self, state: State) -> BoolArray:
+    def suspects(self, state: Kind) -> BoolArray:
         """Return the populations [P] whose controllers' size is in question."""
         return stagnating(state.past_fitness, state.generation, state.watched_since, self.patience)
 
-    def type_a(self, state: State, trials: Trials, scores: Scores) -> FloatArray:
+    def type_a(self, state: Kind, trials: Trials, scores: Scores) -> FloatArray:
         """Return type A fitness [P, U, M], NaN in empty slots."""
         shape = state.genes.shape[:3]
         if self.config.evaluation == "shared":
@@ -122,7 +151,7 @@ class Mesp:
         fitness[place] = credit.of_robot(scores.fitness, place[0])
         return fitness
 
-    def resize(self, state: State, scores: Scores) -> BoolArray:
+    def resize(self, state: Kind, scores: Scores) -> BoolArray:
         """Return the slots [P, U] in use after the lesions."""
         suspects = self.suspects(state)
         fittest = best_team(state.active, state.elite, self.config.genotypes)[0]
@@ -132,11 +161,11 @@ class Mesp:
         without[robot, slot] = credit.of_robot(lesioned, robot)
         return resized(state.active, whole, without, suspects, self.config.lesion_ratio)
 
-    def pairs(self, state: State) -> IntArray:
+    def pairs(self, state: Kind) -> IntArray:
         """Return the sub-populations [Q, 2] that recombine between populations: none."""
         return np.empty((0, 2), dtype=np.int64)
 
-    def finish(self, state: State, active: BoolArray, judged: BoolArray | None = None) -> State:
+    def finish(self, state: Kind, active: BoolArray, judged: BoolArray | None = None) -> Kind:
         """Return the next generation, its controllers using the slots ``active`` [P, U].
 
         Args:
@@ -158,4 +187,5 @@ class Mesp:
         since = state.watched_since
         if judged is not None:
             since = np.where(judged, state.generation + 1, since)
-        return advance(state, children, active, len(pairs), watched_since=since)
+        numbers = {"recombinations": len(pairs)}
+        return advance(state, children, active, numbers, watched_since=since)

@@ -1,0 +1,103 @@
+"""What a method has to give the loop: each omission is one line."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from conevo.errors import UsageError
+from conevo.evolution.protocol import Layout, Progress, Scores, Trials
+from conevo.runs.config import RunSettings
+from conevo.runs.evaluation import Evaluation
+from conevo.runs.loop import evolve_generations, price
+from conevo.worlds.measures import Measure
+from conevo.worlds.protocol import Outcome
+
+LAYOUT = Layout(n_robots=2, n_hidden=1, max_hidden=1, n_genes=3)
+
+
+@dataclass(frozen=True)
+class Note:
+    """A state that is no more than its header."""
+
+    progress: Progress
+
+
+@dataclass(frozen=True)
+class Still:
+    """A method that asks for the same two teams in every generation, in one request."""
+
+    portrait: bool = True
+    numbers: dict[str, float] = field(default_factory=dict)
+    config: object = None
+    name: str = "still"
+    title: str = "Still"
+
+    def init(self, layout: Layout, root: int) -> Note:
+        """Return generation 0."""
+        return Note(Progress.first(layout, root))
+
+    def ask(self, state: Note) -> Trials:
+        """Return two teams."""
+        genes, teams = np.zeros((1, 3), np.float32), np.zeros((2, 2, 1), np.int32)
+        return Trials(state.progress.generation, genes, teams, "fixed", self.portrait)
+
+    def tell(self, state: Note, trials: Trials, scores: Scores) -> Note:
+        """Return the next generation."""
+        told = state.progress.counted(trials, scores, is_first=True).graded(scores.fitness)
+        told = told.crowned(trials, scores).with_numbers(**self.numbers)
+        return Note(replace(told, generation=told.generation + 1))
+
+
+def play(trials: Trials) -> Evaluation:
+    """Return scores that any teams get."""
+    n = len(trials.teams)
+    fitness = np.full((n, 2), 0.5)
+    outcome = Outcome(
+        fitness=np.full((n, 3, 2), 0.5, np.float32),
+        counts=np.ones((n, 3, 2, 2), np.int32),
+        switches=np.zeros((n, 3, 2), np.int32),
+        performance={"value": np.ones((n, 3), np.float32)},
+    )
+    return Evaluation(Scores(fitness, 0 * fitness), outcome)
+
+
+def log_of(method: Still, generations: int = 2) -> list[dict[str, Any]]:
+    """Return the records of a run."""
+    records: list[dict[str, Any]] = []
+    stopped_by = evolve_generations(
+        method,
+        method.init(LAYOUT, 1),
+        play,
+        settings=RunSettings(generations=generations, epochs=7, fittest_epochs=3),
+        main=Measure("value"),
+        castes=("a", "b"),
+        iterations=10,
+        on_generation=lambda state, record: records.append(record),
+    )
+    assert stopped_by == "generations"
+    return records
+
+
+def test_a_header_is_enough_and_the_methods_numbers_are_in_the_log() -> None:
+    numbers = {"step_size": 0.25, "restarts": 3, "condition": float("nan"), "sst": 0.5}
+    first, second = log_of(Still(numbers=numbers))
+    assert (first["step_size"], first["restarts"], first["condition"]) == (0.25, 3, None)
+    assert (first["sst"], first["gst"], first["recombinations"]) == (0.5, None, 0)
+    assert type(first["restarts"]) is int
+    assert (second["generation"], second["team_evaluations"]) == (1, 4)
+    assert [one["team_steps"] for one in (first, second)] == [2 * 3 * 10, 2 * 2 * 3 * 10]
+    assert price(Still(), Still().init(LAYOUT, 1)) == 2
+
+
+def test_a_generation_without_a_portrait_is_refused() -> None:
+    with pytest.raises(UsageError, match="Still has finished generation 0 without a portrait"):
+        log_of(Still(portrait=False))
+
+
+def test_a_number_does_not_take_the_place_of_another_entry() -> None:
+    with pytest.raises(UsageError, match="Still gives a number the name castes, which the log has"):
+        log_of(Still(numbers={"castes": 1.0}))
