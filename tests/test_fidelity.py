@@ -219,8 +219,8 @@ def test_team_evaluations_per_generation(row: dict[str, str], scheme: str) -> No
         config |= {"evaluation": "shared", "rounds": sizes["K"]}
     learner = method(row["method"].strip("`"), **config)
     state = learner.init(Layout(n_robots=3, n_hidden=2, max_hidden=4, n_genes=5), root=1)
-    while state.generation < 1:
+    while state.progress.generation < 1:
         trials = learner.ask(state)
         nothing = np.zeros(trials.teams.shape[:2])
         state = learner.tell(state, trials, Scores(nothing, nothing))
-    assert state.team_evaluations == eval(formula, {"__builtins__": {}}, sizes)
+    assert state.progress.team_evaluations == eval(formula, {"__builtins__": {}}, sizes)
