@@ -10,14 +10,13 @@ from typing import Annotated, Any
 
 import numpy as np
 import numpy.typing as npt
-import warp as wp
 from annotated_types import Ge, Gt, Le
 
 from conevo.errors import UsageError
 from conevo.kernels.khepera import RADIUS
 from conevo.parameters import parameters
 from conevo.rng import stream
-from conevo.worlds.protocol import Scenarios, Simulation
+from conevo.worlds.protocol import Scenarios, Simulation, World, kernel_params
 from conevo.worlds.pursuit_bodies import N_OBSTACLES, Params, Scene, Team
 
 __all__ = ["ArenaParams", "ArenaScenarios", "draw_scenarios", "simulate"]
@@ -50,6 +49,17 @@ class ArenaParams:
     sensor_angle_deg: Annotated[float, Gt(0), Le(89)] = 30.0
     max_speed_cm: Annotated[float, Gt(0), Le(5)] = 0.8
     prey_speed: Annotated[float, Gt(0), Le(1.2)] = 1.2
+
+    @property
+    def prey_speed_cm(self) -> float:
+        """Speed of a prey at full command, cm per iteration."""
+        return self.max_speed_cm * self.prey_speed
+
+    @property
+    def cone(self) -> tuple[float, float]:
+        """Cosine and sine of half the angle that a sensor sees."""
+        angle = math.radians(self.sensor_angle_deg)
+        return math.cos(angle), math.sin(angle)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -157,32 +167,19 @@ def _free_place(
 
 
 def simulate(
-    params: ArenaParams,
-    functions: dict[str, Any],
-    *,
-    robots: int,
-    bodies: int,
-    team_is_prey: bool,
-    prey_mode: int = 0,
-    prey_hidden: int = 0,
-    window: int = 1,
-    moved_share: float = 0.0,
-    moved_least: float = 0.0,
-    n_captors: int = 0,
+    world: World, functions: dict[str, Any], *, bodies: int, team_is_prey: bool, **given: Any
 ) -> Simulation:
-    """Return the Warp side of a world of predators and prey; see ``pursuit_dynamics.Params``."""
-    p = Params()
-    p.n_robots = robots
-    p.team_is_prey = int(team_is_prey)
-    p.arena = params.arena_cm
-    p.reach = params.sensor_range_cm
-    angle = math.radians(params.sensor_angle_deg)
-    p.cone = wp.vec2f(math.cos(angle), math.sin(angle))
-    p.speed = params.max_speed_cm
-    p.prey_speed = params.max_speed_cm * params.prey_speed
-    p.prey_mode, p.prey_hidden = prey_mode, prey_hidden
-    p.window, p.moved_share, p.moved_least = window, moved_share, moved_least
-    p.n_captors = n_captors
+    """Return the Warp side of a world of predators and prey.
+
+    Args:
+        world: the world.
+        functions: its phases.
+        bodies: the most that a scenario has.
+        team_is_prey: whether the robots of the team are prey.
+        given: fields of ``pursuit_bodies.Params`` that its parameters do not have.
+    """
+    robots = world.n_robots
+    p = kernel_params(Params, world.params, world, team_is_prey=team_is_prey, **given)
     prey = 1 if team_is_prey else bodies - robots
     per_body = (
         "x y heading to_x to_y to_heading left right refused collided collisions "
@@ -191,7 +188,7 @@ def simulate(
     sizes = (
         dict.fromkeys(per_body, bodies)
         | dict.fromkeys(("captured", "captures"), prey)
-        | dict.fromkeys(("moved", "commanded"), prey * window)
+        | dict.fromkeys(("moved", "commanded"), prey * p.capture_window)
         | {"infrared": bodies * 8, "first": 1}
     )
     return Simulation(

@@ -100,7 +100,7 @@ from conevo.worlds.gacc_senses import N_SENSORS
 from conevo.worlds.gacc_state import Params, Scene, Team
 from conevo.worlds.measures import Measure
 from conevo.worlds.places import draw_places
-from conevo.worlds.protocol import Scenarios, Simulation
+from conevo.worlds.protocol import Scenarios, Simulation, kernel_params
 
 __all__ = ["GaccParams", "GaccScenarios", "GaccWorld"]
 
@@ -180,6 +180,11 @@ class GaccParams:
                     f"world.{high} ({getattr(self, high)}) must not be below {low} "
                     f"({getattr(self, low)})"
                 )
+
+    @property
+    def home(self) -> float:
+        """Half a side of the home area."""
+        return self.home_side / 2
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -316,30 +321,7 @@ class GaccWorld:
 
     def simulation(self) -> Simulation:
         """Return the Warp side of this world."""
-        p, plan = self.params, self.plan
-        params = Params()
-        params.n_robots = p.n_robots
-        params.n_objects = plan.parts.size
-        params.n_complex = len(plan.parts)
-        params.ordered = sum(1 << c for c, ordered in enumerate(plan.is_ordered) if ordered)
-        params.energy = p.energy
-        params.home = p.home_side / 2
-        params.zone = p.zone_side
-        params.home_range_2 = p.home_range**2
-        params.home_sight_2 = p.home_sight**2
-        params.object_range_2 = p.object_range**2
-        params.object_accuracy = p.object_accuracy
-        params.object_cost = p.object_cost
-        params.robot_range_2 = p.robot_range**2
-        params.robot_cost = p.robot_cost
-        params.grip_2 = p.grip_distance**2
-        params.grip_cost = p.grip_cost
-        params.move_range = p.move_range
-        params.move_cost = p.move_cost
-        params.wait = p.wait
-        params.needs_detection = int(p.needs_detection)
-        params.min_distance_2 = p.min_distance**2
-        params.separation_2 = p.separation**2
+        plan = self.plan
         c = len(plan.parts)
         per_object = "object_x object_y life detected part holders".split()
         return Simulation(
@@ -348,7 +330,13 @@ class GaccWorld:
             | {"built": c, "missing": 3 * c, "demand": 3},
             scene=Scene,
             params_type=Params,
-            params=params,
+            params=kernel_params(
+                Params,
+                self.params,
+                n_objects=plan.parts.size,
+                n_complex=c,
+                ordered=sum(1 << k for k, ordered in enumerate(plan.is_ordered) if ordered),
+            ),
             functions=FUNCTIONS,
             recorded=(
                 *("x", "y", "energy", "fitness", "action", "held", "waited", "dropped"),

@@ -87,7 +87,7 @@ def fetch(team: Team, scene: Scene, p: Params, i: int, k: int) -> None:
     dx = team.object_x[k] - team.x[i]
     dy = team.object_y[k] - team.y[i]
     d2 = dx * dx + dy * dy
-    if d2 <= p.grip_2:
+    if d2 <= p.grip_distance_2:
         team.chosen[i] = GRIP + scene.object_type[k]
         team.target[i] = k
     else:
@@ -177,7 +177,7 @@ def within_grip(team: Team, scene: Scene, p: Params, i: int, t: int, kind: int) 
     found = int(NONE)
     if is_home(p, team.x[i], team.y[i]):
         return found
-    best = float(p.grip_2)
+    best = float(p.grip_distance_2)
     k = int(0)
     while k < p.n_objects:
         if scene.object_type[k] == kind and is_lying(team, k):
@@ -348,8 +348,8 @@ def build(team: Team, scene: Scene, p: Params, k: int, c: int) -> None:
     team.missing[3 * c + kind] = team.missing[3 * c + kind] - 1
     team.life[k] = DELIVERED
     team.holders[k] = 0
-    team.object_x[k] = 0.5 + p.zone * ((float(step) + 0.5) / float(parts) - 0.5)
-    team.object_y[k] = 0.5 + p.zone * ((float(c) + 0.5) / float(p.n_complex) - 0.5)
+    team.object_x[k] = 0.5 + p.zone_side * ((float(step) + 0.5) / float(parts) - 0.5)
+    team.object_y[k] = 0.5 + p.zone_side * ((float(c) + 0.5) / float(p.n_complex) - 0.5)
     for j in range(p.n_robots):
         if team.held[j] == k:
             spent = team.waited[j] + 1

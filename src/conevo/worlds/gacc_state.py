@@ -57,7 +57,7 @@ DROPPED = wp.constant(6)
 
 @wp.struct
 class Params:
-    """``GaccParams`` for the kernels, squared and combined where that is what they need."""
+    """What the kernels need of ``GaccParams``, by its names; ``NAME_2`` is a square."""
 
     n_robots: int
     n_objects: int
@@ -65,7 +65,7 @@ class Params:
     ordered: int  # bit c is set if complex object c takes its parts in order
     energy: float
     home: float  # half a side of the home area
-    zone: float  # a side of the construction zone
+    zone_side: float
     home_range_2: float
     home_sight_2: float
     object_range_2: float
@@ -73,7 +73,7 @@ class Params:
     object_cost: float
     robot_range_2: float
     robot_cost: float
-    grip_2: float
+    grip_distance_2: float
     grip_cost: float
     move_range: float
     move_cost: float

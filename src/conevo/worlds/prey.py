@@ -125,9 +125,14 @@ class PreyWorld:
     def simulation(self) -> Simulation:
         """Return the Warp side of this world."""
         return simulate(
-            self.params,
+            self,
             PREY_FUNCTIONS,
-            robots=self.n_robots,
             bodies=self.n_robots + self._predators[1],
             team_is_prey=True,
+            prey_mode=0,
+            prey_hidden=0,
+            capture_window=1,
+            capture_share=0.0,
+            capture_distance_cm=0.0,
+            capture_predators=0,
         )

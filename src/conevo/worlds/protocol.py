@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Protocol
 
@@ -10,9 +10,10 @@ import numpy as np
 import numpy.typing as npt
 
 from conevo.controllers import ControllerSpec
+from conevo.errors import UsageError, unknown_name
 from conevo.worlds.measures import Measure
 
-__all__ = ["Outcome", "Scenarios", "Simulation", "World"]
+__all__ = ["Outcome", "Scenarios", "Simulation", "World", "kernel_params"]
 
 
 @dataclass(frozen=True)
@@ -70,6 +71,45 @@ class Simulation:
     recorded: tuple[str, ...]
     sizes: dict[str, int] = field(default_factory=dict)
     recorded_at_end: tuple[str, ...] = ()
+
+
+def kernel_params(struct: Any, *sources: Any, **given: Any) -> Any:
+    """Return the parameters of a world as its kernels take them.
+
+    Every field of the struct is filled by name, from what is ``given`` or else from a field or
+    property of the first source that has it. Where none has ``NAME_2``, it is the square of
+    ``NAME``. A truth value becomes 0 or 1, a tuple a vector.
+
+    Args:
+        struct: a wp.struct.
+        sources: the parameters, and the world if it has some of the values.
+        given: values by the names of their fields.
+
+    Raises:
+        UsageError: a field has no source, or its value is not a number; ``given`` has other names.
+    """
+    for name in given:
+        if name not in struct.vars:
+            raise unknown_name("field", name, struct.vars, f"of {struct.key}")
+    filled = struct()
+    for name in struct.vars:
+        try:
+            setattr(filled, name, _value_of(name, sources, given))
+        except (AttributeError, TypeError) as error:
+            raise UsageError(f"{struct.key}.{name}: {error}") from error
+    return filled
+
+
+def _value_of(name: str, sources: Sequence[Any], given: Mapping[str, Any]) -> Any:
+    if name in given:
+        return given[name]
+    for source in sources:
+        if hasattr(source, name):
+            return getattr(source, name)
+    if name.endswith("_2"):
+        return _value_of(name.removesuffix("_2"), sources, given) ** 2
+    kinds = " or ".join(type(source).__name__ for source in sources)
+    raise AttributeError(f"{kinds} has no field or property of this name")
 
 
 class World(Protocol):

@@ -180,19 +180,13 @@ class PursuitWorld:
 
     def simulation(self) -> Simulation:
         """Return the Warp side of this world."""
-        p = self.params
         return simulate(
-            p,
+            self,
             PURSUIT_FUNCTIONS,
-            robots=self.n_robots,
             bodies=self.n_robots + self.n_prey,
             team_is_prey=False,
-            prey_mode=PREY_MODES.get(p.prey, 0),
+            prey_mode=PREY_MODES.get(self.params.prey, 0),
             prey_hidden=len(self._prey_weights()[0]) // self.n_prey,
-            window=p.capture_window,
-            moved_share=p.capture_share,
-            moved_least=p.capture_distance_cm,
-            n_captors=p.capture_predators,
         )
 
     def _prey_weights(self) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]:

@@ -32,21 +32,21 @@ N_OBSTACLES = wp.constant(6)  # most obstacles of a scenario
 
 @wp.struct
 class Params:
-    """Parameters of both worlds for the kernels; ``cone`` is the cosine and sine of its angle."""
+    """What the kernels need of the parameters of both worlds, by their names."""
 
     n_robots: int
     team_is_prey: int
-    arena: float
-    reach: float
+    arena_cm: float
+    sensor_range_cm: float
     cone: wp.vec2f
-    speed: float  # of a predator's wheel at command 1, cm per iteration
-    prey_speed: float
+    max_speed_cm: float  # of a predator's wheel at command 1, cm per iteration
+    prey_speed_cm: float
     prey_mode: int  # how prey that are not the team are controlled
     prey_hidden: int
-    window: int
-    moved_share: float
-    moved_least: float
-    n_captors: int
+    capture_window: int
+    capture_share: float
+    capture_distance_cm: float
+    capture_predators: int
 
 
 @wp.struct
@@ -109,7 +109,7 @@ def is_prey(p: Params, b: int) -> bool:
 @wp.func
 def wheel_speed(p: Params, b: int) -> float:
     """Return how far body ``b``'s wheel rolls in an iteration at command 1."""
-    return wp.where(is_prey(p, b), p.prey_speed, p.speed)
+    return wp.where(is_prey(p, b), p.prey_speed_cm, p.max_speed_cm)
 
 
 # --- what they see --------------------------------------------------------------------------------
@@ -126,14 +126,16 @@ def look(team: Team, scene: Scene, p: Params, b: int, is_light: bool) -> eight:
     c = wp.cos(team.heading[b])
     s = wp.sin(team.heading[b])
     seen = eight()
-    limit = p.reach + 2.0 * RADIUS
+    limit = p.sensor_range_cm + 2.0 * RADIUS
     j = int(0)
     while j < scene.n_bodies[0]:
         if j != b and (not is_light or is_prey(p, j)):
             dx = team.x[j] - x
             dy = team.y[j] - y
             if dx * dx + dy * dy < limit * limit:
-                seen = see_disc(seen, c * dx + s * dy, c * dy - s * dx, RADIUS, p.cone, p.reach)
+                seen = see_disc(
+                    seen, c * dx + s * dy, c * dy - s * dx, RADIUS, p.cone, p.sensor_range_cm
+                )
         j += 1
     if is_light:
         return seen
@@ -142,17 +144,19 @@ def look(team: Team, scene: Scene, p: Params, b: int, is_light: bool) -> eight:
         dx = scene.obstacle_x[j] - x
         dy = scene.obstacle_y[j] - y
         if dx * dx + dy * dy < limit * limit:
-            seen = see_disc(seen, c * dx + s * dy, c * dy - s * dx, RADIUS, p.cone, p.reach)
+            seen = see_disc(
+                seen, c * dx + s * dy, c * dy - s * dx, RADIUS, p.cone, p.sensor_range_cm
+            )
         j += 1
-    near = p.reach + RADIUS
+    near = p.sensor_range_cm + RADIUS
     if x < near:
-        seen = see_wall(seen, x, -c, s, p.cone, p.reach)
-    if p.arena - x < near:
-        seen = see_wall(seen, p.arena - x, c, -s, p.cone, p.reach)
+        seen = see_wall(seen, x, -c, s, p.cone, p.sensor_range_cm)
+    if p.arena_cm - x < near:
+        seen = see_wall(seen, p.arena_cm - x, c, -s, p.cone, p.sensor_range_cm)
     if y < near:
-        seen = see_wall(seen, y, -s, -c, p.cone, p.reach)
-    if p.arena - y < near:
-        seen = see_wall(seen, p.arena - y, s, c, p.cone, p.reach)
+        seen = see_wall(seen, y, -s, -c, p.cone, p.sensor_range_cm)
+    if p.arena_cm - y < near:
+        seen = see_wall(seen, p.arena_cm - y, s, c, p.cone, p.sensor_range_cm)
     return seen
 
 
@@ -180,7 +184,7 @@ def pursue(team: Team, scene: Scene, p: Params, b: int, t: int) -> wp.vec2f:
     """
     x = team.x[b]
     y = team.y[b]
-    limit = p.reach + 2.0 * RADIUS
+    limit = p.sensor_range_cm + 2.0 * RADIUS
     closest = limit * limit
     j = int(0)
     while j < scene.n_bodies[0]:
@@ -199,7 +203,7 @@ def pursue(team: Team, scene: Scene, p: Params, b: int, t: int) -> wp.vec2f:
         team.known[b] = 0  # it is not here any more
     if team.known[b] == 0:
         return walk_randomly(team, scene, p, b, t)
-    return steer(wrap(wp.atan2(dy, dx) - team.heading[b]), p.speed)
+    return steer(wrap(wp.atan2(dy, dx) - team.heading[b]), p.max_speed_cm)
 
 
 @wp.func

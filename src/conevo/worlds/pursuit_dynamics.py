@@ -112,7 +112,7 @@ def overlaps(ax: float, ay: float, bx: float, by: float) -> bool:
 @wp.func
 def is_refused(team: Team, scene: Scene, p: Params, b: int, x: float, y: float) -> int:
     """Return 1 if body ``b`` may not move to a place: wall, obstacle, or another body there now."""
-    far = p.arena - RADIUS
+    far = p.arena_cm - RADIUS
     if x < RADIUS or x > far or y < RADIUS or y > far:
         return 1
     j = int(0)
@@ -189,8 +189,8 @@ def commit(team: Team, scene: Scene, p: Params, i: int, t: int) -> None:
             team.y[b] = team.to_y[b]
             team.heading[b] = team.to_heading[b]
         if b >= p.n_robots and is_prey(p, b):
-            d = 0.5 * wp.abs(team.left[b] + team.right[b]) * p.prey_speed
-            at = (b - p.n_robots) * p.window + t % p.window
+            d = 0.5 * wp.abs(team.left[b] + team.right[b]) * p.prey_speed_cm
+            at = (b - p.n_robots) * p.capture_window + t % p.capture_window
             team.commanded[at] = d
             team.moved[at] = wp.where(is_out == 0, d, 0.0)
         if b == i:
@@ -207,18 +207,18 @@ def commit(team: Team, scene: Scene, p: Params, i: int, t: int) -> None:
 @wp.func
 def is_captured(team: Team, p: Params, q: int, t: int) -> bool:
     """Return whether prey ``q`` is captured in this iteration: immobilized, with predators near."""
-    if t + 1 < p.window:
+    if t + 1 < p.capture_window:
         return False
     moved = float(0.0)
     commanded = float(0.0)
     k = int(0)
-    while k < p.window:
-        moved += team.moved[q * p.window + k]
-        commanded += team.commanded[q * p.window + k]
+    while k < p.capture_window:
+        moved += team.moved[q * p.capture_window + k]
+        commanded += team.commanded[q * p.capture_window + k]
         k += 1
-    if moved >= p.moved_share * commanded and moved >= p.moved_least:
+    if moved >= p.capture_share * commanded and moved >= p.capture_distance_cm:
         return False
-    limit = p.reach + 2.0 * RADIUS
+    limit = p.sensor_range_cm + 2.0 * RADIUS
     near = int(0)
     j = int(0)
     while j < p.n_robots:
@@ -226,7 +226,7 @@ def is_captured(team: Team, p: Params, q: int, t: int) -> bool:
         dy = team.y[j] - team.y[p.n_robots + q]
         near += int(dx * dx + dy * dy <= limit * limit)
         j += 1
-    return near >= p.n_captors
+    return near >= p.capture_predators
 
 
 @wp.func
@@ -260,7 +260,7 @@ def resolve_escape(team: Team, scene: Scene, p: Params, i: int, t: int) -> None:
     if team.collisions[i] != 0:
         team.fitness[i] = 0.0
         return
-    d = 0.5 * wp.abs(team.left[i] + team.right[i]) * p.prey_speed
+    d = 0.5 * wp.abs(team.left[i] + team.right[i]) * p.prey_speed_cm
     bend = 0.5 * wp.abs(team.right[i] - team.left[i])
     team.fitness[i] = team.fitness[i] + d * (1.0 - wp.sqrt(bend))
 

@@ -42,7 +42,6 @@ from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 import numpy.typing as npt
-import warp as wp
 from annotated_types import Ge, Gt, Le
 
 from conevo.controllers import ControllerSpec
@@ -52,7 +51,7 @@ from conevo.rng import stream
 from conevo.worlds import canals, rocks
 from conevo.worlds.measures import Measure
 from conevo.worlds.places import draw_places
-from conevo.worlds.protocol import Scenarios, Simulation
+from conevo.worlds.protocol import Scenarios, Simulation, kernel_params
 from conevo.worlds.rover_dynamics import FUNCTIONS, ROCK_CELLS, Params, Scene, Team
 
 __all__ = ["RoverParams", "RoverScenarios", "RoverWorld"]
@@ -117,6 +116,26 @@ class RoverParams:
     fitness: Literal["eq_5_4", "value_times_area"] = "eq_5_4"
     n_hidden: Annotated[int, Ge(2), Le(16)] = 10
     max_hidden: Annotated[int, Ge(2), Le(32)] = 20  # Choice: twice the initial number
+
+    @property
+    def ranges(self) -> tuple[float, float, float]:
+        """Radius of a detection with each setting."""
+        return self.low_range, self.med_range, self.hi_range
+
+    @property
+    def accuracy(self) -> tuple[float, float, float]:
+        """Probability that a rover succeeds with each setting."""
+        return self.low_accuracy, self.med_accuracy, self.hi_accuracy
+
+    @property
+    def cost(self) -> tuple[float, float, float]:
+        """Energy of a detection with each setting."""
+        return self.low_cost, self.med_cost, self.hi_cost
+
+    @property
+    def fitness_is_product(self) -> bool:
+        """Whether a rover is credited with value times area."""
+        return self.fitness == "value_times_area"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -226,31 +245,15 @@ class RoverWorld:
 
     def simulation(self) -> Simulation:
         """Return the Warp side of this world."""
-        p = self.params
-        ranges = (p.low_range, p.med_range, p.hi_range)
-        params = Params()
-        params.n_robots = p.n_robots
-        params.energy = p.energy
-        params.ranges = wp.vec3f(*ranges)
-        params.accuracy = wp.vec3f(p.low_accuracy, p.med_accuracy, p.hi_accuracy)
-        params.cost = wp.vec3f(p.low_cost, p.med_cost, p.hi_cost)
-        params.rover_range_2 = p.rover_sensor_range**2
-        params.rover_cost = p.rover_sensor_cost
-        params.move_range = p.move_range
-        params.move_cost = p.move_cost
-        params.report_cost = p.report_cost
-        params.min_distance_2 = p.min_distance**2
-        params.separation_2 = p.separation**2
-        params.fitness_is_product = int(p.fitness == "value_times_area")
         return Simulation(
             state=Team,
             sizes={
                 "detected": int(sum(rocks.mix(self.environment))),
-                "cover": p.n_robots * int(COVER_WORDS),
+                "cover": self.n_robots * int(COVER_WORDS),
             },
             scene=Scene,
             params_type=Params,
-            params=params,
+            params=kernel_params(Params, self.params),
             functions=FUNCTIONS,
             recorded=("x", "y", "action", "setting", "energy", "covered", "value", "fitness"),
             recorded_at_end=("detected",),

@@ -40,15 +40,15 @@ octants = wp.types.vector(length=8, dtype=float)
 
 @wp.struct
 class Params:
-    """``RoverParams`` for the kernels, squared and combined where that is what they need."""
+    """What the kernels need of ``RoverParams``, by its names; ``NAME_2`` is a square."""
 
     n_robots: int
     energy: float
     ranges: wp.vec3f
     accuracy: wp.vec3f
     cost: wp.vec3f
-    rover_range_2: float
-    rover_cost: float
+    rover_sensor_range_2: float
+    rover_sensor_cost: float
     move_range: float
     move_cost: float
     report_cost: float
@@ -146,11 +146,11 @@ def sense(team: Team, scene: Scene, p: Params, i: int, t: int) -> None:
     while j < p.n_robots:
         dx = team.x[j] - x
         dy = team.y[j] - y
-        if dx * dx + dy * dy < p.rover_range_2 and j != i:
+        if dx * dx + dy * dy < p.rover_sensor_range_2 and j != i:
             near = mark(near, j)
         j += 1
     if near != wp.uint64(0):
-        closest = closest_in_octants(team.x, team.y, near, x, y, p.rover_range_2)
+        closest = closest_in_octants(team.x, team.y, near, x, y, p.rover_sensor_range_2)
         for o in range(8):
             j = closest[o]
             if j >= 0:
@@ -250,10 +250,10 @@ def commit(team: Team, scene: Scene, p: Params, i: int, t: int) -> None:
                 team.x[i] = x
                 team.y[i] = y
                 team.covered_range[i] = 0.0
-        team.energy[i] = team.energy[i] - p.rover_cost - p.move_cost
+        team.energy[i] = team.energy[i] - p.rover_sensor_cost - p.move_cost
     else:
         team.setting[i] = a
-        team.energy[i] = team.energy[i] - p.rover_cost - p.cost[a]
+        team.energy[i] = team.energy[i] - p.rover_sensor_cost - p.cost[a]
 
 
 # --- resolve --------------------------------------------------------------------------------------
