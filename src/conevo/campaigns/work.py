@@ -132,11 +132,14 @@ def _evolve(
 ) -> Run | Shaping:
     """Return the run, finished by now unless its time was over."""
     path = places.run(planned.label)
-    if not kind_of(path):
+    found: Run | Shaping
+    if kind_of(path):
+        found = Shaping(path) if kind_of(path) == "shaping" else Run(path)
+    else:
         configs = planned.configs()
         command = f"conevo campaign start, run {planned.label}"
         if planned.shape:
-            start_shaping(
+            found = start_shaping(
                 planned.tasks,
                 planned.method,
                 planned.preset,
@@ -148,8 +151,7 @@ def _evolve(
                 command=command,
             )
         else:
-            start(configs[0], path, threads=threads, device=device, command=command)
-    found = Shaping(path) if kind_of(path) == "shaping" else Run(path)
+            found = start(configs[0], path, threads=threads, device=device, command=command)
     longer = None if found.run_ids == planned.run_ids else planned.configs()[0]
     if longer and (isinstance(found, Shaping) or found.provenance.get("stem_id") != longer.stem_id):
         raise UsageError(f"{path} is not the run that was planned; move it away and retry")

@@ -58,12 +58,14 @@ def run(
     if (origin or champion) and (shape or seeds is not None):
         raise UsageError("--from and --from-champion start one run: leave out --shape and --seeds")
     order = Order(**options, comparing=seeds is not None)
+    if prey is not None and world is not None:
+        from conevo.worlds.registry import resolve
+
+        entry, _ = resolve(world)
+        if not hasattr(entry.params_class, "prey"):
+            raise UsageError(f"--prey {prey!r}: {entry.name} has no prey to choose")
+    order.take("world.prey", "--prey", prey)
     config = order.resolve(world)
-    if prey is not None:
-        if not hasattr(config.world_params, "prey"):
-            raise UsageError(f"--prey {prey!r}: {config.world} has no prey to choose")
-        order.take("world.prey", "--prey", prey)
-        config = order.resolve(world)
     if seeds is not None:
         from conevo.cli.comparison import compare, plan_of
 

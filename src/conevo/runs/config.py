@@ -148,8 +148,19 @@ class RunConfig:
         return self.entry.address(self.environment)
 
     def build_world(self) -> World:
-        """Return the world of this run."""
-        return self.entry.build(self.environment, self.world_params)
+        """Return the world of this run, which is built once.
+
+        Raises:
+            UsageError: it cannot have these parameters.
+        """
+        return self._world
+
+    @functools.cached_property
+    def _world(self) -> World:
+        try:
+            return self.entry.build(self.environment, self.world_params)
+        except ValueError as error:  # of a world in a file
+            raise UsageError(f"[world]: {error}") from error
 
     def build_method(self) -> Method:
         """Return the method of this run."""
@@ -322,11 +333,7 @@ def resolve(
     if own_preset is not None and names["preset"] != own_preset.value:
         _refuse_label(names["preset"], base, layers[0], own_preset.place)
     built = {name: _build(name, part, [base, *layers, single]) for name, part in parts.items()}
-    try:
-        entry.build(environment, built["world"])
-    except ValueError as error:
-        raise UsageError(f"[world]: {error}") from error
-    return RunConfig(
+    config = RunConfig(
         entry=entry,
         environment=environment,
         method=names["method"],
@@ -336,6 +343,8 @@ def resolve(
         method_config=built["method"],
         changed=tuple(_changed(parts, built, base)),
     )
+    config.build_world()  # refuses parameters that this world cannot have
+    return config
 
 
 def parse_assignment(text: str) -> tuple[str, Any]:

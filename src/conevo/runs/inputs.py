@@ -46,6 +46,8 @@ def keep_inputs(config: RunConfig, directory: Path) -> RunConfig:
         if getattr(params, f"{field.name}_digest", ""):
             kept = copy_input(Path(getattr(params, field.name)), folder)
             params = dataclasses.replace(params, **{field.name: str(kept)})
+    if entry is config.entry and params is config.world_params:
+        return config
     return dataclasses.replace(config, entry=entry, world_params=params)
 
 

@@ -120,7 +120,7 @@ def start(
         **ancestry,
         "sessions": [],
     }
-    return Run(create(path, config, about, first if ancestry else None).path, lab)
+    return Run(path, lab, create(path, config, about, first if ancestry else None))
 
 
 def beginning(
@@ -155,8 +155,10 @@ class Run:
         UsageError: there is no run at ``path``.
     """
 
-    def __init__(self, path: str | Path, lab: Lab | None = None) -> None:
-        self._store = Store(Path(path))
+    def __init__(
+        self, path: str | Path, lab: Lab | None = None, store: Store | None = None
+    ) -> None:
+        self._store = store or Store(Path(path))
         self._lab = lab
         self.path = self._store.path
         self.outline: Outline = self._store.read_outline()

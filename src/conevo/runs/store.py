@@ -87,7 +87,7 @@ def create(path: Path, config: RunConfig, provenance: Record, first: State | Non
             identity = _identity(provenance) | {"method": config.method}
             checkpoint.save(draft / ORIGIN, first, identity)
         replace_file(draft / GENERATIONS, b"")
-    return Store(path)
+    return Store(path, keep_inputs(config, path))
 
 
 class Store(Directory):
@@ -95,14 +95,16 @@ class Store(Directory):
 
     Args:
         path: the run's directory.
+        config: what has just been written there.
 
     Raises:
         UsageError: there is no run at ``path``.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, config: RunConfig | None = None) -> None:
         super().__init__(path, "run")
         self._next_checkpoint = 0
+        self._config = (config.to_toml(path).encode(), config) if config else None
 
     # --- what the run is --------------------------------------------------------------------------
 
@@ -122,7 +124,7 @@ class Store(Directory):
         return read_toml(self.path / CONFIG)
 
     def read_config(self) -> RunConfig:
-        """Return the run's configuration; this loads its world.
+        """Return the run's configuration; this loads its world, once for each text of the file.
 
         Raises:
             UsageError: it is not the one the run was started with, or its world is not there.
@@ -130,7 +132,10 @@ class Store(Directory):
         from conevo.runs.config import resolve
 
         self.read_outline()
-        config, extension = resolve(file=self.path / CONFIG), self._read_extension()
+        text, extension = read_bytes(self.path / CONFIG, MOST_TOML), self._read_extension()
+        if self._config is None or self._config[0] != text:
+            self._config = text, resolve(file=self.path / CONFIG)
+        config = self._config[1]
         return config.of_length(extension["length"]) if extension else config
 
     def read_provenance(self) -> Record:
