@@ -16,7 +16,7 @@ import conevo
 from conevo.cli.main import main
 from conevo.evolution.methods.cone import ConeConfig
 from conevo.parameters import checked, parameters
-from conevo.runs.config import RunSettings
+from conevo.runs.settings import RunSettings
 from conevo.worlds.gacc import GaccParams
 from conevo.worlds.pursuit import PursuitParams
 from conevo.worlds.registry import resolve

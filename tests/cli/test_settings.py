@@ -10,8 +10,8 @@ import pytest
 
 import conevo
 from conevo.evolution.methods.registry import METHODS
-from conevo.runs.config import PRESETS, RunSettings, resolve
-from conevo.runs.settings import declared
+from conevo.runs.config import PRESETS, resolve
+from conevo.runs.settings import RunSettings, declared
 from runs.tiny import command
 
 

@@ -10,9 +10,9 @@ import pytest
 
 from conevo.errors import UsageError
 from conevo.evolution.protocol import Layout, Progress, Scores, Trials
-from conevo.runs.config import RunSettings
 from conevo.runs.evaluation import Evaluation
 from conevo.runs.loop import evolve_generations, price
+from conevo.runs.settings import RunSettings
 from conevo.worlds.measures import Measure
 from conevo.worlds.protocol import Outcome
 

@@ -40,15 +40,15 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import tomli_w
-from annotated_types import Ge, Le
 
 from conevo.errors import UsageError, shown, unknown_name
-from conevo.parameters import WrongValue, parameters, refuse_unknown
+from conevo.parameters import WrongValue, refuse_unknown
 from conevo.reading import DamagedFile, parse_toml, read_toml
 from conevo.runs.outline import LENGTH, Outline, identify, outline_of
+from conevo.runs.settings import RunSettings
 
 if TYPE_CHECKING:
     from conevo.evolution.protocol import Method
@@ -58,7 +58,6 @@ if TYPE_CHECKING:
 __all__ = [
     "PRESETS",
     "RunConfig",
-    "RunSettings",
     "parse_assignment",
     "parse_assignments",
     "resolve",
@@ -73,45 +72,6 @@ NAMES = {
     "preset": "desk",
 }  # the keys of [run] that choose components
 ANY = "any"  # the table of a preset for worlds without one of their own
-
-
-@parameters("run")
-class RunSettings:
-    """How long and on how much evidence to evolve; belongs to no world and no method.
-
-    Defaults are those of the multi-rover experiments (Nitschke 2009, table 5.5).
-
-    Attributes:
-        seed: root of all randomness of the run.
-        generations: the run ends after this many.
-        epochs: simulated trials per team evaluation (q); all teams of a generation meet the same.
-        fittest_epochs: simulated trials in which each generation's fittest team is evaluated once
-            more. Choice: as many as the thesis' q, and the same in all generations, so that
-            progress and the champion of a run are not a matter of lucky scenarios.
-        credit: "robot" gives each robot its own fitness as the world reports it (eq. 5.4, 6.8);
-            "team" gives every robot the sum over the team (eq. 5.5).
-        budget_evaluations: the run never spends more team evaluations than this; 0 is no limit.
-        target: the run ends when the fittest team's main task performance is as good as this: at
-            least, or, of a measure of which smaller is better, at most.
-        checkpoint_every: generations between two checkpoints.
-        n_finalists: the fittest teams of the run, which are validated at its end. Choice: 10, as
-            the thesis says nothing of how a run's best team is found. 1 leaves the choice to the
-            scenarios of the evolution phase.
-        n_validations: scenarios in which finalists are validated. Choice: 20, as many as tests.
-        n_tests: fresh scenarios of the testing phase (5.4: 20).
-    """
-
-    seed: Annotated[int, Ge(0), Le(2**63 - 1)] = 1
-    generations: Annotated[int, Ge(1), Le(10_000_000)] = 250
-    epochs: Annotated[int, Ge(1), Le(10_000)] = 10
-    fittest_epochs: Annotated[int, Ge(1), Le(10_000)] = 10
-    credit: Literal["robot", "team"] = "robot"
-    budget_evaluations: Annotated[int, Ge(0), Le(2**63 - 1)] = 0
-    target: float | None = None
-    checkpoint_every: Annotated[int, Ge(1), Le(10_000_000)] = 1
-    n_finalists: Annotated[int, Ge(1), Le(1000)] = 10
-    n_validations: Annotated[int, Ge(1), Le(10_000)] = 20
-    n_tests: Annotated[int, Ge(1), Le(10_000)] = 20
 
 
 @dataclass(frozen=True)

@@ -13,12 +13,13 @@ from pathlib import Path
 from typing import Any
 
 from conevo.errors import UsageError
-from conevo.runs.config import RunConfig, RunSettings
+from conevo.runs.config import RunConfig
 from conevo.runs.directory import kind_of
 from conevo.runs.lab import Lab
 from conevo.runs.loop import has_reached
 from conevo.runs.outline import LENGTH
 from conevo.runs.provenance import now
+from conevo.runs.settings import RunSettings
 from conevo.runs.store import Store
 from conevo.worlds.measures import measures_of
 

@@ -11,8 +11,8 @@ import numpy as np
 
 from conevo.errors import UsageError
 from conevo.evolution.protocol import Method, Progress, Scores, State
-from conevo.runs.config import RunSettings
 from conevo.runs.evaluation import Evaluate, Portrait, describe
+from conevo.runs.settings import RunSettings
 from conevo.worlds.measures import Measure
 
 __all__ = ["check_budget", "evolve_generations", "has_reached", "price"]

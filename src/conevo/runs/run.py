@@ -120,7 +120,7 @@ def start(
         **ancestry,
         "sessions": [],
     }
-    return Run(path, lab, create(path, config, about, first if ancestry else None))
+    return Run(create(path, config, about, first if ancestry else None), lab)
 
 
 def beginning(
@@ -149,16 +149,14 @@ class Run:
     """A run on disk, finished or not.
 
     Args:
-        path: its directory.
+        path: its directory, or the store of it.
 
     Raises:
         UsageError: there is no run at ``path``.
     """
 
-    def __init__(
-        self, path: str | Path, lab: Lab | None = None, store: Store | None = None
-    ) -> None:
-        self._store = store or Store(Path(path))
+    def __init__(self, path: str | Path | Store, lab: Lab | None = None) -> None:
+        self._store = path if isinstance(path, Store) else Store(Path(path))
         self._lab = lab
         self.path = self._store.path
         self.outline: Outline = self._store.read_outline()

@@ -1,4 +1,4 @@
-"""Every setting with its default, unit, bounds and meaning, read from where it is declared.
+"""The settings of a run, and every setting with its unit, bounds and meaning, as it is declared.
 
 A setting is a field of a dataclass: ``RunSettings``, a world's parameters or a method's. Its bounds
 are those of its annotation. Its unit and meaning are in the ``Attributes`` of the class' docstring,
@@ -14,16 +14,69 @@ import textwrap
 import types
 from dataclasses import dataclass
 from importlib import resources
-from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
+from typing import (
+    TYPE_CHECKING,
+    Annotated,
+    Any,
+    Literal,
+    Union,
+    get_args,
+    get_origin,
+    get_type_hints,
+)
 
-from conevo.runs.config import RunConfig, RunSettings
+from annotated_types import Ge, Le
 
-__all__ = ["Setting", "declared", "preset_purpose", "settings_of"]
+from conevo.parameters import parameters
+
+if TYPE_CHECKING:
+    from conevo.runs.config import RunConfig
+
+__all__ = ["RunSettings", "Setting", "declared", "preset_purpose", "settings_of"]
 
 BOUNDS = {"ge": ">=", "gt": ">", "le": "<=", "lt": "<"}
 LARGEST = 2**63 - 1  # what a whole number can be in a configuration file
 TYPES = {int: "whole number", float: "number", str: "text", bool: "true, false"}
 ENTRY = re.compile(r"(\w+)(?: \(([^)]*)\))?: (.*)", re.DOTALL)
+
+
+@parameters("run")
+class RunSettings:
+    """How long and on how much evidence to evolve; belongs to no world and no method.
+
+    Defaults are those of the multi-rover experiments (Nitschke 2009, table 5.5).
+
+    Attributes:
+        seed: root of all randomness of the run.
+        generations: the run ends after this many.
+        epochs: simulated trials per team evaluation (q); all teams of a generation meet the same.
+        fittest_epochs: simulated trials in which each generation's fittest team is evaluated once
+            more. Choice: as many as the thesis' q, and the same in all generations, so that
+            progress and the champion of a run are not a matter of lucky scenarios.
+        credit: "robot" gives each robot its own fitness as the world reports it (eq. 5.4, 6.8);
+            "team" gives every robot the sum over the team (eq. 5.5).
+        budget_evaluations: the run never spends more team evaluations than this; 0 is no limit.
+        target: the run ends when the fittest team's main task performance is as good as this: at
+            least, or, of a measure of which smaller is better, at most.
+        checkpoint_every: generations between two checkpoints.
+        n_finalists: the fittest teams of the run, which are validated at its end. Choice: 10, as
+            the thesis says nothing of how a run's best team is found. 1 leaves the choice to the
+            scenarios of the evolution phase.
+        n_validations: scenarios in which finalists are validated. Choice: 20, as many as tests.
+        n_tests: fresh scenarios of the testing phase (5.4: 20).
+    """
+
+    seed: Annotated[int, Ge(0), Le(2**63 - 1)] = 1
+    generations: Annotated[int, Ge(1), Le(10_000_000)] = 250
+    epochs: Annotated[int, Ge(1), Le(10_000)] = 10
+    fittest_epochs: Annotated[int, Ge(1), Le(10_000)] = 10
+    credit: Literal["robot", "team"] = "robot"
+    budget_evaluations: Annotated[int, Ge(0), Le(2**63 - 1)] = 0
+    target: float | None = None
+    checkpoint_every: Annotated[int, Ge(1), Le(10_000_000)] = 1
+    n_finalists: Annotated[int, Ge(1), Le(1000)] = 10
+    n_validations: Annotated[int, Ge(1), Le(10_000)] = 20
+    n_tests: Annotated[int, Ge(1), Le(10_000)] = 20
 
 
 @dataclass(frozen=True)
