@@ -30,23 +30,20 @@ __all__ = [
 
 @parameters("method")
 class SchemeConfig:
-    """How the genotypes of several populations are tried in teams, alike for all such methods.
-
-    Attributes:
-        evaluation: "systematic" tries every genotype once (section 3.3.1), in R x M teams if it is
-            a whole network, in R x U x M if it is a neuron; "shared" draws complete teams in which
-            every genotype takes part ``rounds`` times, rounds x M teams, the scheme ESP itself was
-            published with.
-        rounds: K, trials of each genotype under "shared". More makes fitness less noisy.
-            Choice: 10, as ESP.
-        fresh_rounds: whether each round is played in scenarios of its own: for the same evaluations
-            every genotype meets ``rounds`` times as many, and all genotypes meet the same ones.
-            Choice: on, since without it co-evolved teams do not learn the shipped example.
-    """
+    """How the genotypes of several populations are tried in teams, alike for all such methods."""
 
     evaluation: Literal["systematic", "shared"] = "systematic"
+    """how genotypes are tried: "systematic" tries every genotype once (section 3.3.1), in R x M
+    teams if it is a whole network, in R x U x M if it is a neuron; "shared" draws complete teams in
+    which every genotype takes part ``rounds`` times, rounds x M teams, the scheme ESP itself was
+    published with."""
     rounds: Annotated[int, Ge(1), Le(10_000)] = 10
+    """K, trials of each genotype under "shared". More makes fitness less noisy. Choice: 10, as
+    ESP."""
     fresh_rounds: bool = True
+    """whether each round is played in scenarios of its own: for the same evaluations every genotype
+    meets ``rounds`` times as many, and all genotypes meet the same ones. Choice: on, since without
+    it co-evolved teams do not learn the shipped example."""
 
     @property
     def n_parts(self) -> int:

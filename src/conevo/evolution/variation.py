@@ -19,22 +19,19 @@ __all__ = ["VariationConfig", "across", "breed", "crossover", "mutate", "within"
 
 @parameters("method")
 class VariationConfig:
-    """Selection and variation, alike for all methods (Nitschke 2009, section 3.4, table 5.5).
-
-    Attributes:
-        elite_portion: fraction of a (sub-)population that may become parents. More keeps more
-            diversity and selects less. 0.5 for multi-rover and GACC, 0.25 for pursuit.
-        mutation_probability: chance of each gene of a child to be mutated.
-        mutation_scale: scale of the Cauchy step in gene units; half of all steps are smaller.
-            Choice: 0.1, the thesis gives none; it is 1 in weight units of [-10, 10].
-        n_elitist: fittest genotypes that survive unchanged, at most the elite portion. 0: children
-            replace all genotypes (section 3.4.3).
-    """
+    """Selection and variation, alike for all methods (Nitschke 2009, section 3.4, table 5.5)."""
 
     elite_portion: Annotated[float, Gt(0), Le(1)] = 0.5
+    """fraction of a (sub-)population that may become parents. More keeps more diversity and selects
+    less. 0.5 for multi-rover and GACC, 0.25 for pursuit."""
     mutation_probability: Annotated[float, Ge(0), Le(1)] = 0.05
+    """chance of each gene of a child to be mutated."""
     mutation_scale: Annotated[float, Ge(0), Le(1000)] = 0.1
+    """scale of the Cauchy step in gene units; half of all steps are smaller. Choice: 0.1, the
+    thesis gives none; it is 1 in weight units of [-10, 10]."""
     n_elitist: Annotated[int, Ge(0), Le(1_000_000)] = 0
+    """fittest genotypes that survive unchanged, at most the elite portion. 0: children replace all
+    genotypes (section 3.4.3)."""
 
 
 def crossover(

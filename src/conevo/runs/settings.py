@@ -1,14 +1,16 @@
 """The settings of a run, and every setting with its unit, bounds and meaning, as it is declared.
 
 A setting is a field of a dataclass: ``RunSettings``, a world's parameters or a method's. Its bounds
-are those of its annotation. Its unit and meaning are in the ``Attributes`` of the class' docstring,
-"name (unit): meaning", or in those of the class it inherits the field from.
+are those of its annotation. Its unit and meaning are the text below the field: "(unit) meaning.",
+or that below the field of the class from which it is inherited.
 """
 
 from __future__ import annotations
 
+import ast
 import dataclasses
 import inspect
+import itertools
 import re
 import textwrap
 import types
@@ -37,7 +39,7 @@ __all__ = ["RunSettings", "Setting", "declared", "preset_purpose", "settings_of"
 BOUNDS = {"ge": ">=", "gt": ">", "le": "<=", "lt": "<"}
 LARGEST = 2**63 - 1  # what a whole number can be in a configuration file
 TYPES = {int: "whole number", float: "number", str: "text", bool: "true, false"}
-ENTRY = re.compile(r"(\w+)(?: \(([^)]*)\))?: (.*)", re.DOTALL)
+TEXT = re.compile(r"(?:\(([^)]*)\) )?(.*?)\.?")  # below a field: "(unit) meaning."
 
 
 @parameters("run")
@@ -45,38 +47,36 @@ class RunSettings:
     """How long and on how much evidence to evolve; belongs to no world and no method.
 
     Defaults are those of the multi-rover experiments (Nitschke 2009, table 5.5).
-
-    Attributes:
-        seed: root of all randomness of the run.
-        generations: the run ends after this many.
-        epochs: simulated trials per team evaluation (q); all teams of a generation meet the same.
-        fittest_epochs: simulated trials in which each generation's fittest team is evaluated once
-            more. Choice: as many as the thesis' q, and the same in all generations, so that
-            progress and the champion of a run are not a matter of lucky scenarios.
-        credit: "robot" gives each robot its own fitness as the world reports it (eq. 5.4, 6.8);
-            "team" gives every robot the sum over the team (eq. 5.5).
-        budget_evaluations: the run never spends more team evaluations than this; 0 is no limit.
-        target: the run ends when the fittest team's main task performance is as good as this: at
-            least, or, of a measure of which smaller is better, at most.
-        checkpoint_every: generations between two checkpoints.
-        n_finalists: the fittest teams of the run, which are validated at its end. Choice: 10, as
-            the thesis says nothing of how a run's best team is found. 1 leaves the choice to the
-            scenarios of the evolution phase.
-        n_validations: scenarios in which finalists are validated. Choice: 20, as many as tests.
-        n_tests: fresh scenarios of the testing phase (5.4: 20).
     """
 
     seed: Annotated[int, Ge(0), Le(2**63 - 1)] = 1
+    """root of all randomness of the run."""
     generations: Annotated[int, Ge(1), Le(10_000_000)] = 250
+    """the run ends after this many."""
     epochs: Annotated[int, Ge(1), Le(10_000)] = 10
+    """simulated trials per team evaluation (q); all teams of a generation meet the same."""
     fittest_epochs: Annotated[int, Ge(1), Le(10_000)] = 10
+    """simulated trials in which each generation's fittest team is evaluated once more. Choice: as
+    many as the thesis' q, and the same in all generations, so that progress and the champion of a
+    run are not a matter of lucky scenarios."""
     credit: Literal["robot", "team"] = "robot"
+    """what a robot is credited with: "robot" gives each robot its own fitness as the world reports
+    it (eq. 5.4, 6.8); "team" gives every robot the sum over the team (eq. 5.5)."""
     budget_evaluations: Annotated[int, Ge(0), Le(2**63 - 1)] = 0
+    """the run never spends more team evaluations than this; 0 is no limit."""
     target: float | None = None
+    """the run ends when the fittest team's main task performance is as good as this: at least, or,
+    of a measure of which smaller is better, at most."""
     checkpoint_every: Annotated[int, Ge(1), Le(10_000_000)] = 1
+    """generations between two checkpoints."""
     n_finalists: Annotated[int, Ge(1), Le(1000)] = 10
+    """the fittest teams of the run, which are validated at its end. Choice: 10, as the thesis says
+    nothing of how a run's best team is found. 1 leaves the choice to the scenarios of the evolution
+    phase."""
     n_validations: Annotated[int, Ge(1), Le(10_000)] = 20
+    """scenarios in which finalists are validated. Choice: 20, as many as tests."""
     n_tests: Annotated[int, Ge(1), Le(10_000)] = 20
+    """fresh scenarios of the testing phase (5.4: 20)."""
 
 
 @dataclass(frozen=True)
@@ -101,7 +101,7 @@ class Setting:
 def declared(part: type[Any]) -> list[Setting]:
     """Return the settings of a dataclass, in the order of its fields."""
     hints = get_type_hints(part, include_extras=True)
-    texts = _attributes(part)
+    texts = _meanings(part)
     found = []
     for field in dataclasses.fields(part):
         unit, meaning = texts.get(field.name, ("", ""))
@@ -132,16 +132,17 @@ def preset_purpose(preset: str) -> str:
     return re.split(r"[.:](?: |$)", words)[0]
 
 
-def _attributes(part: type[Any]) -> dict[str, tuple[str, str]]:
-    """Return unit and meaning of every field that a class or one it inherits from describes."""
+def _meanings(part: type[Any]) -> dict[str, tuple[str, str]]:
+    """Return unit and meaning of every field that has a text below it, also of inherited ones."""
     found: dict[str, tuple[str, str]] = {}
-    for one in reversed(part.__mro__):
-        _, _, section = inspect.cleandoc(one.__doc__ or "").partition("Attributes:\n")
-        section = re.split(r"\n(?=\S)", section)[0]
-        for entry in re.split(r"\n(?=\S)", textwrap.dedent(section)):
-            if match := ENTRY.fullmatch(" ".join(entry.split())):
-                name, unit, meaning = match.groups()
-                found[name] = (unit or "", meaning.removesuffix("."))
+    for one in reversed([one for one in part.__mro__ if dataclasses.is_dataclass(one)]):
+        (declaration,) = ast.parse(textwrap.dedent(inspect.getsource(one))).body
+        assert isinstance(declaration, ast.ClassDef)
+        for field, text in itertools.pairwise(declaration.body):
+            match field, text:
+                case ast.AnnAssign(ast.Name(name)), ast.Expr(ast.Constant(str(meaning))):
+                    if parts := TEXT.fullmatch(" ".join(meaning.split())):
+                        found[name] = (parts[1] or "", parts[2])
     return found
 
 

@@ -29,26 +29,23 @@ class ArenaParams:
     """What both worlds have in common; lengths in cm, one iteration is 0.1 s.
 
     Nitschke 2009, table 4.1, unless marked.
-
-    Attributes:
-        iterations (0.1 s): length of an epoch (table 4.3).
-        arena_cm (cm): side of the arena. Choice: a tenth of the printed 1000, in which robots of
-            this speed do not meet (docs/results/arena.md).
-        sensor_range_cm (cm): how far an infrared or light sensor sees, from its place on the rim.
-        sensor_angle_deg (degrees): half angle of the cone a sensor sees. Choice: 30, so that the
-            sensors ahead overlap and a gap remains behind the shoulders, as on the real robot.
-        max_speed_cm (cm per iteration): speed of a predator at full command. Choice: 0.8, the
-            8 cm/s of Khepera simulators. At 5 (0.5 m/s, the robot's own limit) bodies still cannot
-            jump past one another.
-        prey_speed (predators' speed): speed of a prey at full command (section 4.1).
     """
 
     iterations: Annotated[int, Ge(2), Le(1_000_000)] = 1000
+    """(0.1 s) length of an epoch (table 4.3)."""
     arena_cm: Annotated[float, Ge(60), Le(5000)] = 100.0
+    """(cm) side of the arena. Choice: a tenth of the printed 1000, in which robots of this speed do
+    not meet (docs/results/arena.md)."""
     sensor_range_cm: Annotated[float, Gt(0), Le(200)] = 22.0
+    """(cm) how far an infrared or light sensor sees, from its place on the rim."""
     sensor_angle_deg: Annotated[float, Gt(0), Le(89)] = 30.0
+    """(degrees) half angle of the cone a sensor sees. Choice: 30, so that the sensors ahead overlap
+    and a gap remains behind the shoulders, as on the real robot."""
     max_speed_cm: Annotated[float, Gt(0), Le(5)] = 0.8
+    """(cm per iteration) speed of a predator at full command. Choice: 0.8, the 8 cm/s of Khepera
+    simulators. At 5 (0.5 m/s, the robot's own limit) bodies still cannot jump past one another."""
     prey_speed: Annotated[float, Gt(0), Le(1.2)] = 1.2
+    """(predators' speed) speed of a prey at full command (section 4.1)."""
 
     @property
     def prey_speed_cm(self) -> float:

@@ -115,60 +115,58 @@ class GaccParams:
 
     Nitschke 2009, table 6.4, unless marked. Choice: tables 6.1 and 6.2 have lost the settings of
     detection sensors and grippers; all types have the same.
-
-    Attributes:
-        n_robots (robots): robots in a team.
-        iterations (iterations): length of an epoch.
-        energy (energy): of a robot at the start of an epoch.
-        home_side (side): side of the home area, in the middle of the square.
-        zone_side (side): side of the construction zone, in the middle of the home area.
-        home_range (side): how far from its centre the home area is sensed.
-        home_sight (side): how far a robot in the home area sees who needs help there, and objects.
-        object_range (side): how far the object and obstacle sensors see.
-        object_accuracy (probability): that an object or an obstacle in range is sensed.
-        object_cost (energy): of an activation of these sensors.
-        robot_range (side): how far the robot sensors see.
-        robot_cost (energy): of the robot sensors, in every iteration.
-        grip_distance (side): how far from a robot an object may be that it grips.
-        grip_cost (energy): of an activation of the gripper, waiting with an object included.
-        move_range (side): the largest step.
-        move_cost (energy): of a move, refused or not.
-        wait (iterations): how long a robot waits with an object for help.
-        needs_detection: whether an object must have been detected before it can be gripped.
-        min_distance (side): lower bound of distances in eqs 6.1 to 6.3.
-        separation (side): a robot may not come closer than this to another.
-        obstacle_least (side): shortest side of an obstacle.
-        obstacle_most (side): longest side of an obstacle.
-        obstacle_gap (side): least distance of an obstacle from walls, home area and the others.
-        n_hidden (neurons): hidden neurons of a controller at the start.
-        max_hidden (neurons): hidden neurons a controller can grow to.
     """
 
     n_robots: Annotated[int, Ge(2), Le(64)] = 30
+    """(robots) robots in a team."""
     iterations: Annotated[int, Ge(2), Le(1_000_000)] = 3000
+    """(iterations) length of an epoch."""
     energy: Positive = 1000.0
+    """(energy) of a robot at the start of an epoch."""
     home_side: Annotated[float, Gt(0), Le(0.8)] = 0.7  # Choice: see docs/results/gacc.md
+    """(side) side of the home area, in the middle of the square."""
     zone_side: Annotated[float, Gt(0), Le(0.5)] = 0.06  # Choice
+    """(side) side of the construction zone, in the middle of the home area."""
     home_range: Annotated[float, Gt(0), Le(1)] = 1.0  # Choice: sensed from everywhere
+    """(side) how far from its centre the home area is sensed."""
     home_sight: Annotated[float, Gt(0), Le(1)] = 1.0  # Choice: at home, all of home is in sight
+    """(side) how far a robot in the home area sees who needs help there, and objects."""
     object_range: Range = 0.05
+    """(side) how far the object and obstacle sensors see."""
     object_accuracy: Annotated[float, Ge(0), Le(1)] = 1.0  # Choice
+    """(probability) that an object or an obstacle in range is sensed."""
     object_cost: NonNegative = 0.02  # Choice
+    """(energy) of an activation of these sensors."""
     robot_range: Range = 0.05
+    """(side) how far the robot sensors see."""
     robot_cost: NonNegative = 0.01
+    """(energy) of the robot sensors, in every iteration."""
     grip_distance: Range = 0.05  # Choice: what can be detected can be gripped
+    """(side) how far from a robot an object may be that it grips."""
     grip_cost: NonNegative = 0.01  # Choice
+    """(energy) of an activation of the gripper, waiting with an object included."""
     move_range: Annotated[float, Gt(0), Le(0.02)] = 0.01  # Choice: the rovers', table 5.4
+    """(side) the largest step."""
     move_cost: NonNegative = 0.01
+    """(energy) of a move, refused or not."""
     wait: Annotated[int, Ge(1), Le(1_000_000)] = 30
+    """(iterations) how long a robot waits with an object for help."""
     needs_detection: bool = False  # Choice: whether nobody grips what nobody has detected
+    """whether an object must have been detected before it can be gripped."""
     min_distance: Positive = 0.01  # Choice: the bound of eq. 6.1, read as a maximum
+    """(side) lower bound of distances in eqs 6.1 to 6.3."""
     separation: NonNegative = 0.002  # Choice: "only one robot can occupy any position" (6.1.2)
+    """(side) a robot may not come closer than this to another."""
     obstacle_least: Annotated[float, Ge(0.02), Le(0.1)] = 0.02  # Choice: sides of an obstacle
+    """(side) shortest side of an obstacle."""
     obstacle_most: Annotated[float, Ge(0.02), Le(0.1)] = 0.1  # Choice
+    """(side) longest side of an obstacle."""
     obstacle_gap: Annotated[float, Gt(0), Le(0.05)] = 0.03  # Choice: around every obstacle
+    """(side) least distance of an obstacle from walls, home area and the others."""
     n_hidden: Annotated[int, Ge(2), Le(16)] = 10
+    """(neurons) hidden neurons of a controller at the start."""
     max_hidden: Annotated[int, Ge(2), Le(32)] = 20  # Choice: twice the initial number
+    """(neurons) hidden neurons a controller can grow to."""
 
     def __post_init__(self) -> None:
         for low, high in (

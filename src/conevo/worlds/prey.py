@@ -48,20 +48,16 @@ __all__ = ["PreyParams", "PreyWorld"]
 
 @parameters("world")
 class PreyParams(ArenaParams):
-    """Parameters of the world, beside those of the arena.
-
-    Attributes:
-        least: fewest obstacles, and fewest predators, of an epoch (section 4.3).
-        most: most obstacles, and most predators, of an epoch.
-        n_hidden (neurons): hidden neurons of a controller at the start (section 4.1).
-        max_hidden (neurons): hidden neurons a controller can grow to. Choice: twice the initial
-            number.
-    """
+    """Parameters of the world, beside those of the arena."""
 
     least: Annotated[int, Ge(0), Le(6)] = 2
+    """fewest obstacles, and fewest predators, of an epoch (section 4.3)."""
     most: Annotated[int, Ge(0), Le(6)] = 6
+    """most obstacles, and most predators, of an epoch."""
     n_hidden: Annotated[int, Ge(2), Le(16)] = 5
+    """(neurons) hidden neurons of a controller at the start (section 4.1)."""
     max_hidden: Annotated[int, Ge(2), Le(32)] = 10
+    """(neurons) hidden neurons a controller can grow to. Choice: twice the initial number."""
 
     def __post_init__(self) -> None:
         if self.most < self.least:

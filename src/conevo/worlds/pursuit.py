@@ -63,33 +63,27 @@ PREY_MODES = {"shaped": 0, "heuristic": 1, "random": 2}  # a file's prey are con
 
 @parameters("world")
 class PursuitParams(ArenaParams):
-    """Parameters of the world, beside those of the arena.
-
-    Attributes:
-        prey: "shaped" (the evolved prey that are shipped), "heuristic", "random", or a file that
-            ``conevo shape-prey`` made.
-        prey_digest: digest of a prey file; a run fills it in and checks it.
-        n_obstacles (obstacles): cylinders in the arena. The thesis has them only when prey are
-            shaped.
-        capture_window (iterations): over which a captured prey has hardly moved. Choice: 10, one
-            second.
-        capture_share: it moved less than this share of what its wheels commanded. Choice: a tenth.
-        capture_distance_cm (cm): or it moved less than this. Choice: 0.2.
-        capture_predators (predators): that must be within light range (section 4.1: two).
-        n_hidden (neurons): hidden neurons of a controller at the start (section 4.1).
-        max_hidden (neurons): hidden neurons a controller can grow to. Choice: twice the initial
-            number.
-    """
+    """Parameters of the world, beside those of the arena."""
 
     prey: str = "shaped"
+    """who they are: "shaped" (the evolved prey that are shipped), "heuristic", "random", or a file
+    that ``conevo shape-prey`` made."""
     prey_digest: str = ""
+    """digest of a prey file; a run fills it in and checks it."""
     n_obstacles: Annotated[int, Ge(0), Le(6)] = 0
+    """(obstacles) cylinders in the arena. The thesis has them only when prey are shaped."""
     capture_window: Annotated[int, Ge(1), Le(1000)] = 10
+    """(iterations) over which a captured prey has hardly moved. Choice: 10, one second."""
     capture_share: Annotated[float, Ge(0), Le(1)] = 0.1
+    """it moved less than this share of what its wheels commanded. Choice: a tenth."""
     capture_distance_cm: Annotated[float, Ge(0), Le(100)] = 0.2
+    """(cm) or it moved less than this. Choice: 0.2."""
     capture_predators: Annotated[int, Ge(1), Le(6)] = 2
+    """(predators) that must be within light range (section 4.1: two)."""
     n_hidden: Annotated[int, Ge(2), Le(16)] = 6
+    """(neurons) hidden neurons of a controller at the start (section 4.1)."""
     max_hidden: Annotated[int, Gt(0), Le(32)] = 12
+    """(neurons) hidden neurons a controller can grow to. Choice: twice the initial number."""
 
     def __post_init__(self) -> None:
         if self.prey in PREY_MODES:

@@ -68,54 +68,52 @@ class RoverParams:
 
     Nitschke 2009, table 5.4, unless marked. Choice: the sensor settings (range, accuracy, cost) are
     lost from table 5.2; these keep its printed nominal range 0.05 for the middle one.
-
-    Attributes:
-        n_robots (rovers): rovers in a team.
-        iterations (iterations): length of an epoch.
-        energy (energy): of a rover at the start of an epoch.
-        low_range (side): radius of a detection with setting low.
-        med_range (side): radius of a detection with setting med.
-        hi_range (side): radius of a detection with setting hi.
-        low_accuracy (probability): that a rover succeeds on a rock in range with setting low.
-        med_accuracy (probability): that a rover succeeds on a rock in range with setting med.
-        hi_accuracy (probability): that a rover succeeds on a rock in range with setting hi.
-        low_cost (energy): of a detection with setting low.
-        med_cost (energy): of a detection with setting med.
-        hi_cost (energy): of a detection with setting hi.
-        rover_sensor_range (side): how far the rover sensors see.
-        rover_sensor_cost (energy): of the rover sensors, in every iteration.
-        move_range (side): the largest step.
-        move_cost (energy): of a move, refused or not.
-        report_cost (energy): of reporting, in an iteration with a detection.
-        min_distance (side): lower bound of distances in eqs 5.1 and 5.4.
-        separation (side): a rover may not come closer than this to another.
-        fitness: what a rover is credited with: eq. 5.4, or value times area.
-        n_hidden (neurons): hidden neurons of a controller at the start.
-        max_hidden (neurons): hidden neurons a controller can grow to.
     """
 
     n_robots: Annotated[int, Ge(2), Le(64)] = 20
+    """(rovers) rovers in a team."""
     iterations: Annotated[int, Ge(2), Le(1_000_000)] = 2500
+    """(iterations) length of an epoch."""
     energy: Positive = 1000.0
+    """(energy) of a rover at the start of an epoch."""
     low_range: Range = 0.07
+    """(side) radius of a detection with setting low."""
     med_range: Range = 0.05
+    """(side) radius of a detection with setting med."""
     hi_range: Range = 0.03
+    """(side) radius of a detection with setting hi."""
     low_accuracy: Share = 0.7
+    """(probability) that a rover succeeds on a rock in range with setting low."""
     med_accuracy: Share = 0.8
+    """(probability) that a rover succeeds on a rock in range with setting med."""
     hi_accuracy: Share = 0.9
+    """(probability) that a rover succeeds on a rock in range with setting hi."""
     low_cost: NonNegative = 0.1
+    """(energy) of a detection with setting low."""
     med_cost: NonNegative = 0.2
+    """(energy) of a detection with setting med."""
     hi_cost: NonNegative = 0.3
+    """(energy) of a detection with setting hi."""
     rover_sensor_range: Range = 0.02
+    """(side) how far the rover sensors see."""
     rover_sensor_cost: NonNegative = 0.05
+    """(energy) of the rover sensors, in every iteration."""
     move_range: Annotated[float, Gt(0), Le(0.02)] = 0.01
+    """(side) the largest step."""
     move_cost: NonNegative = 0.01
+    """(energy) of a move, refused or not."""
     report_cost: NonNegative = 0.05  # Choice: paid in an iteration in which the rover detects
+    """(energy) of reporting, in an iteration with a detection."""
     min_distance: Positive = 0.01  # Choice: the bound of eq. 5.1, read as a maximum
+    """(side) lower bound of distances in eqs 5.1 and 5.4."""
     separation: NonNegative = 0.002  # Choice: "only one rover can occupy any position" (5.1)
+    """(side) a rover may not come closer than this to another."""
     fitness: Literal["eq_5_4", "value_times_area"] = "eq_5_4"
+    """what a rover is credited with: eq. 5.4, or value times area."""
     n_hidden: Annotated[int, Ge(2), Le(16)] = 10
+    """(neurons) hidden neurons of a controller at the start."""
     max_hidden: Annotated[int, Ge(2), Le(32)] = 20  # Choice: twice the initial number
+    """(neurons) hidden neurons a controller can grow to."""
 
     @property
     def ranges(self) -> tuple[float, float, float]:

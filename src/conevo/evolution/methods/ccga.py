@@ -39,13 +39,10 @@ __all__ = ["Ccga", "CcgaConfig", "CcgaState"]
 
 @parameters("method")
 class CcgaConfig(VariationConfig, SchemeConfig):
-    """Parameters of CCGA; under the scheme "shared" no partners come from the elite.
-
-    Attributes:
-        genotypes: M, whole networks per population (table 5.5: 500; 600 in all for pursuit).
-    """
+    """Parameters of CCGA; under the scheme "shared" no partners come from the elite."""
 
     genotypes: Annotated[int, Ge(2), Le(1_000_000)] = 500
+    """M, whole networks per population (table 5.5: 500; 600 in all for pursuit)."""
 
 
 @dataclass(frozen=True)

@@ -34,40 +34,37 @@ __all__ = ["Cone", "Cone1Config", "Cone2Config", "Cone3Config", "ConeConfig", "C
 
 @parameters("method")
 class ConeConfig(MespConfig):
-    """Parameters of CONE: those of Multi-Agent ESP and its own.
-
-    Attributes:
-        stagnation_v: V, generations without progress of the fittest team before SST moves (table
-            5.5: 15; 10 for pursuit).
-        stagnation_w: W, further generations before GST moves; a controller's size is questioned
-            after V + W + Y (table 5.5: 10).
-        sst: specialization similarity threshold at the start. Higher makes more populations
-            candidates for recombination. Choice: 0.5, the middle of table 5.5's range.
-        gst: genotype similarity threshold at the start. Higher recombines more. Choice: 0.2; two
-            random sub-populations are 0.33 apart, and genotypes "needed to be very similar in order
-            to be recombined" (7.1.2).
-        gd_aggregate: "mean" or "sum" of the distances of rank-paired elites. Choice: the mean.
-        threshold_step: change of a threshold (section 3.5: 1 %). Choice: absolute.
-        type_c: whose fitness ranks the elite (type C): "own" is that of the robot on trial, as for
-            type A; "team" is the mean of all robots; "off" leaves the order of type A and saves the
-            evaluations. Choice: "own", as eq. 5.4 for type A.
-        type_c_rounds: teams in which each elite controller is tried for type C; 0 means as many as
-            type A has: one if "systematic", ``rounds`` if "shared". Choice: 0, so that type C never
-            overwrites better evidence.
-        use_gdm: ask for similar genotypes (the genotype difference metric).
-        use_sdm: ask for similar behaviour (the specialization difference metric).
-    """
+    """Parameters of CONE: those of Multi-Agent ESP and its own."""
 
     stagnation_v: Annotated[int, Ge(1), Le(100_000)] = 15
+    """V, generations without progress of the fittest team before SST moves (table 5.5: 15; 10 for
+    pursuit)."""
     stagnation_w: Annotated[int, Ge(1), Le(100_000)] = 10
+    """W, further generations before GST moves; a controller's size is questioned after V + W + Y
+    (table 5.5: 10)."""
     sst: Annotated[float, Ge(0), Le(1)] = 0.5
+    """specialization similarity threshold at the start. Higher makes more populations candidates
+    for recombination. Choice: 0.5, the middle of table 5.5's range."""
     gst: Annotated[float, Ge(0), Le(1)] = 0.2
+    """genotype similarity threshold at the start. Higher recombines more. Choice: 0.2; two random
+    sub-populations are 0.33 apart, and genotypes "needed to be very similar in order to be
+    recombined" (7.1.2)."""
     gd_aggregate: Literal["mean", "sum"] = "mean"
+    """the "mean" or "sum" of the distances of rank-paired elites. Choice: the mean."""
     threshold_step: Annotated[float, Ge(0), Le(1)] = 0.01
+    """change of a threshold (section 3.5: 1 %). Choice: absolute."""
     type_c: Literal["own", "team", "off"] = "own"
+    """whose fitness ranks the elite (type C): "own" is that of the robot on trial, as for type A;
+    "team" is the mean of all robots; "off" leaves the order of type A and saves the evaluations.
+    Choice: "own", as eq. 5.4 for type A."""
     type_c_rounds: Annotated[int, Ge(0), Le(10_000)] = 0
+    """teams in which each elite controller is tried for type C; 0 means as many as type A has: one
+    if "systematic", ``rounds`` if "shared". Choice: 0, so that type C never overwrites better
+    evidence."""
     use_gdm: bool = True
+    """ask for similar genotypes (the genotype difference metric)."""
     use_sdm: bool = True
+    """ask for similar behaviour (the specialization difference metric)."""
 
     @property
     def n_elite_rounds(self) -> int:

@@ -46,14 +46,11 @@ __all__ = ["HetCne", "HetCneConfig", "HetCneState"]
 
 @parameters("method")
 class HetCneConfig(VariationConfig):
-    """Parameters of HetCNE.
-
-    Attributes:
-        genotypes: M, whole networks in the population, at least as many as robots; each costs one
-            team evaluation. Choice: 10000, as for HomCNE.
-    """
+    """Parameters of HetCNE."""
 
     genotypes: Annotated[int, Ge(2), Le(1_000_000)] = 10_000
+    """M, whole networks in the population, at least as many as robots; each costs one team
+    evaluation. Choice: 10000, as for HomCNE."""
 
 
 @dataclass(frozen=True)

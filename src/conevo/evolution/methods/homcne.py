@@ -34,15 +34,12 @@ __all__ = ["HomCne", "HomCneConfig"]
 
 @parameters("method")
 class HomCneConfig(VariationConfig):
-    """Parameters of HomCNE.
-
-    Attributes:
-        genotypes: M, whole networks in the population; each costs one team evaluation.
-            Choice: 10000, the 20 x 500 of the methods with many populations (table 5.5's own number
-            is lost), so that all methods spend the same team evaluations per generation.
-    """
+    """Parameters of HomCNE."""
 
     genotypes: Annotated[int, Ge(2), Le(1_000_000)] = 10_000
+    """M, whole networks in the population; each costs one team evaluation. Choice: 10000, the 20 x
+    500 of the methods with many populations (table 5.5's own number is lost), so that all methods
+    spend the same team evaluations per generation."""
 
 
 @dataclass(frozen=True)

@@ -50,19 +50,16 @@ __all__ = ["Mesp", "MespConfig", "MespState"]
 
 @parameters("method")
 class MespConfig(VariationConfig, SchemeConfig):
-    """Parameters of Multi-Agent ESP.
-
-    Attributes:
-        genotypes: M, neurons per sub-population (table 5.5: 500 per population of 10).
-        stagnation_y: Y, generations without progress before a controller's size is questioned
-            (table 5.5: 15; 20 for pursuit).
-        lesion_ratio: share of its fitness that a controller must keep without its least needed
-            neuron for that neuron to go. Lower removes more. Choice: 0.9, the thesis gives none.
-    """
+    """Parameters of Multi-Agent ESP."""
 
     genotypes: Annotated[int, Ge(2), Le(1_000_000)] = 50
+    """M, neurons per sub-population (table 5.5: 500 per population of 10)."""
     stagnation_y: Annotated[int, Ge(1), Le(100_000)] = 15
+    """Y, generations without progress before a controller's size is questioned (table 5.5: 15; 20
+    for pursuit)."""
     lesion_ratio: Annotated[float, Gt(0), Le(1)] = 0.9
+    """share of its fitness that a controller must keep without its least needed neuron for that
+    neuron to go. Lower removes more. Choice: 0.9, the thesis gives none."""
 
 
 @dataclass(frozen=True)
