@@ -138,7 +138,7 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
             sys.exit(0)
         fail(f"{error.filename}: {error.strerror}" if error.filename else str(error), 3)
     except Exception as error:
-        outside = sys.modules.get("conevo.worlds.outside")
+        outside = sys.modules.get("conevo.outside")
         line = outside.line_of(error) if outside else ""
         if not line:
             raise

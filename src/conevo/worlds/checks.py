@@ -14,10 +14,10 @@ import numpy.typing as npt
 from pydantic import ValidationError
 
 from conevo.errors import ConevoError, UsageError
+from conevo.outside import line_of
 from conevo.parameters import wrong_values
 from conevo.rng import fold, stream
 from conevo.worlds.contract import faults, scenario_faults
-from conevo.worlds.outside import line_of
 from conevo.worlds.protocol import World
 from conevo.worlds.registry import WorldEntry, resolve
 from conevo.worlds.rollout import Rollout
