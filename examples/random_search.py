@@ -1,7 +1,8 @@
 """Random search: a team of clones of every genotype; all but the elitists are drawn anew.
 
-Made up: what a method must at least be better than. The recipe *add a method* of CONTRIBUTING.md
-puts this file into the package. It also works from outside: ``python examples/random_search.py``.
+Made up: what a method must at least be better than. It works as it is, ``conevo run
+rover/complex-1 --method examples/random_search.py:random-search``, and without any world, ``python
+examples/random_search.py``. The recipe *add a method* of CONTRIBUTING.md puts it into the package.
 """
 
 from __future__ import annotations
@@ -15,12 +16,13 @@ from annotated_types import Ge
 from conevo.evolution import credit
 from conevo.evolution.assembly import rows
 from conevo.evolution.generation import Populations, advance, begin, count, crown, grade, trials
+from conevo.evolution.methods.registry import MethodEntry
 from conevo.evolution.population import elite_count, random_genes
 from conevo.evolution.protocol import Layout, Scores, Trials
 from conevo.evolution.variation import VariationConfig
 from conevo.rng import stream
 
-__all__ = ["RandomSearch", "RandomSearchConfig"]
+__all__ = ["ENTRY", "RandomSearch", "RandomSearchConfig"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,6 +70,16 @@ class RandomSearch:
         genes = random_genes(generator, state.genes.shape)
         genes[:, :, :1] = state.genes[:, :, state.elite[0, :1]]
         return advance(state, genes, state.active)
+
+
+ENTRY = MethodEntry(
+    name="random-search",
+    title="random search",
+    summary="a team of clones of random genotypes; the fittest survives",
+    source="made up",
+    config_name="RandomSearchConfig",
+    method_name="RandomSearch",
+)
 
 
 def main() -> None:

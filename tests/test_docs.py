@@ -227,6 +227,8 @@ def test_following_the_recipes_adds_a_world_and_a_method(tmp_path):
         text = (ROOT / "examples" / f"{example}.py").read_text()
         text = re.sub(r"\n\n(def main\(\)|ENTRY = ).*", "", text, flags=re.DOTALL)
         text = text.replace("from conevo.worlds.registry import WorldEntry\n", "")
+        text = text.replace("from conevo.evolution.methods.registry import MethodEntry\n", "")
+        text = text.replace('"ENTRY", ', "")
         (package / place / f"{example}.py").write_text(text)
     for mark, name, text in recipes():
         if mark == "entry":

@@ -25,7 +25,7 @@ from typing import Any, Literal
 from conevo.errors import EnvironmentFailure, UsageError
 from conevo.reading import read_bytes
 
-__all__ = ["Source", "classes_of", "is_outside", "line_of", "load"]
+__all__ = ["Source", "classes_of", "files_of", "is_outside", "line_of", "load"]
 
 MOST_BYTES = 2**20  # of a text
 OWN = {"world": "conevo_world_", "method": "conevo_method_"}  # begin the names of their modules
@@ -71,6 +71,15 @@ def load(path: Path, kind: Literal["world", "method"], digest: str = "") -> Sour
     with _loading:
         module = sys.modules.get(own) or _run(path, texts, kind, own)
     return Source(module, tuple(map(str, texts)), found)
+
+
+def files_of(path: Path) -> list[Path]:
+    """Return a file and the files next to it that it imports; nothing in them is run.
+
+    Raises:
+        UsageError: one cannot be read.
+    """
+    return list(_texts(path, "Python"))
 
 
 def is_outside(name: str) -> bool:

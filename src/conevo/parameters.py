@@ -69,6 +69,9 @@ def checked(part: type[Any], section: str) -> type[Any]:
         return part
     config = ConfigDict(**CONFIG, arbitrary_types_allowed=True)
     frozen = part.__dataclass_params__.frozen
+    if hasattr(part, "__pydantic_config__"):  # inherited: pydantic would change the class itself
+        names = ("__module__", "__qualname__", "__doc__")
+        part = type(part.__name__, (part,), {name: getattr(part, name) for name in names})
     return _refusing(dataclass(part, frozen=frozen, config=config), section)
 
 

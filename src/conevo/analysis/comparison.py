@@ -27,7 +27,7 @@ from conevo.analysis.statistics import (
     mean_interval,
     normality,
 )
-from conevo.evolution.methods.registry import METHODS
+from conevo.evolution.methods.registry import METHODS, title_of
 
 __all__ = [
     "Aggregate",
@@ -55,7 +55,7 @@ class Treatment(NamedTuple):
     @property
     def title(self) -> str:
         """Name as published, and the levels."""
-        name = METHODS[self.method].title if self.method in METHODS else self.method
+        name = title_of(self.method)
         return f"{name}, {self.variant}" if self.variant else name
 
 

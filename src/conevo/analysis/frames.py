@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from conevo.errors import UsageError
+from conevo.evolution.methods.registry import remember_title
 from conevo.worlds.measures import Measure
 
 __all__ = ["SCHEMA", "Tables", "Value"]
@@ -24,6 +25,7 @@ SCHEMA: dict[str, dict[str, str]] = {
         "family": "VARCHAR",
         "number": "INTEGER",
         "method": "VARCHAR",
+        "title": "VARCHAR",
         "preset": "VARCHAR",
         "seed": "BIGINT",
         "variant": "VARCHAR",
@@ -111,10 +113,10 @@ SCHEMA: dict[str, dict[str, str]] = {
 }
 """Columns of each table and their DuckDB types, as written to and read from NAME.parquet.
 
-``runs``: exchanges is the number of pairs of sub-populations that recombined between populations,
-in the mean of the generations, exchange_share that of the pairs that could have; both are NULL for
-methods that never do. ``measures``: the world's, as it declares them; of a measure that is not
-listed larger is better.
+``runs``: title is the method's name as published; exchanges is the number of pairs of
+sub-populations that recombined between populations, in the mean of the generations, exchange_share
+that of the pairs that could have; both are NULL for methods that never do. ``measures``: the
+world's, as it declares them; of a measure that is not listed larger is better.
 """
 
 
@@ -176,6 +178,8 @@ class Tables:
         self._connection = duckdb.connect(":memory:", config={"threads": 1})
         for table, columns in SCHEMA.items():
             self._open(table, columns)
+        for name, title in self.query("SELECT DISTINCT method, title FROM runs ORDER BY ALL")[1]:
+            remember_title(name, title or name)
         self._connection.execute("CREATE TABLE budgets (run VARCHAR, budget VARCHAR)")
         rows = self.query(
             "SELECT run, world, preset, contains(run, '/stage-'), stopped_by, evaluations,"

@@ -1,4 +1,4 @@
-"""The files that a plan names: worlds and prey, copied into the campaign so that it can be moved.
+"""The files that a plan names, of worlds, methods and prey: copied so that it can be moved.
 
 On disk they are named from the folder of the plan, in memory by their whole paths.
 """
@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+from conevo.outside import files_of
 from conevo.runs.inputs import INPUTS, copy_input
 
 __all__ = ["keep_files", "located", "renamed", "shown_as"]
@@ -19,7 +20,7 @@ Rename = Callable[[Any], Any]
 def located(value: Any, folder: Path) -> Any:
     """Return a level or setting; if it names a file of a folder, by its whole path.
 
-    A world in a file always does, "FILE.py:ENVIRONMENT"; another text if there is such a file.
+    "FILE.py:NAME", a world or method in a file, always does; another text if there is such a file.
     """
     if not isinstance(value, str):
         return value
@@ -66,9 +67,7 @@ def keep_files(values: Iterable[Any], directory: Path) -> dict[str, str]:
             continue
         files = [file]
         if ".py:" in value:
-            from conevo.worlds.outside import load
-
-            files = [Path(one) for one in load(file).files]
+            files = files_of(file)
         kept = [copy_input(one, directory / INPUTS) for one in files]
         names[str(file)] = kept[0].relative_to(directory).as_posix()
     return names

@@ -20,8 +20,11 @@ import tomli_w
 
 from conevo.campaigns.inputs import located, shown_as
 from conevo.errors import UsageError, unknown_name
-from conevo.runs.config import PRESETS, RunConfig, resolve
+from conevo.evolution.methods.registry import MethodEntry
+from conevo.evolution.methods.registry import resolve as resolve_method
+from conevo.runs.config import IN_FILES, PRESETS, RunConfig, resolve
 from conevo.runs.shaping import tasks_up_to
+from conevo.worlds.registry import WorldEntry
 from conevo.worlds.registry import resolve as resolve_world
 
 __all__ = ["MOST_SEEDS", "Plan", "PlannedRun", "Where"]
@@ -37,7 +40,8 @@ class PlannedRun:
     Attributes:
         label: its name in the campaign, and of its directory.
         world: address of the world and environment; of a shaping the last environment.
-        method, preset, seed: as for any run.
+        method: address of the method.
+        preset, seed: as for any run.
         variant: levels of all factors but world and method, "gst=0.1"; empty if there are none.
         overrides: settings over those of the preset.
         shape: whether the environments before this one are learned first.
@@ -58,13 +62,14 @@ class PlannedRun:
 
     @property
     def values(self) -> list[Any]:
-        """Its world and its settings."""
-        return [self.world, *self.overrides.values()]
+        """Its world, its method and its settings."""
+        return [self.world, self.method, *self.overrides.values()]
 
     def mapped(self, change: Callable[[Any], Any]) -> PlannedRun:
-        """Return the run with its world and its settings changed."""
+        """Return the run with its world, its method and its settings changed."""
         overrides = {key: change(value) for key, value in self.overrides.items()}
-        return dataclasses.replace(self, world=change(self.world), overrides=overrides)
+        names = {"world": change(self.world), "method": change(self.method)}
+        return dataclasses.replace(self, **names, overrides=overrides)
 
     @property
     def names(self) -> list[str]:
@@ -211,7 +216,8 @@ class Plan:
             UsageError: an unknown name or a value that is not allowed in any run.
         """
         cells = self._cells()
-        self._refuse_namesakes({levels["world"] for levels in cells})
+        self._refuse_namesakes("world", (resolve_world(w)[0] for w in _levels(cells, "world")))
+        self._refuse_namesakes("method", map(resolve_method, _levels(cells, "method")))
         written = [self._write_cell(levels) for levels in cells]
         runs = [run for same_seed in zip(*written, strict=True) for run in same_seed]
         labels = [run.label for run in runs]
@@ -219,14 +225,14 @@ class Plan:
             raise UsageError(f"{twice[0]} {self.place} is planned twice: duplicate level or seed")
         return runs
 
-    def _refuse_namesakes(self, worlds: Iterable[str]) -> None:
-        """Refuse two worlds that are named alike: results go by the name."""
+    def _refuse_namesakes(self, kind: str, entries: Iterable[WorldEntry | MethodEntry]) -> None:
+        """Refuse two worlds or methods that are named alike: results go by the name."""
         files: dict[str, str] = {}
-        for entry, _ in map(resolve_world, sorted(worlds)):
+        for entry in entries:
             other = files.setdefault(entry.name, entry.file)
             if other != entry.file:
                 raise UsageError(
-                    f"{entry.name} {self.place} is the name of two worlds, {other} and "
+                    f"{entry.name} {self.place} is the name of two {kind}s, {other} and "
                     f"{entry.file}: their ENTRY must have different names"
                 )
 
@@ -253,7 +259,7 @@ class Plan:
             PlannedRun(
                 label=_label(configs[-1], variant, seed),
                 world=address,
-                method=method,
+                method=configs[-1].method_entry.address,
                 preset=self.preset,
                 seed=seed,
                 variant=variant,
@@ -267,10 +273,11 @@ class Plan:
 
     @property
     def values(self) -> list[Any]:
-        """All levels, settings and worlds that conditions name."""
+        """All levels, settings, and worlds and methods that conditions name."""
         tables = [self.factors, *(one.factors for one in self.where)]
         found = [level for table in tables for levels in table.values() for level in levels]
-        found += [name for one in self.where for name in one.conditions.get("world", ())]
+        conditions = [one.conditions.get(key, ()) for one in self.where for key in IN_FILES]
+        found += [name for names in conditions for name in names]
         for table in (self.settings, *(one.settings for one in self.where)):
             found += table.values()
         return found
@@ -320,6 +327,11 @@ class Plan:
             "settings": self.settings,
         }
         return tomli_w.dumps(tables | ({"where": where} if where else {}))
+
+
+def _levels(cells: Iterable[Mapping[str, Any]], factor: str) -> list[str]:
+    """Return the different levels that a factor has."""
+    return sorted({levels[factor] for levels in cells})
 
 
 def _combinations(factors: Mapping[str, tuple[Any, ...]]) -> list[dict[str, Any]]:

@@ -80,7 +80,7 @@ def read_preset(name: str) -> Plan:
 def read_plan(path: Path) -> Plan:
     """Return the plan in a file; its name is the file's unless it says another.
 
-    Files that it names, of worlds and prey, are taken from its folder.
+    Files that it names, of worlds, methods and prey, are taken from its folder.
 
     Raises:
         UsageError: it is no plan; the message names the key and what is allowed.
@@ -216,7 +216,7 @@ def _where(table: Any, of_all: Mapping[str, Any], place: str) -> Where:
         conditions[key] = tuple(_expand(_texts(allowed, f"where.{key}", place)))
     for key, known in (("method", METHODS), ("preset", PRESETS)):
         for name in conditions.get(key, ()):
-            if name not in known:
+            if name not in known and not (key == "method" and ".py:" in name):
                 raise unknown_name(f"where.{key}", name, known, place)
     for name in conditions.get("world", ()):
         if name not in of_all["world"] and ".py" not in name:

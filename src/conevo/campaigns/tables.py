@@ -19,6 +19,7 @@ from conevo.campaigns.ended import read_ended
 from conevo.campaigns.places import Places
 from conevo.campaigns.plan import PlannedRun
 from conevo.errors import ConevoError
+from conevo.evolution.methods.registry import title_of
 from conevo.reading import DamagedFile, read_json
 from conevo.runs.code import changes_text, sessions_of
 from conevo.runs.directory import as_json
@@ -171,6 +172,7 @@ def _run_row(
         "family": family if is_numbered else environment,
         "number": int(number) if is_numbered else 0,
         "method": run.method,
+        "title": title_of(run.method),
         "preset": run.preset,
         "seed": run.seed,
         "variant": planned.variant,

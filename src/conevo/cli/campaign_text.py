@@ -21,6 +21,7 @@ from conevo.campaigns.progress import last_written, progress_of
 from conevo.cli.find import campaigns_in
 from conevo.cli.text import duration, table
 from conevo.errors import ConevoError
+from conevo.evolution.methods.registry import name_in
 
 __all__ = [
     "campaigns_here",
@@ -179,7 +180,7 @@ def grid(
     for run in planned:
         if run.label in entries:
             row = cells.setdefault((shown_as(run.world), run.variant), {})
-            row.setdefault(run.method, []).append(entries[run.label])
+            row.setdefault(name_in(run.method), []).append(entries[run.label])
     methods = list(dict.fromkeys(method for row in cells.values() for method in row))
     lines = [
         [" ".join(name for name in key if name), *(_cell(row.get(m, [])) for m in methods)]

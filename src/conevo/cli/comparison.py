@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from conevo.errors import UsageError
@@ -34,22 +35,25 @@ def plan_of(order: Order, config: RunConfig, n_seeds: int, shape: bool) -> Plan:
     Raises:
         UsageError: --config, whose settings a campaign cannot take.
     """
+    from conevo.campaigns.inputs import located
     from conevo.campaigns.plan import Plan
+    from conevo.evolution.methods.registry import name_in
 
     if order.config is not None:
         raise UsageError("--seeds and --config are mutually exclusive; give settings with --set")
     first = 1 if order.seed is None else order.seed
-    methods = order.methods
+    methods = tuple(located(method, Path.cwd()) for method in order.methods)
+    names = [name_in(method) for method in methods]
     settings = dict(order.overrides)
     if len(methods) > 1 and config.preset == "smoke" and not config.run.budget_evaluations:
         settings |= SMOKE | settings
-    parts = [config.task, *methods, config.preset, *(["shaped"] if shape else [])]
+    parts = [config.task, *names, config.preset, *(["shaped"] if shape else [])]
     if settings:
         text = json.dumps(settings, sort_keys=True, default=str)
         parts.append(hashlib.blake2b(text.encode(), digest_size=3).hexdigest())
     return Plan(
         name=re.sub(r"[^A-Za-z0-9._-]+", "-", "-".join(parts)),
-        title=f"{config.task}: {', '.join(methods)}",
+        title=f"{config.task}: {', '.join(names)}",
         produces=(),
         seeds=tuple(range(first, first + n_seeds)),
         preset=config.preset,
@@ -63,8 +67,6 @@ def plan_of(order: Order, config: RunConfig, n_seeds: int, shape: bool) -> Plan:
 
 def compare(order: Order, plan: Plan, dry_run: bool) -> int:
     """Carry the campaign out on all cores, or print its runs; returns the exit code."""
-    from pathlib import Path
-
     from conevo.campaigns.campaign import CAMPAIGNS, create
     from conevo.cli.campaign_run import carry_on, ready
     from conevo.cli.campaign_text import print_plan

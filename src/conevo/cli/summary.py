@@ -23,7 +23,7 @@ from conevo.cli.text import (
     spread,
     table,
 )
-from conevo.evolution.methods.registry import METHODS
+from conevo.evolution.methods.registry import title_of
 from conevo.runs.code import changes_text, sessions_of
 from conevo.runs.outline import Outline
 from conevo.runs.run import Run
@@ -49,9 +49,8 @@ __all__ = [
 
 def title(outline: Outline) -> str:
     """Return one line that names a run."""
-    known = METHODS.get(outline.method)
-    name = known.title if known else outline.method
-    return f"{outline.task}, {name}, preset {outline.preset}, seed {outline.seed}"
+    method = title_of(outline.method)
+    return f"{outline.task}, {method}, preset {outline.preset}, seed {outline.seed}"
 
 
 def print_end(run: Run, style: str) -> None:

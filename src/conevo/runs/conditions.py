@@ -78,7 +78,7 @@ def _changed(
     address = config.address if on is None else on
     if "/" not in address and ".py:" not in address:
         address = config.entry.address(address)
-    there = resolve(address, config.method, config.preset)
+    there = resolve(address, config.method_entry.address, config.preset)
     known = [field.name for field in fields(there.world_params)]
     settings = {}
     if there.world == config.world:
@@ -105,7 +105,14 @@ def _changed(
                 f"which no setting changes; another environment may have others: --on ENVIRONMENT"
             )
     seed, place = config.run.seed, "of the changed conditions"
-    return resolve(address, config.method, config.preset, seed, overrides=settings, place=place)
+    return resolve(
+        address,
+        config.method_entry.address,
+        config.preset,
+        seed,
+        overrides=settings,
+        place=place,
+    )
 
 
 def _resized(team: Team, n_robots: int) -> Team:

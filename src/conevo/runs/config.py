@@ -1,8 +1,7 @@
 """What a run is, settled before it starts: component defaults, preset, TOML file, single settings.
 
-Each layer overrides the one before. A default lives in one place only: the field of the component
-it belongs to. Presets and files hold overrides, and every value remembers where it came from, so
-that a wrong one can be named with its place.
+Each layer overrides the one before. A default lives in one place only: the field of its component.
+Presets and files hold overrides; every value remembers its place, which errors name.
 
 A configuration file has three tables. ``[run]`` also holds the three names::
 
@@ -18,9 +17,10 @@ A configuration file has three tables. ``[run]`` also holds the three names::
     [method]
     genotypes = 20
 
-The world may be one in a file of its own, ``world = "FILE.py:ENVIRONMENT"``; ``world_digest`` next
-to it is checked when it is given. A file is named from the folder of the configuration file; a run
-has copies of its own (``runs.inputs``).
+The world may be one in a file of its own, ``world = "FILE.py:ENVIRONMENT"``, and so may the method,
+``method = "FILE.py:NAME"``; ``world_digest`` and ``method_digest`` next to them are checked when
+they are given. A file is named from the folder of the configuration file; a run has copies of its
+own (``runs.inputs``). No preset has sizes for a method in a file: its own defaults hold.
 
 Presets (``presets/*.toml``) hold the same three tables, with ``method`` split by method, for any
 world; a world's own table replaces that one. A variant ("cone-1") takes its family's values
@@ -29,7 +29,6 @@ world; a world's own table replaces that one. A variant ("cone-1") takes its fam
     [any.run]
     [any.method.cone]
     [rover.world]
-    [pursuit.run]
 """
 
 from __future__ import annotations
@@ -51,6 +50,7 @@ from conevo.runs.outline import LENGTH, Outline, identify, outline_of
 from conevo.runs.settings import RunSettings
 
 if TYPE_CHECKING:
+    from conevo.evolution.methods.registry import MethodEntry
     from conevo.evolution.protocol import Method
     from conevo.worlds.protocol import World
     from conevo.worlds.registry import WorldEntry
@@ -69,8 +69,10 @@ NAMES = {
     "world": "",
     "world_digest": "",
     "method": "cone",
+    "method_digest": "",
     "preset": "desk",
 }  # the keys of [run] that choose components
+IN_FILES = ("world", "method")  # of NAMES, what may be in a file outside the package
 ANY = "any"  # the table of a preset for worlds without one of their own
 
 
@@ -85,7 +87,7 @@ class RunConfig:
 
     entry: WorldEntry
     environment: str
-    method: str
+    method_entry: MethodEntry
     preset: str
     run: RunSettings
     world_params: Any
@@ -96,6 +98,11 @@ class RunConfig:
     def world(self) -> str:
         """The world's name with its version, "rover-v1"."""
         return self.entry.name
+
+    @property
+    def method(self) -> str:
+        """The method's name, "cone"."""
+        return self.method_entry.name
 
     @property
     def task(self) -> str:
@@ -124,16 +131,14 @@ class RunConfig:
 
     def build_method(self) -> Method:
         """Return the method of this run."""
-        from conevo.evolution.methods.registry import METHODS
-
-        return METHODS[self.method].build(self.method_config)
+        return self.method_entry.build(self.method_config)
 
     @functools.cached_property
     def run_id(self) -> str:
         """Twelve hex digits that change with any value but the preset's name.
 
         A file counts by its content: where a value has a digest beside it ("prey_digest"), the
-        path does not count. Neither does that of a world's file.
+        path does not count. Neither does that of a world's or a method's file.
         """
         return identify(self.tables(), self.task)
 
@@ -158,7 +163,7 @@ class RunConfig:
         run = _build("run", RunSettings, [layer])
         built = {"run": run, "world": self.world_params, "method": self.method_config}
         parts = {name: type(part) for name, part in built.items()}
-        base = _read_preset(self.preset, self.world, self.method)
+        base = _read_preset(self.preset, self.world, self.method_entry)
         changed = tuple(_changed(parts, built, base))
         return dataclasses.replace(self, run=run, changed=changed)
 
@@ -174,12 +179,15 @@ class RunConfig:
         Args:
             folder: of that file; files in it are named from there, others by their whole path.
         """
-        world = {"world": self.address}
+        names = {"world": self.address}
         if self.entry.digest:
-            world["world_digest"] = self.entry.digest
-        names = {"method": self.method, "preset": self.preset}
+            names["world_digest"] = self.entry.digest
+        names["method"] = self.method_entry.address
+        if self.method_entry.digest:
+            names["method_digest"] = self.method_entry.digest
+        names["preset"] = self.preset
         tables = {
-            "run": world | names | _set_fields(self.run),
+            "run": names | _set_fields(self.run),
             "world": _set_fields(self.world_params),
             "method": _set_fields(self.method_config),
         }
@@ -242,7 +250,8 @@ def resolve(
     Args:
         world: "rover/complex-1", or "FILE.py:ENVIRONMENT" for a world in a file of its own; may be
             left out if the configuration file names it.
-        method: wins over the file's, as the next two do.
+        method: "cone", or "FILE.py:NAME" for a method in a file of its own; wins over the file's,
+            as the next two do.
         preset: whose overrides to begin with.
         seed: root of all randomness.
         file: a configuration file, for example the ``config.toml`` of a run.
@@ -257,7 +266,7 @@ def resolve(
             all that it does; nothing has been written.
         EnvironmentFailure: the file cannot be read.
     """
-    from conevo.evolution.methods.registry import METHODS
+    from conevo.evolution.methods.registry import resolve as resolve_method
     from conevo.worlds.registry import resolve as resolve_world
 
     layers: list[Layer] = [_read_file(Path(file))] if file is not None else []
@@ -265,6 +274,8 @@ def resolve(
     single, short = _split_keys(given, place, folder)
     if world is not None:
         world = _Value(world, place, folder).as_file
+    if method is not None:
+        method = _Value(method, place, folder).as_file
     for name, asked in (("world", world), ("method", method), ("preset", preset), ("seed", seed)):
         if asked is not None and (twice := single.get("run", {}).get(name)):
             raise UsageError(
@@ -278,25 +289,24 @@ def resolve(
             f"which world? {named or 'N'}ame one as WORLD/ENVIRONMENT, for example rover/complex-1"
         )
     entry, environment = resolve_world(names["world"], names["world_digest"])
-    if names["method"] not in METHODS:
-        raise unknown_name("method", names["method"], METHODS)
+    method_entry = resolve_method(names["method"], names["method_digest"])
     parts: dict[str, type] = {
         "run": RunSettings,
         "world": entry.params_class,
-        "method": METHODS[names["method"]].config_class,
+        "method": method_entry.config_class,
     }
     for key, value in short.items():
         single.setdefault(_section_of(key, parts, place), {})[key] = value
     if seed is not None:
         single.setdefault("run", {})["seed"] = _Value(seed, "as the seed")
-    base = _read_preset(names["preset"], entry.name, names["method"])
+    base = _read_preset(names["preset"], entry.name, method_entry)
     if own_preset is not None and names["preset"] != own_preset.value:
         _refuse_label(names["preset"], base, layers[0], own_preset.place)
     built = {name: _build(name, part, [base, *layers, single]) for name, part in parts.items()}
     config = RunConfig(
         entry=entry,
         environment=environment,
-        method=names["method"],
+        method_entry=method_entry,
         preset=names["preset"],
         run=built["run"],
         world_params=built["world"],
@@ -376,18 +386,17 @@ def _take_names(layers: list[Layer], asked: Mapping[str, str | None]) -> dict[st
     names = dict(NAMES)
     for layer in layers:
         given = {name: layer.get("run", {}).pop(name, None) for name in NAMES}
-        if given["world_digest"] is not None and given["world"] is None:
-            place = given["world_digest"].place
-            raise UsageError(f"run.world_digest {place}: it needs run.world next to it")
-        if given["world"] is not None:
-            names["world_digest"] = ""  # of another world
+        for name in IN_FILES:
+            key = f"{name}_digest"
+            if (digest := given[key]) is not None and given[name] is None:
+                raise UsageError(f"run.{key} {digest.place}: it needs run.{name} next to it")
+            names[key] = names[key] if given[name] is None else ""  # of another one
         for name, found in given.items():
             if found is not None and not isinstance(found.value, str):
                 raise UsageError(f"run.{name} = {shown(found.value)} {found.place}: must be a name")
             if found is not None:
-                names[name] = found.as_file if name == "world" else found.value
-    if asked["world"] is not None:
-        names["world_digest"] = ""
+                names[name] = found.as_file if name in IN_FILES else found.value
+    names |= {f"{name}_digest": "" for name in IN_FILES if asked[name] is not None}
     return names | {name: value for name, value in asked.items() if value is not None}
 
 
@@ -423,19 +432,19 @@ def _section_of(key: str, parts: Mapping[str, type], place: str) -> str:
     return homes[0]
 
 
-def _read_preset(preset: str, world: str, method: str) -> Layer:
-    """Return what a preset says about this world and method."""
+def _read_preset(preset: str, world: str, method: MethodEntry) -> Layer:
+    """Return what a preset says about this world and method; nothing of a method in a file."""
     if preset not in PRESETS:
         raise unknown_name("preset", preset, PRESETS)
     source = resources.files(__package__) / "presets" / f"{preset}.toml"
     worlds = parse_toml(source.read_text(encoding="utf-8"), f"preset {preset!r}")
     generic, own = dict(worlds[ANY]), dict(worlds.get(world.rsplit("-v", 1)[0], {}))
     by_method = generic.pop("method") | own.pop("method", {})
-    family = method.split("-")[0]
-    if not {family, method} & set(by_method):
-        raise UsageError(f"preset {preset!r} has no settings for method {method!r} in {world!r}")
-    tables = generic | own
-    tables["method"] = by_method.get(family, {}) | by_method.get(method, {})
+    name, family = method.name, method.name.split("-")[0]
+    if not (method.file or {family, name} & set(by_method)):
+        raise UsageError(f"preset {preset!r} has no settings for method {name!r} in {world!r}")
+    sizes = {} if method.file else by_method.get(family, {}) | by_method.get(name, {})
+    tables = generic | own | {"method": sizes}
     return _as_layer(tables, f"in preset {preset!r}")
 
 

@@ -1,6 +1,7 @@
-"""The files that a run needs besides conevo, copied into its directory: a world's, and its prey.
+"""The files that a run needs besides conevo, copied into it: its world's and method's, its prey.
 
-A value with a digest next to it names a file, as ``world`` and ``world_digest`` in ``[run]``,
+A value with a digest next to it names a file, as ``world`` and ``world_digest`` in ``[run]``, so do
+``method`` and ``method_digest``,
 ``prey`` and ``prey_digest`` in ``[world]``. The copies are named from the directory, so that it can
 be moved, and looked at where the original files are changed or gone.
 """
@@ -8,6 +9,7 @@ be moved, and looked at where the original files are changed or gone.
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -36,19 +38,28 @@ def keep_inputs(config: RunConfig, directory: Path) -> RunConfig:
         EnvironmentFailure: a file cannot be read or written.
     """
     folder = directory / INPUTS
-    entry, params = config.entry, config.world_params
+    entry, method, params = config.entry, config.method_entry, config.world_params
     if entry.file:
-        from conevo.worlds.outside import load
+        from conevo.worlds.outside import load as load_world
 
-        file, *_ = [copy_input(Path(one), folder) for one in entry.files]
-        entry = load(file, entry.digest)
+        entry = load_world(_copied(entry.files, folder), entry.digest)
+    if method.file:
+        from conevo.evolution.methods.outside import load as load_method
+
+        method = load_method(_copied(method.files, folder), method.digest)
     for field in dataclasses.fields(params):
         if getattr(params, f"{field.name}_digest", ""):
             kept = copy_input(Path(getattr(params, field.name)), folder)
             params = dataclasses.replace(params, **{field.name: str(kept)})
-    if entry is config.entry and params is config.world_params:
+    if (entry, method, params) == (config.entry, config.method_entry, config.world_params):
         return config
-    return dataclasses.replace(config, entry=entry, world_params=params)
+    return dataclasses.replace(config, entry=entry, method_entry=method, world_params=params)
+
+
+def _copied(files: Iterable[str], folder: Path) -> Path:
+    """Return the copy of the first of some files in a folder, after copying all of them."""
+    first, *_ = [copy_input(Path(one), folder) for one in files]
+    return first
 
 
 def copy_input(file: Path, folder: Path) -> Path:

@@ -13,6 +13,7 @@ from pathlib import PurePath
 from typing import Any
 
 from conevo.errors import UsageError
+from conevo.evolution.methods.registry import name_in, remember_title
 from conevo.reading import DamagedFile, parse_toml
 
 __all__ = ["LENGTH", "Outline", "digest_of", "identify", "outline_of", "read_outline"]
@@ -51,7 +52,8 @@ def identify(tables: Tables, task: str, without: Collection[str] = ("preset",)) 
     """Return twelve hex digits that change with any value in the tables of a configuration.
 
     A file counts by its content: where a value has a digest next to it ("prey_digest"), the path
-    does not count. Neither does that of a world's file: ``task`` stands for it.
+    does not count. Neither does that of a world's file, for which ``task`` stands, nor that of a
+    method's file.
 
     Args:
         tables: every value spelt out.
@@ -59,7 +61,8 @@ def identify(tables: Tables, task: str, without: Collection[str] = ("preset",)) 
         without: keys of ``[run]`` that do not count.
     """
     found = {section: dict(table) for section, table in tables.items()}
-    found["run"] = {k: v for k, v in found["run"].items() if k not in without} | {"world": task}
+    names = {"world": task, "method": name_in(found["run"]["method"])}
+    found["run"] = {k: v for k, v in found["run"].items() if k not in without} | names
     for section in ("world", "method"):
         table = found[section]
         for key in [key for key in table if key.endswith("_digest") and table[key]]:
@@ -95,7 +98,8 @@ def outline_of(tables: Tables, task: str = "", place: str = "config.toml") -> Ou
             raise DamagedFile(f"{place} is damaged: run.{name} must be a whole number from {least}")
     address = run["world"]
     known = task or (PurePath(address).name if ".py:" in address else address)
-    return Outline(known, run["method"], run["preset"], *(run[name] for name in NUMBERS))
+    method = name_in(run["method"])
+    return Outline(known, method, run["preset"], *(run[name] for name in NUMBERS))
 
 
 def read_outline(content: bytes, provenance: Mapping[str, Any], place: str) -> Outline:
@@ -109,6 +113,8 @@ def read_outline(content: bytes, provenance: Mapping[str, Any], place: str) -> O
     Raises:
         UsageError: the configuration was changed, or is damaged.
     """
+    if about := provenance.get("method"):
+        remember_title(about["name"], about["title"])
     header = provenance.get("world")
     task = f"{header['name']}/{header['environment']}" if header else ""
     text = content.decode("utf-8", "replace")

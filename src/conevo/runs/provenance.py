@@ -22,9 +22,10 @@ from typing import TYPE_CHECKING, Any
 from conevo.runs.code import code_digest, version
 
 if TYPE_CHECKING:
+    from conevo.evolution.protocol import Method
     from conevo.worlds.protocol import World
 
-__all__ = ["describe_machine", "describe_world", "now"]
+__all__ = ["describe", "describe_machine", "describe_world", "now"]
 
 
 def describe_machine(device: str) -> dict[str, Any]:
@@ -39,6 +40,12 @@ def describe_machine(device: str) -> dict[str, Any]:
         "cpu": _cpu(),
         "device": device,
     }
+
+
+def describe(world: World, method: Method) -> dict[str, Any]:
+    """Return the headers of a run's world and method: what is known without loading them."""
+    about = {"name": method.name, "title": method.title}
+    return {"world": describe_world(world), "method": about}
 
 
 def describe_world(world: World) -> dict[str, Any]:

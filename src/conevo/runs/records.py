@@ -52,6 +52,13 @@ class WorldHeader(TypedDict):
     optimum: Finite
 
 
+class MethodHeader(TypedDict):
+    """What is known of a method without loading it."""
+
+    name: str
+    title: str
+
+
 class Session(TypedDict):
     """One time that a run was carried on."""
 
@@ -114,6 +121,7 @@ class Provenance(TypedDict):
     code: NotRequired[str]
     stem_id: NotRequired[RunId]
     world: NotRequired[WorldHeader]
+    method: NotRequired[MethodHeader]
     origin: NotRequired[Origin]
     extended: NotRequired[list[FormerEnd]]
     finished: NotRequired[str]

@@ -18,7 +18,7 @@ from conevo.runs.time_limit import TimeLimit
 
 # A run is looked at more often than it is carried on: what simulates it is loaded where it is used.
 if TYPE_CHECKING:
-    from conevo.evolution.protocol import State
+    from conevo.evolution.protocol import Method, State
     from conevo.runs.champions import Team
     from conevo.runs.config import RunConfig
     from conevo.runs.lab import Lab
@@ -32,7 +32,7 @@ Watch = Callable[["Run", Record], None]
 
 def evolve(
     world: str | None = None,
-    method: str | None = None,
+    method: str | Method | None = None,
     preset: str | None = None,
     seed: int | None = None,
     out: str | Path | None = None,
@@ -48,7 +48,7 @@ def evolve(
 
     Args:
         world: world and environment, "rover/complex-1".
-        method: "cone" (default), "mesp", "ccga", "hetcne", "homcne", "cone-1" to "cone-3".
+        method: "cone" (default), "mesp" ..., "FILE.py:NAME", or an object of a class in a file.
         preset: "smoke" (seconds), "desk" (minutes, default), "night" (hours), "thesis".
         seed: the same seed gives the same run, to the bit.
         out: the run's directory; by default a new one under ``runs/``.
@@ -57,20 +57,20 @@ def evolve(
         threads: CPU threads, all by default; results do not depend on it.
         device: "cpu" or "cuda".
         progress: print a line per generation.
-        origin: a finished run, with whose populations this one begins, in any environment whose
-            controllers have the same inputs and outputs.
+        origin: a finished run with whose populations this one begins, if its controllers fit.
         of_champion: breed the populations from the origin's champion instead.
 
     Raises:
         UsageError: a name or value that is not allowed, or ``out`` exists; nothing was written.
         EnvironmentFailure: no such device, full disk, no permission.
     """
+    from conevo.evolution.methods.outside import as_settings
     from conevo.runs.config import resolve
 
-    settings = resolve(world, method, preset, seed, config, overrides)
-    if origin is not None and not isinstance(origin, Run):
-        origin = Run(origin)
-    how: dict[str, Any] = {"threads": threads, "device": device, "of_champion": of_champion}
+    name, overrides = as_settings(method, overrides or {})
+    settings = resolve(world, name, preset, seed, config, overrides)
+    origin = origin if origin is None or isinstance(origin, Run) else Run(origin)
+    how: Record = {"threads": threads, "device": device, "of_champion": of_champion}
     run = start(settings, out, origin=origin, **how)
     return run.resume(threads=threads, watch=_print_line if progress else None)
 
@@ -116,7 +116,7 @@ def start(
         "kernel_hash": lab.rollout.kernel_hash,
         "created": provenance.now(),
         **provenance.describe_machine(device),
-        "world": provenance.describe_world(lab.world),
+        **provenance.describe(lab.world, lab.method),
         **ancestry,
         "sessions": [],
     }

@@ -51,6 +51,7 @@ def evolve_on(
     if state is None:
         state = store.load_origin(method, blank) or lab.first_state()
     refuse_other_state(state, blank, store.path)
+    del blank  # as large as the state
     generation = state.progress.generation
     if problem and remark is not None:
         remark(f"{problem}; going on from generation {generation} instead")

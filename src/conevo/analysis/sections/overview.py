@@ -11,6 +11,7 @@ from typing_extensions import TypedDict
 from conevo.analysis.exhibits import Column, Section, Table, number, plain
 from conevo.analysis.frames import Tables
 from conevo.errors import ConevoError
+from conevo.evolution.methods.registry import name_in
 from conevo.reading import parse_toml, read_json, read_json_lines, read_text
 
 __all__ = ["Campaign", "overview", "read_campaign", "repetition"]
@@ -193,7 +194,7 @@ def _failures(failed: dict[str, dict[str, Any]], campaign: Campaign) -> Table:
     rows = [
         {
             "run": label,
-            "method": campaign.planned.get(label, {}).get("method"),
+            "method": name_in(campaign.planned.get(label, {}).get("method") or ""),
             "seed": campaign.planned.get(label, {}).get("seed"),
             "origin": why.get("origin"),
             "message": why.get("message"),

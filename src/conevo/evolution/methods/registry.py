@@ -4,125 +4,197 @@ from __future__ import annotations
 
 import importlib
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
-from conevo.errors import unknown_name
+from conevo.errors import UsageError, unknown_name
 
 if TYPE_CHECKING:
     from conevo.evolution.protocol import Method
 
-__all__ = ["METHODS", "MethodEntry", "method"]
+__all__ = ["METHODS", "MethodEntry", "method", "name_in", "remember_title", "resolve", "title_of"]
 
 
 @dataclass(frozen=True)
 class MethodEntry:
-    """One method.
+    """What the registry knows of a method without loading it.
+
+    ``module`` holds the classes named ``config_name`` (parameters) and ``method_name`` (built from
+    parameters, name and title). An entry in a file outside the package leaves it out;
+    ``methods.outside`` fills it in, with the file's path, ``files`` (this one first, then the files
+    next to it that it imports) and the digest of their texts.
 
     Attributes:
         name: how it is asked for.
         title: its name as published.
         summary: one line on what it does.
         source: where it is described.
-        target: "module:Class:Config" below this package, loaded when needed.
     """
 
     name: str
     title: str
     summary: str
     source: str
-    target: str
+    config_name: str
+    method_name: str
+    module: str = ""
+    file: str = ""
+    files: tuple[str, ...] = ()
+    digest: str = ""
+
+    @property
+    def address(self) -> str:
+        """What ``resolve`` finds this method by: its name, or "FILE.py:NAME"."""
+        return f"{self.file}:{self.name}" if self.file else self.name
 
     @property
     def config_class(self) -> type[Any]:
         """The dataclass of its parameters; it refuses what they do not allow."""
         from conevo.parameters import checked
 
-        return checked(self._load(2), "method")
+        return checked(getattr(importlib.import_module(self.module), self.config_name), "method")
 
     def build(self, config: Any) -> Method:
         """Return the method with the given parameters, an instance of ``config_class``."""
-        return cast("Method", self._load(1)(config=config, name=self.name, title=self.title))
-
-    def _load(self, part: int) -> Any:
-        parts = self.target.split(":")
-        module = importlib.import_module(f"conevo.evolution.methods.{parts[0]}")
-        return getattr(module, parts[part])
+        make = getattr(importlib.import_module(self.module), self.method_name)
+        return cast("Method", make(config=config, name=self.name, title=self.title))
 
 
 METHODS: dict[str, MethodEntry] = {
     entry.name: entry
     for entry in (
         MethodEntry(
-            "homcne",
-            "HomCNE",
-            "one population of whole networks, a team of clones",
-            "Nitschke 2009, sections 2.3.1, 5.3.3",
-            "homcne:HomCne:HomCneConfig",
+            name="homcne",
+            title="HomCNE",
+            summary="one population of whole networks, a team of clones",
+            source="Nitschke 2009, sections 2.3.1, 5.3.3",
+            module="conevo.evolution.methods.homcne",
+            config_name="HomCneConfig",
+            method_name="HomCne",
         ),
         MethodEntry(
-            "hetcne",
-            "HetCNE",
-            "one population of whole networks, a team of different genotypes",
-            "Nitschke 2009, sections 2.3.1, 5.3.3",
-            "hetcne:HetCne:HetCneConfig",
+            name="hetcne",
+            title="HetCNE",
+            summary="one population of whole networks, a team of different genotypes",
+            source="Nitschke 2009, sections 2.3.1, 5.3.3",
+            module="conevo.evolution.methods.hetcne",
+            config_name="HetCneConfig",
+            method_name="HetCne",
         ),
         MethodEntry(
-            "ccga",
-            "CCGA",
-            "a population of whole networks per robot, genetically isolated",
-            "Potter and De Jong 2000; Nitschke 2009, sections 2.3.3, 5.3.3",
-            "ccga:Ccga:CcgaConfig",
+            name="ccga",
+            title="CCGA",
+            summary="a population of whole networks per robot, genetically isolated",
+            source="Potter and De Jong 2000; Nitschke 2009, sections 2.3.3, 5.3.3",
+            module="conevo.evolution.methods.ccga",
+            config_name="CcgaConfig",
+            method_name="Ccga",
         ),
         MethodEntry(
-            "mesp",
-            "Multi-Agent ESP",
-            "a population per robot, a sub-population per hidden neuron",
-            "Yong and Miikkulainen 2009; Nitschke 2009, sections 2.3.3, 5.3.3",
-            "mesp:Mesp:MespConfig",
+            name="mesp",
+            title="Multi-Agent ESP",
+            summary="a population per robot, a sub-population per hidden neuron",
+            source="Yong and Miikkulainen 2009; Nitschke 2009, sections 2.3.3, 5.3.3",
+            module="conevo.evolution.methods.mesp",
+            config_name="MespConfig",
+            method_name="Mesp",
         ),
         MethodEntry(
-            "cone",
-            "CONE",
-            "MESP with recombination between populations that behave and look alike",
-            "Nitschke 2009, chapter 3",
-            "cone:Cone:ConeConfig",
+            name="cone",
+            title="CONE",
+            summary="MESP with recombination between populations that behave and look alike",
+            source="Nitschke 2009, chapter 3",
+            module="conevo.evolution.methods.cone",
+            config_name="ConeConfig",
+            method_name="Cone",
         ),
         MethodEntry(
-            "cone-1",
-            "CONE-1",
-            "CONE without the genotype difference metric",
-            "Nitschke 2009, sections 4.5.7, 5.5.5, 6.5.6",
-            "cone:Cone:Cone1Config",
+            name="cone-1",
+            title="CONE-1",
+            summary="CONE without the genotype difference metric",
+            source="Nitschke 2009, sections 4.5.7, 5.5.5, 6.5.6",
+            module="conevo.evolution.methods.cone",
+            config_name="Cone1Config",
+            method_name="Cone",
         ),
         MethodEntry(
-            "cone-2",
-            "CONE-2",
-            "CONE without the specialization difference metric",
-            "Nitschke 2009, sections 4.5.7, 5.5.5, 6.5.6",
-            "cone:Cone:Cone2Config",
+            name="cone-2",
+            title="CONE-2",
+            summary="CONE without the specialization difference metric",
+            source="Nitschke 2009, sections 4.5.7, 5.5.5, 6.5.6",
+            module="conevo.evolution.methods.cone",
+            config_name="Cone2Config",
+            method_name="Cone",
         ),
         MethodEntry(
-            "cone-3",
-            "CONE-3",
-            "CONE without both metrics: no recombination between populations",
-            "Nitschke 2009, sections 4.5.7, 5.5.5, 6.5.6",
-            "cone:Cone:Cone3Config",
+            name="cone-3",
+            title="CONE-3",
+            summary="CONE without both metrics: no recombination between populations",
+            source="Nitschke 2009, sections 4.5.7, 5.5.5, 6.5.6",
+            module="conevo.evolution.methods.cone",
+            config_name="Cone3Config",
+            method_name="Cone",
         ),
     )
 }
+
+
+def name_in(address: str) -> str:
+    """Return the name of a method: "team-es" of "FILE.py:team-es", "cone" of "cone"."""
+    return address.rpartition(":")[2] if ".py:" in address else address
+
+
+_TITLES: dict[str, str] = {}  # of methods in files, as the files and runs say that are read
+
+
+def title_of(name: str) -> str:
+    """Return a method's name as published; its name if nothing that was read has its title."""
+    return METHODS[name].title if name in METHODS else _TITLES.get(name, name)
+
+
+def remember_title(name: str, title: str) -> None:
+    """Take note of the title of a method in a file."""
+    _TITLES[name] = title
+
+
+def resolve(name: str, digest: str = "") -> MethodEntry:
+    """Return the entry of a method.
+
+    Args:
+        name: one of ``METHODS``, or "FILE.py:NAME" for a method in a file outside the package.
+        digest: of that file, checked if it is given.
+
+    Raises:
+        UsageError: no such method; a file that holds no method or has changed.
+    """
+    file, _, own = name.rpartition(":")
+    if name.endswith(".py"):
+        file, own = name, ""
+    if not file.endswith(".py"):
+        if file or ".py/" in name:
+            raise UsageError(f"method {name!r}: a method in a file is named FILE.py:NAME")
+        if name not in METHODS:
+            raise unknown_name("method", name, METHODS)
+        if digest:
+            raise UsageError(f"run.method_digest belongs to a method in a file, not to {name!r}")
+        return METHODS[name]
+    from conevo.evolution.methods.outside import load
+
+    entry = load(Path(file), digest)
+    if own != entry.name:
+        raise UsageError(f"method {name!r}: the method in this file is {file}:{entry.name}")
+    return entry
 
 
 def method(name: str, **config: Any) -> Method:
     """Return a method by name, e.g. ``method("cone", genotypes=20, evaluation="shared")``.
 
     Args:
-        name: one of ``METHODS``.
+        name: one that ``resolve`` knows: "cone", or "FILE.py:NAME".
         config: fields of its config class that differ from their defaults.
 
     Raises:
         UsageError: an unknown name, an unknown parameter or a value that is not allowed.
     """
-    if name not in METHODS:
-        raise unknown_name("method", name, METHODS)
-    entry = METHODS[name]
+    entry = resolve(name)
     return entry.build(entry.config_class(**config))

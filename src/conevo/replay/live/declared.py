@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from conevo.errors import ConevoError
+from conevo.evolution.methods.registry import remember_title
 from conevo.reading import parse_json
 from conevo.replay.live.files import Whole, readable
 from conevo.worlds.measures import Measure
@@ -33,7 +34,10 @@ class Declared:
 
 
 def _measures(content: bytes) -> dict[str, Measure]:
-    world = parse_json(content, "provenance.json").get("world")
+    about = parse_json(content, "provenance.json")
+    world, method = about.get("world"), about.get("method")
+    if isinstance(method, dict):
+        remember_title(readable(str(method.get("name"))), readable(str(method.get("title"))))
     listed = world.get("measures") if isinstance(world, dict) else None
     if not isinstance(listed, list):
         return {}

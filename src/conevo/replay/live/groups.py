@@ -15,6 +15,7 @@ from conevo.campaigns.executors import usable_cores
 from conevo.campaigns.inputs import shown_as
 from conevo.campaigns.ledger import Entry
 from conevo.errors import ConevoError, UsageError
+from conevo.evolution.methods.registry import name_in
 from conevo.replay.live.files import Stamp, is_locked, readable, stamp
 from conevo.replay.live.panels import Panel, panels_of
 from conevo.replay.live.runs import Standing, Subject
@@ -198,9 +199,8 @@ class Experiment(Group):
         known, self._by_label = self._by_label, {}
         for label, run in campaign.planned.items():
             path = folder / Path(label).name
-            about = {
-                name: getattr(run, name) for name in ("method", "preset", "seed", "variant")
-            } | {"task": shown_as(run.world)}
+            about = {name: getattr(run, name) for name in ("preset", "seed", "variant")}
+            about |= {"task": shown_as(run.world), "method": name_in(run.method)}
             name = f"{self._prefix}/{label}" if self._prefix else label
             self._by_label[label] = known.get(label) or Subject(
                 self._names.of(path, name), path, about

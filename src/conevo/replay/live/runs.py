@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from conevo.errors import ConevoError, UsageError
+from conevo.evolution.methods.registry import name_in
 from conevo.replay.live.declared import Declared
 from conevo.replay.live.files import Log, Whole, is_locked, readable, stamp
 from conevo.replay.live.settings import Choices, choices_of, factors
@@ -61,7 +62,7 @@ class Settings:
             raise TypeError("[run] a run has one generation at least")
         return Settings(
             task=texts[0].rpartition("/")[2] if ".py:" in texts[0] else texts[0],
-            method=texts[1],
+            method=name_in(texts[1]),
             preset=texts[2],
             seed=numbers[0],
             generations=numbers[1],

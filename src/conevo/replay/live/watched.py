@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from conevo.errors import UsageError
-from conevo.evolution.methods.registry import METHODS
+from conevo.evolution.methods.registry import METHODS, title_of
 from conevo.palette import caste_colours, method_looks, several
 from conevo.replay.live.files import readable
 from conevo.replay.live.groups import Experiment, Group, Names, Runs, children
@@ -146,7 +146,7 @@ class Watched:
 def _methods(names: Iterable[str]) -> dict[str, dict[str, str]]:
     """Return title and colour of methods, those of the registry first."""
     titles = {entry.name: entry.title for entry in METHODS.values()}
-    titles |= {name: name for name in sorted(set(names) - set(METHODS) - {""})}
+    titles |= {name: title_of(name) for name in sorted(set(names) - set(METHODS) - {""})}
     looks = method_looks(titles)
     return {name: {"title": title, "colour": looks[name].line} for name, title in titles.items()}
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 
-from conevo.evolution.methods.registry import METHODS
+from conevo.evolution.methods.registry import title_of
 from conevo.replay.trajectory import About
 
 __all__ = ["enumerated", "facts", "listed", "number", "subtitle", "title"]
@@ -56,8 +56,7 @@ def facts(about: About) -> tuple[tuple[str, str], ...]:
 
 def _method(about: About) -> str:
     """Return the method's name as published."""
-    name = about["method"]
-    return METHODS[name].title if name in METHODS else name
+    return title_of(about["method"])
 
 
 def _tally(names: Sequence[str]) -> str:
