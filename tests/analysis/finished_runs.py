@@ -12,6 +12,7 @@ import duckdb
 import numpy as np
 
 from conevo.analysis.frames import SCHEMA
+from conevo.evolution.methods.registry import title_of
 
 METHODS = ("homcne", "hetcne", "ccga", "mesp", "cone")
 ROBOTS = 20
@@ -171,6 +172,7 @@ def _run(
             "family": [cell.environment.rpartition("-")[0]],
             "number": [_number(cell)],
             "method": [cell.method],
+            "title": [title_of(cell.method)],
             "preset": [cell.preset],
             "seed": [seed],
             "variant": [cell.variant],
