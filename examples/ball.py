@@ -25,16 +25,15 @@ Version history:
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
 import warp as wp
 from annotated_types import Ge, Gt, Le
 
-from conevo.controllers import ControllerSpec
 from conevo.kernels.actions import begin_counting, count_action, heuristic_action
-from conevo.kernels.network import Networks, first_input, highest
+from conevo.kernels.outputs import highest
 from conevo.kernels.random import uniform
 from conevo.kernels.steps import steered_step
 from conevo.rng import stream
@@ -50,8 +49,6 @@ class BallParams:
     iterations: Annotated[int, Ge(2), Le(100_000)] = 200
     step: Annotated[float, Gt(0), Le(0.1)] = 0.01
     reach: Annotated[float, Gt(0), Le(0.5)] = 0.1
-    n_hidden: Annotated[int, Ge(2), Le(16)] = 4
-    max_hidden: Annotated[int, Ge(2), Le(32)] = 8
 
 
 @wp.struct
@@ -74,7 +71,8 @@ class Scene:
 class Team:
     """State of a team: R elements each; the ball has one x and one y."""
 
-    nets: Networks
+    inputs: wp.array2d[float]  # [R, 4]
+    outputs: wp.array2d[float]  # [R, 4]
     x: wp.array[float]
     y: wp.array[float]
     push_x: wp.array[float]  # by what the robot pushes the ball, nothing if it does not
@@ -121,11 +119,10 @@ def sense(team: Team, scene: Scene, p: Params, i: int, t: int) -> None:
     """Fill robot ``i``'s sensor inputs."""
     ball = to_ball(team, i)
     last = scene.places.shape[0] - 1
-    first = first_input(team.nets, i)
-    team.nets.inputs[first] = ball[0]
-    team.nets.inputs[first + 1] = ball[1]
-    team.nets.inputs[first + 2] = scene.places[last - 1] - team.x[i]
-    team.nets.inputs[first + 3] = scene.places[last] - team.y[i]
+    team.inputs[i, 0] = ball[0]
+    team.inputs[i, 1] = ball[1]
+    team.inputs[i, 2] = scene.places[last - 1] - team.x[i]
+    team.inputs[i, 3] = scene.places[last] - team.y[i]
 
 
 @wp.func
@@ -134,7 +131,7 @@ def act(team: Team, scene: Scene, p: Params, i: int, t: int) -> None:
     if team.heuristic[i] == 0:
         team.chosen[i] = heuristic_action(uniform(scene.seed[0], t, 0, i), 1, 0, 2)
     else:
-        team.chosen[i] = highest(team.nets, i, 2)
+        team.chosen[i] = highest(team.outputs, i, 2)
 
 
 @wp.func
@@ -143,7 +140,7 @@ def commit(team: Team, scene: Scene, p: Params, i: int, t: int) -> None:
     a = team.chosen[i]
     team.pushes[i] = 0
     if a == 1:
-        step = steered_step(team.nets.sums[i][2], team.nets.sums[i][3], p.step)
+        step = steered_step(team.outputs[i, 2], team.outputs[i, 3], p.step)
         if wp.length(to_ball(team, i)) <= p.reach:
             team.pushes[i] = 1
             team.push_x[i] = step[0]
@@ -198,6 +195,9 @@ class BallWorld:
     params: BallParams
 
     name: ClassVar[str] = "ball-v1"
+    inputs: ClassVar[tuple[str, ...]] = ("ball x", "ball y", "goal x", "goal y")
+    outputs: ClassVar[tuple[str, ...]] = ("rest", "push", "dx", "dy")
+    controller: ClassVar[dict[str, Any]] = {"n_hidden": 4, "max_hidden": 8}
     actions: ClassVar[tuple[str, ...]] = ("rest", "push")
     castes: ClassVar[tuple[str, ...]] = actions
     performance: ClassVar[tuple[str, ...]] = ("gain",)
@@ -207,12 +207,6 @@ class BallWorld:
     def n_robots(self) -> int:
         """Number of robots."""
         return self.params.n_robots
-
-    @property
-    def controller(self) -> ControllerSpec:
-        """Four sensors; rest, push, dx, dy."""
-        n, most = self.params.n_hidden, self.params.max_hidden
-        return ControllerSpec(n_sensors=4, n_hidden=n, n_outputs=4, max_hidden=most)
 
     def scenarios(self, keys: Sequence[int]) -> BallScenarios:
         """Return one scenario per key."""

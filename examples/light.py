@@ -19,16 +19,15 @@ Version history:
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
 import warp as wp
 from annotated_types import Ge, Gt, Le
 
-from conevo.controllers import ControllerSpec
 from conevo.kernels.actions import begin_counting, count_action, heuristic_action
-from conevo.kernels.network import Networks, first_input, highest
+from conevo.kernels.outputs import highest
 from conevo.kernels.random import uniform
 from conevo.kernels.steps import steered_step
 from conevo.rng import stream
@@ -43,8 +42,6 @@ class LightParams:
     n_robots: Annotated[int, Ge(2), Le(64)] = 3
     iterations: Annotated[int, Ge(2)] = 100
     step: Annotated[float, Gt(0), Le(0.1)] = 0.01
-    n_hidden: Annotated[int, Ge(2), Le(16)] = 4
-    max_hidden: Annotated[int, Ge(2), Le(32)] = 8
 
 
 @wp.struct
@@ -64,9 +61,13 @@ class Scene:
 
 @wp.struct
 class Team:
-    """State of a team: R elements each; counts and performance as the world's names say."""
+    """State of a team: R elements each, counts and performance as the world's names say.
 
-    nets: Networks
+    inputs [R, 2], outputs [R, 4]: what a robot's controller reads and writes.
+    """
+
+    inputs: wp.array2d[float]
+    outputs: wp.array2d[float]
     x: wp.array[float]
     y: wp.array[float]
     chosen: wp.array[int]
@@ -97,8 +98,8 @@ def reset(team: Team, scene: Scene, p: Params, i: int) -> None:
 def sense(team: Team, scene: Scene, p: Params, i: int, t: int) -> None:
     """Fill robot ``i``'s sensor inputs."""
     way = light(team, scene, i)
-    team.nets.inputs[first_input(team.nets, i)] = way[0]
-    team.nets.inputs[first_input(team.nets, i) + 1] = way[1]
+    team.inputs[i, 0] = way[0]
+    team.inputs[i, 1] = way[1]
 
 
 @wp.func
@@ -107,7 +108,7 @@ def act(team: Team, scene: Scene, p: Params, i: int, t: int) -> None:
     if team.heuristic[i] == 0:
         team.chosen[i] = heuristic_action(uniform(scene.seed[0], t, 0, i), 0, 1, 2)
     else:
-        team.chosen[i] = highest(team.nets, i, 2)
+        team.chosen[i] = highest(team.outputs, i, 2)
 
 
 @wp.func
@@ -115,7 +116,7 @@ def commit(team: Team, scene: Scene, p: Params, i: int, t: int) -> None:
     """Make robot ``i``'s action its state, and count it."""
     a = team.chosen[i]
     if a == 1:
-        step = steered_step(team.nets.sums[i][2], team.nets.sums[i][3], p.step)
+        step = steered_step(team.outputs[i, 2], team.outputs[i, 3], p.step)
         team.x[i] = wp.clamp(team.x[i] + step[0], 0.0, 1.0)
         team.y[i] = wp.clamp(team.y[i] + step[1], 0.0, 1.0)
     count_action(team.action, team.switches, team.counts, i, a, a)
@@ -151,6 +152,9 @@ class LightWorld:
     params: LightParams
 
     name: ClassVar[str] = "light-v1"
+    inputs: ClassVar[tuple[str, ...]] = ("light x", "light y")
+    outputs: ClassVar[tuple[str, ...]] = ("rest", "move", "dx", "dy")
+    controller: ClassVar[dict[str, Any]] = {"n_hidden": 4, "max_hidden": 8}
     actions: ClassVar[tuple[str, ...]] = ("rest", "move")
     castes: ClassVar[tuple[str, ...]] = actions
     performance: ClassVar[tuple[str, ...]] = ("nearness",)
@@ -160,12 +164,6 @@ class LightWorld:
     def n_robots(self) -> int:
         """Number of robots."""
         return self.params.n_robots
-
-    @property
-    def controller(self) -> ControllerSpec:
-        """Two sensors; rest, move, dx, dy."""
-        n, most = self.params.n_hidden, self.params.max_hidden
-        return ControllerSpec(n_sensors=2, n_hidden=n, n_outputs=4, max_hidden=most)
 
     def scenarios(self, keys: Sequence[int]) -> LightScenarios:
         """Return one scenario per key."""

@@ -17,7 +17,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from conevo.controllers import ControllerSpec
+    from conevo.controllers.base import Controller
+    from conevo.controllers.registry import CONTROLLERS, controller
     from conevo.errors import ConevoError, EnvironmentFailure, UsageError
     from conevo.evolution.methods.registry import METHODS, method
     from conevo.evolution.protocol import Layout, Method, Scores, Trials
@@ -29,10 +30,11 @@ if TYPE_CHECKING:
     __version__: str
 
 __all__ = [
+    "CONTROLLERS",
     "METHODS",
     "WORLDS",
     "ConevoError",
-    "ControllerSpec",
+    "Controller",
     "EnvironmentFailure",
     "Layout",
     "Method",
@@ -43,16 +45,18 @@ __all__ = [
     "UsageError",
     "World",
     "__version__",
+    "controller",
     "evolve",
     "method",
     "world",
 ]
 
 _HOMES = {
+    "CONTROLLERS": "controllers.registry",
     "METHODS": "evolution.methods.registry",
     "WORLDS": "worlds.registry",
     "ConevoError": "errors",
-    "ControllerSpec": "controllers",
+    "Controller": "controllers.base",
     "EnvironmentFailure": "errors",
     "Layout": "evolution.protocol",
     "Method": "evolution.protocol",
@@ -62,6 +66,7 @@ _HOMES = {
     "Trials": "evolution.protocol",
     "UsageError": "errors",
     "World": "worlds.protocol",
+    "controller": "controllers.registry",
     "evolve": "runs.run",
     "method": "evolution.methods.registry",
     "world": "worlds.registry",

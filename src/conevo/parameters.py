@@ -12,7 +12,7 @@ configuration or plan with ``step = 1`` are refused in the same words.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import fields
 from functools import cache
 from typing import Any, TypeVar, cast, dataclass_transform
@@ -91,11 +91,14 @@ def _refusing(part: type[Any], section: str) -> type[Any]:
     return part
 
 
-def refuse_unknown(part: type[Any], section: str, key: str, place: str = "") -> None:
-    """Raise UsageError if a class of parameters has no ``key``."""
+def refuse_unknown(
+    part: type[Any], section: str, key: str, place: str = "", also: Sequence[str] = ()
+) -> None:
+    """Raise UsageError if a class of parameters has no ``key``; ``also`` names others like it."""
     known = [field.name for field in fields(part)]
     if key not in known:
-        raise unknown_name("key", f"{section}.{key}", [f"{section}.{one}" for one in known], place)
+        names = [*(f"{section}.{one}" for one in known), *also]
+        raise unknown_name("key", f"{section}.{key}", names, place)
 
 
 def wrong_values(error: ValidationError, section: str) -> list[WrongValue]:

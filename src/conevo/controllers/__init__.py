@@ -1,5 +1,1 @@
-"""Controllers: from genotypes (numbers) to networks (behaviour)."""
-
-from conevo.controllers.spec import ControllerSpec
-
-__all__ = ["ControllerSpec"]
+"""Controllers: from genotypes (numbers) to what a robot does (behaviour)."""

@@ -2,7 +2,7 @@
 
 import warp as wp
 
-from conevo.kernels.network import sigmoid
+from conevo.kernels.outputs import sigmoid
 
 __all__ = ["is_taken", "random_step", "steered_step"]
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import asdict
 from importlib.metadata import version
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import numpy.typing as npt
 
 from conevo.analysis.fittest import equip
-from conevo.controllers import ControllerSpec
+from conevo.controllers.base import Controller
 from conevo.errors import UsageError
 from conevo.replay.channel import Channel
 from conevo.replay.trajectory import FORMAT, About, Trajectory
@@ -22,7 +22,7 @@ from conevo.worlds.measures import Measure, measures_of
 from conevo.worlds.protocol import World
 from conevo.worlds.rollout import Rollout
 
-__all__ = ["hidden_activations", "record", "record_epoch"]
+__all__ = ["record", "record_epoch"]
 
 Array = npt.NDArray[Any]
 # What a replay does not need of a scenario: what only kernels look at.
@@ -105,7 +105,7 @@ def record_epoch(
 
     Args:
         rollout: of the world.
-        genes: pool of neuron genotypes [K, G].
+        genes: pool of genotypes [K, G].
         team: pool rows [R, U], -1 for an empty slot.
         scenario: its key.
         heuristic: [R] index of a heuristic controller, -1 for the network; None for networks.
@@ -113,13 +113,13 @@ def record_epoch(
     Returns:
         What is known of it, of no run; and the channels.
     """
-    world, spec = rollout.world, rollout.world.controller
+    world = rollout.world
     scenes = world.scenarios([scenario])
     modes = np.full(world.n_robots, -1, np.int32) if heuristic is None else heuristic
     seen = rollout.record(genes, team, scenes, modes)
     outcome = rollout.evaluate(genes, team[None], scenes, modes[None])
     portrait = describe(outcome, world.castes)
-    inputs, sums = seen.pop("inputs"), seen.pop("sums")
+    inputs, outputs, hidden = (seen.pop(name) for name in ("inputs", "outputs", "hidden"))
     measured = seen.pop("performance")
     seen.pop("counts", None)
     has_network = modes < 0
@@ -129,10 +129,9 @@ def record_epoch(
     channels = {name: Channel.of(values) for name, values in seen.items()}
     for k, one in enumerate(measures_of(world)):
         channels[f"performance/{one.name}"] = Channel.of(measured[:, k])
-    channels["sensors"] = Channel.of(inputs[:, :, : spec.n_sensors])
-    hidden = hidden_activations(spec, genes, team, inputs) * has_network[:, None]
-    channels["hidden"] = Channel.of(hidden, bits=8)
-    channels["outputs"] = Channel.of(_sigmoid(sums) * has_network[:, None], bits=8)
+    channels["sensors"] = Channel.of(inputs)
+    channels["hidden"] = Channel.of(hidden * has_network[:, None], bits=8)
+    channels["outputs"] = Channel.of(_sigmoid(outputs) * has_network[:, None], bits=8)
     for name in vars(scenes):
         if name not in _UNSEEN:
             is_shared = rollout.is_shared(name)
@@ -156,7 +155,9 @@ def record_epoch(
         "iterations": world.params.iterations,
         "n_robots": world.n_robots,
         "params": _params(world),
-        "controller": asdict(spec),  # type: ignore[typeddict-item]
+        "controller": _controller(rollout.controller),
+        "inputs": list(world.inputs),
+        "outputs": list(world.outputs),
         "actions": list(world.actions),
         "castes": list(world.castes),
         "labels": portrait.labels,
@@ -175,29 +176,9 @@ def _worth(measure: Measure) -> str:
     return f"{measure.unit}{'' if measure.larger_is_better else ' (smaller is better)'}".strip()
 
 
-def hidden_activations(
-    spec: ControllerSpec,
-    genes: npt.NDArray[np.float32],
-    team: npt.NDArray[np.int32],
-    inputs: npt.NDArray[np.float32],
-) -> npt.NDArray[np.float64]:
-    """Return the activation of every hidden neuron [T, R, U], 0 in empty slots.
-
-    The kernel keeps only those that feed the context; the others follow from what it does keep: in
-    iteration t a neuron sees the sensors of t and the context that iteration t - 1 left.
-
-    Args:
-        spec: shape of the controllers.
-        genes: pool of neuron genotypes [K, G].
-        team: pool rows [R, U].
-        inputs: [T, R, sensors + context] as ``Rollout.record`` returns them.
-    """
-    sensors, context = np.split(inputs.astype(np.float64), [spec.n_sensors], axis=2)
-    before = np.concatenate([np.zeros_like(context[:1]), context[:-1]])
-    seen = np.concatenate([sensors, before], axis=2)
-    weights = spec.weight_scale * genes[team][:, :, : spec.n_inputs].astype(np.float64)
-    sums = np.einsum("tri,rui->tru", seen, weights) + float(spec.bias)
-    return np.where(team >= 0, _sigmoid(sums), 0.0)
+def _controller(controller: Controller) -> dict[str, Any]:
+    """Return the name and the settings of a controller."""
+    return {"name": controller.name} | asdict(cast("Any", controller))
 
 
 def _sigmoid(sums: Array) -> npt.NDArray[np.float64]:

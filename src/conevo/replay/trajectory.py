@@ -18,7 +18,7 @@ channel                what
 the world's own        every array of its ``Simulation.recorded`` [T, ...] and ``recorded_at_end``
 ``performance/NAME``   [T] each task performance measure as if the epoch ended there
 ``sensors``            [T, R, S] what every robot sensed
-``hidden``             [T, R, U] activation of the neuron in each slot, 0 in an empty one
+``hidden``             [T, R, U] activation of the part in each slot, 0 in an empty one
 ``outputs``            [T, R, O] activations of the output units, of which the highest wins
 ``scene/NAME``         the scenario: where everything stood
 =====================  =============================================================================
@@ -49,18 +49,6 @@ MOST_BYTES = 2**30  # of a file when it is unpacked: what a small file can ask f
 _CODES = {np.dtype(kind) for kind in (np.uint8, np.uint16, np.uint32)}
 
 
-class Controller(TypedDict):
-    """The shape of the networks; see ``controllers.ControllerSpec``."""
-
-    n_sensors: int
-    n_hidden: int
-    n_outputs: int
-    max_hidden: int
-    recurrent: bool
-    bias: bool
-    weight_scale: float
-
-
 class About(TypedDict):
     """What a trajectory is of.
 
@@ -69,7 +57,9 @@ class About(TypedDict):
     caste of each robot in this epoch. specialization, fitness [R]: S and fitness in it. heuristic
     [R]: name of a robot's heuristic controller, "" for its network. neurons [R]: slots in which a
     robot has hidden neurons. units: what follows a value of each measure of performance, its unit
-    and that smaller is better if it is; conevo 0.1.0 wrote none.
+    and that smaller is better if it is; conevo 0.1.0 wrote none. controller: its name and settings.
+    inputs, outputs: names of what robots sense and of what their controllers give; conevo 0.1.0
+    wrote none.
     """
 
     format: int
@@ -88,7 +78,9 @@ class About(TypedDict):
     iterations: int
     n_robots: int
     params: dict[str, bool | int | float | str]
-    controller: Controller
+    controller: dict[str, bool | int | float | str]
+    inputs: NotRequired[list[str]]
+    outputs: NotRequired[list[str]]
     actions: list[str]
     castes: list[str]
     labels: list[str]

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
+from conevo.controllers.registry import genome_of
 from conevo.errors import UsageError
 from conevo.runs.champions import Team
 from conevo.runs.lab import layout_of, refuse_other_state
 from conevo.runs.store import Store
-from conevo.worlds.protocol import World
 
 if TYPE_CHECKING:
     from conevo.evolution.protocol import State
@@ -17,13 +17,6 @@ if TYPE_CHECKING:
     from conevo.runs.run import Run
 
 __all__ = ["ancestor_of", "refuse_other_controllers"]
-
-SIZES = {
-    "n_sensors": "sensors",
-    "n_context": "context inputs",
-    "n_outputs": "outputs",
-    "max_hidden": "slots for neurons",
-}
 
 
 def ancestor_of(
@@ -56,23 +49,35 @@ def ancestor_of(
         about |= {"generation": team.generation, "checkpoint": digest, "of": "champion"}
         return team, {"origin": about}
     settings = config()
-    blank = settings.build_method().init(layout_of(settings.build_world()), settings.run.seed)
+    layout = layout_of(settings.build_world(), settings.controller)
+    blank = settings.build_method().init(layout, settings.run.seed)
     state, digest = store.load_final(settings.method, blank)
     refuse_other_state(state, blank, path)
     generation = state.progress.generation
     return state, {"origin": about | {"generation": generation, "checkpoint": digest}}
 
 
-def refuse_other_controllers(origin: Run, world: World) -> None:
-    """Raise UsageError if a world's controllers are not of the sizes that a run's world has."""
-    old, new = origin.config.build_world().controller, world.controller
-    different = [
-        f"{getattr(old, name)} {what} became {getattr(new, name)}"
-        for name, what in SIZES.items()
-        if getattr(old, name) != getattr(new, name)
+def refuse_other_controllers(origin: Run, config: RunConfig) -> None:
+    """Raise UsageError if a run's controllers are not those that another configuration has.
+
+    They may have another number of hidden neurons at the start, as long as genotypes mean the same.
+    """
+    old, new = origin.config, config
+    there, here = old.build_world(), new.build_world()
+    a, b = genome_of(old.controller, there), genome_of(new.controller, here)
+    sizes = {
+        "inputs": (len(there.inputs), len(here.inputs)),
+        "outputs": (len(there.outputs), len(here.outputs)),
+        "slots for parts": (a.max_parts, b.max_parts),
+        "genes of a part": (a.n_genes, b.n_genes),
+    }
+    different = [f"{was} {what} became {n}" for what, (was, n) in sizes.items() if was != n]
+    before, now = old.tables()["controller"], new.tables()["controller"]
+    different += [
+        f"controller.{key} = {before.get(key)!r} became {now.get(key)!r}"
+        for key in before | now
+        if key not in ("n_hidden", "max_hidden") and before.get(key) != now.get(key)
     ]
-    if old.bias != new.bias:
-        different.append("only one of the two has a bias")
     if different:
         raise UsageError(
             f"the controllers of {origin.path} ({origin.config.task}) do not fit this world: "

@@ -35,8 +35,8 @@ def test_under(
     """Test a run's champion in its own world and under changed conditions; writes nothing.
 
     Choice: in the same world the run's settings hold unless they are changed; another world has
-    those of the run's preset. A smaller team is of the first controllers, a larger one repeats them
-    from the first on.
+    those of the run's preset. The controllers are the run's. A smaller team is of the first
+    controllers, a larger one repeats them from the first on.
 
     Returns:
         The results of both, "own" and "changed", as ``Run.test`` gives them; "conditions": the
@@ -48,7 +48,7 @@ def test_under(
     """
     own = run.test(scenarios, seed, threads=threads)
     config = _changed(run.config, on, world, robots)
-    refuse_other_controllers(run, config.build_world())
+    refuse_other_controllers(run, config)
     lab = Lab.equip(config, threads, run.provenance["device"])
     champion = run.champion
     if champion is None:
@@ -105,7 +105,7 @@ def _changed(
                 f"which no setting changes; another environment may have others: --on ENVIRONMENT"
             )
     seed, place = config.run.seed, "of the changed conditions"
-    return resolve(
+    changed = resolve(
         address,
         config.method_entry.address,
         config.preset,
@@ -113,6 +113,7 @@ def _changed(
         overrides=settings,
         place=place,
     )
+    return replace(changed, controller=config.controller)
 
 
 def _resized(team: Team, n_robots: int) -> Team:

@@ -3,7 +3,7 @@
 Each layer overrides the one before. A default lives in one place only: the field of its component.
 Presets and files hold overrides; every value remembers its place, which errors name.
 
-A configuration file has three tables. ``[run]`` also holds the three names::
+A configuration file has four tables. ``[run]`` also holds three names::
 
     [run]
     world = "rover-v1/complex-1"
@@ -14,15 +14,20 @@ A configuration file has three tables. ``[run]`` also holds the three names::
     [world]
     iterations = 1250
 
+    [controller]
+    name = "srn"
+    n_hidden = 8
+
     [method]
     genotypes = 20
 
+What ``[controller]`` leaves open is as the world suggests, then as the controller's defaults are.
 The world may be one in a file of its own, ``world = "FILE.py:ENVIRONMENT"``, and so may the method,
 ``method = "FILE.py:NAME"``; ``world_digest`` and ``method_digest`` next to them are checked when
 they are given. A file is named from the folder of the configuration file; a run has copies of its
 own (``runs.inputs``). No preset has sizes for a method in a file: its own defaults hold.
 
-Presets (``presets/*.toml``) hold the same three tables, with ``method`` split by method, for any
+Presets (``presets/*.toml``) hold the same tables, with ``method`` split by method, for any
 world; a world's own table replaces that one. A variant ("cone-1") takes its family's values
 ("cone") first, then its own::
 
@@ -43,6 +48,7 @@ from typing import TYPE_CHECKING, Any
 
 import tomli_w
 
+from conevo.controllers.registry import DEFAULT, suggested
 from conevo.errors import UsageError, shown, unknown_name
 from conevo.parameters import WrongValue, refuse_unknown
 from conevo.reading import DamagedFile, parse_toml, read_toml
@@ -50,6 +56,7 @@ from conevo.runs.outline import LENGTH, Outline, identify, outline_of
 from conevo.runs.settings import RunSettings
 
 if TYPE_CHECKING:
+    from conevo.controllers.base import Controller
     from conevo.evolution.methods.registry import MethodEntry
     from conevo.evolution.protocol import Method
     from conevo.worlds.protocol import World
@@ -64,7 +71,7 @@ __all__ = [
 ]
 
 PRESETS = ("smoke", "desk", "night", "thesis")
-SECTIONS = ("run", "world", "method")
+SECTIONS = ("run", "world", "controller", "method")
 NAMES = {
     "world": "",
     "world_digest": "",
@@ -80,7 +87,8 @@ ANY = "any"  # the table of a preset for worlds without one of their own
 class RunConfig:
     """A fully resolved run.
 
-    ``world_params`` and ``method_config`` are the world's and the method's own frozen dataclasses.
+    ``world_params``, ``controller`` and ``method_config`` are the world's, the controller's and the
+    method's own frozen dataclasses.
     ``changed`` names the settings that are not as the preset has them, "run.generations"; the seed
     is none of them.
     """
@@ -91,6 +99,7 @@ class RunConfig:
     preset: str
     run: RunSettings
     world_params: Any
+    controller: Controller
     method_config: Any
     changed: tuple[str, ...] = dataclasses.field(default=(), compare=False)
 
@@ -160,10 +169,11 @@ class RunConfig:
         """
         values = {k: v for k, v in (_set_fields(self.run) | dict(length)).items() if v is not None}
         layer = _as_layer({"run": values}, "as the run's length")
-        run = _build("run", RunSettings, [layer])
-        built = {"run": run, "world": self.world_params, "method": self.method_config}
+        run = _build("run", {"run": RunSettings}, [layer])
+        built = {"run": run, "world": self.world_params, "controller": self.controller}
+        built["method"] = self.method_config
         parts = {name: type(part) for name, part in built.items()}
-        base = _read_preset(self.preset, self.world, self.method_entry)
+        base = _read_preset(self.preset, self.entry, self.method_entry, self.controller.name)
         changed = tuple(_changed(parts, built, base))
         return dataclasses.replace(self, run=run, changed=changed)
 
@@ -174,7 +184,7 @@ class RunConfig:
         return f"{task}-{self.method}-{self.preset}-s{self.run.seed}-{self.run_id[:6]}"
 
     def tables(self, folder: Path | None = None) -> dict[str, dict[str, Any]]:
-        """Return the three tables of the configuration file, every value spelt out.
+        """Return the tables of the configuration file, every value spelt out.
 
         Args:
             folder: of that file; files in it are named from there, others by their whole path.
@@ -189,6 +199,7 @@ class RunConfig:
         tables = {
             "run": names | _set_fields(self.run),
             "world": _set_fields(self.world_params),
+            "controller": {"name": self.controller.name} | _set_fields(self.controller),
             "method": _set_fields(self.method_config),
         }
         if folder is not None:
@@ -266,6 +277,7 @@ def resolve(
             all that it does; nothing has been written.
         EnvironmentFailure: the file cannot be read.
     """
+    from conevo.controllers.registry import find
     from conevo.evolution.methods.registry import resolve as resolve_method
     from conevo.worlds.registry import resolve as resolve_world
 
@@ -290,19 +302,21 @@ def resolve(
         )
     entry, environment = resolve_world(names["world"], names["world_digest"])
     method_entry = resolve_method(names["method"], names["method_digest"])
+    controller = _take_controller([*layers, single])
     parts: dict[str, type] = {
         "run": RunSettings,
         "world": entry.params_class,
+        "controller": find(controller).settings_class,
         "method": method_entry.config_class,
     }
     for key, value in short.items():
         single.setdefault(_section_of(key, parts, place), {})[key] = value
     if seed is not None:
         single.setdefault("run", {})["seed"] = _Value(seed, "as the seed")
-    base = _read_preset(names["preset"], entry.name, method_entry)
+    base = _read_preset(names["preset"], entry, method_entry, controller)
     if own_preset is not None and names["preset"] != own_preset.value:
         _refuse_label(names["preset"], base, layers[0], own_preset.place)
-    built = {name: _build(name, part, [base, *layers, single]) for name, part in parts.items()}
+    built = {name: _build(name, parts, [base, *layers, single]) for name in parts}
     config = RunConfig(
         entry=entry,
         environment=environment,
@@ -310,6 +324,7 @@ def resolve(
         preset=names["preset"],
         run=built["run"],
         world_params=built["world"],
+        controller=built["controller"],
         method_config=built["method"],
         changed=tuple(_changed(parts, built, base)),
     )
@@ -400,6 +415,19 @@ def _take_names(layers: list[Layer], asked: Mapping[str, str | None]) -> dict[st
     return names | {name: value for name, value in asked.items() if value is not None}
 
 
+def _take_controller(layers: list[Layer]) -> str:
+    """Remove the name from the layers' [controller] tables and return the one that holds."""
+    name = DEFAULT
+    for layer in layers:
+        found = layer.get("controller", {}).pop("name", None)
+        if found is not None and not isinstance(found.value, str):
+            raise UsageError(
+                f"controller.name = {shown(found.value)} {found.place}: must be a name"
+            )
+        name = name if found is None else found.value
+    return name
+
+
 def _refuse_label(preset: str, base: Layer, file: Layer, place: str) -> None:
     """Raise UsageError if a preset would set nothing that the configuration file does not set."""
     if all(key in file.get(section, {}) for section in base for key in base[section]):
@@ -432,29 +460,38 @@ def _section_of(key: str, parts: Mapping[str, type], place: str) -> str:
     return homes[0]
 
 
-def _read_preset(preset: str, world: str, method: MethodEntry) -> Layer:
-    """Return what a preset says about this world and method; nothing of a method in a file."""
+def _read_preset(preset: str, world: WorldEntry, method: MethodEntry, controller: str) -> Layer:
+    """Return what a preset says about this world and method, and the world about a controller.
+
+    It says nothing of a method in a file.
+    """
     if preset not in PRESETS:
         raise unknown_name("preset", preset, PRESETS)
     source = resources.files(__package__) / "presets" / f"{preset}.toml"
     worlds = parse_toml(source.read_text(encoding="utf-8"), f"preset {preset!r}")
-    generic, own = dict(worlds[ANY]), dict(worlds.get(world.rsplit("-v", 1)[0], {}))
+    generic, own = dict(worlds[ANY]), dict(worlds.get(world.short_name, {}))
     by_method = generic.pop("method") | own.pop("method", {})
     name, family = method.name, method.name.split("-")[0]
     if not (method.file or {family, name} & set(by_method)):
-        raise UsageError(f"preset {preset!r} has no settings for method {name!r} in {world!r}")
+        raise UsageError(f"preset {preset!r} has no settings for method {name!r} in {world.name!r}")
     sizes = {} if method.file else by_method.get(family, {}) | by_method.get(name, {})
     tables = generic | own | {"method": sizes}
-    return _as_layer(tables, f"in preset {preset!r}")
+    layer = _as_layer(tables, f"in preset {preset!r}")
+    suggestion = {"controller": suggested(controller, world.world_class)}
+    of_world = _as_layer(suggestion, f"of world {world.name!r}")
+    layer["controller"] = of_world["controller"] | layer.get("controller", {})
+    return layer
 
 
-def _build(section: str, part: Any, layers: Iterable[Layer]) -> Any:
+def _build(section: str, parts: Mapping[str, Any], layers: Iterable[Layer]) -> Any:
     """Return the component's dataclass with the layers' values over its defaults."""
+    part = parts[section]
     values: dict[str, Any] = {}
     places: dict[str, str] = {}
     for layer in layers:
         for key, given in layer.get(section, {}).items():
-            refuse_unknown(part, section, key, given.place)
+            also = [f"{one}.{key}" for one in parts if key in parts[one].__dataclass_fields__]
+            refuse_unknown(part, section, key, given.place, also)
             is_file = f"{key}_digest" in part.__dataclass_fields__
             values[key] = given.as_file if is_file else given.value
             places[key] = given.place

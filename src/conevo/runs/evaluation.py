@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,7 +14,7 @@ from conevo.specialization import individual
 from conevo.worlds.protocol import Outcome, World
 from conevo.worlds.rollout import Rollout
 
-__all__ = ["Evaluation", "Portrait", "describe", "join", "make_evaluator", "score"]
+__all__ = ["Evaluation", "Portrait", "describe", "make_evaluator", "score"]
 
 
 @dataclass(frozen=True)
@@ -56,38 +56,20 @@ def make_evaluator(
     ``fittest_epochs`` of them in all generations.
     """
 
-    def keys(trials: Trials, part: int) -> list[int]:
+    def keys(trials: Trials) -> list[int]:
         if trials.scenarios == "fixed":
             return [fold(seed, "fittest", epoch) for epoch in range(fittest_epochs)]
-        met = range(part * epochs, (part + 1) * epochs)
+        met = range(trials.rounds * epochs)
         return [fold(seed, "epoch", trials.generation, epoch) for epoch in met]
 
     def evaluate(trials: Trials) -> Evaluation:
         genes = np.asarray(trials.genes, dtype=np.float32)
         teams = np.asarray(trials.teams, dtype=np.int32)
-        outcome = join(
-            rollout.evaluate(genes, some, world.scenarios(keys(trials, part)))
-            for part, some in enumerate(np.split(teams, trials.rounds))
-        )
+        scenarios = world.scenarios(keys(trials))
+        outcome = rollout.evaluate(genes, teams, scenarios, rounds=trials.rounds)
         return Evaluation(score(outcome, credit), outcome)
 
     return evaluate
-
-
-def join(parts: Iterable[Outcome]) -> Outcome:
-    """Return the outcomes of parts of the teams as one, in their order."""
-    several = list(parts)
-    if len(several) == 1:
-        return several[0]
-    return Outcome(
-        fitness=np.concatenate([one.fitness for one in several]),
-        counts=np.concatenate([one.counts for one in several]),
-        switches=np.concatenate([one.switches for one in several]),
-        performance={
-            name: np.concatenate([one.performance[name] for one in several])
-            for name in several[0].performance
-        },
-    )
 
 
 def score(outcome: Outcome, credit: str = "robot") -> Scores:

@@ -6,6 +6,8 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
+from conevo.controllers.base import Controller
+from conevo.controllers.registry import genome_of
 from conevo.errors import EnvironmentFailure
 from conevo.evolution.inheritance import breed_from, hand_on
 from conevo.evolution.protocol import Layout, Method, State
@@ -21,10 +23,10 @@ from conevo.worlds.rollout import Rollout
 __all__ = ["Lab", "Price", "check_memory", "layout_of", "price_of", "refuse_other_state"]
 
 
-def layout_of(world: World) -> Layout:
-    """Return the size of the problem that a world sets a method."""
-    spec = world.controller
-    return Layout(world.n_robots, spec.n_hidden, spec.max_hidden, spec.n_genes)
+def layout_of(world: World, controller: Controller) -> Layout:
+    """Return the size of the problem that a world and its robots' controller set a method."""
+    genome = genome_of(controller, world)
+    return Layout(world.n_robots, genome.n_parts, genome.max_parts, genome.n_genes)
 
 
 @dataclass(frozen=True)
@@ -55,9 +57,9 @@ def price_of(config: RunConfig, ancestor: State | Team | None = None) -> Price:
         UsageError: the budget does not pay for one generation, or the ancestor does not fit.
     """
     world, run = config.build_world(), config.run
-    method = config.build_method()
-    check_memory(config, layout_of(world))
-    state = _first(method, layout_of(world), run.seed, ancestor)
+    method, layout = config.build_method(), layout_of(world, config.controller)
+    check_memory(config, layout)
+    state = _first(method, layout, run.seed, ancestor)
     check_budget(method, state, run.budget_evaluations)
     first = price(method, state)
     generations = run.generations
@@ -121,7 +123,7 @@ class Lab:
             EnvironmentFailure: there is no such device, or no place for compiled kernels.
         """
         world = config.build_world()
-        rollout = Rollout(world, n_threads=threads, device=device).build()
+        rollout = Rollout(world, config.controller, threads, device).build()
         return Lab(
             config=config,
             world=world,
@@ -137,9 +139,14 @@ class Lab:
             ),
         )
 
+    @property
+    def layout(self) -> Layout:
+        """The size of the problem."""
+        return layout_of(self.world, self.config.controller)
+
     def refuse_other_team(self, team: Team, path: Path) -> None:
         """Raise DamagedFile if a team, of the run at ``path``, cannot play in this world."""
-        layout = layout_of(self.world)
+        layout = self.layout
         fits = (layout.n_robots, layout.max_hidden, layout.n_genes)
         if team.genes.shape != fits:
             raise DamagedFile(
@@ -149,7 +156,7 @@ class Lab:
 
     def blank_state(self) -> State:
         """Return generation 0 of random populations: what all states of this run are like."""
-        return self.method.init(layout_of(self.world), self.config.run.seed)
+        return self.method.init(self.layout, self.config.run.seed)
 
     def first_state(self, ancestor: State | Team | None = None) -> State:
         """Return the state before generation 0, after checking that it can be paid.
@@ -162,7 +169,7 @@ class Lab:
             UsageError: the budget does not pay for one generation, the ancestor does not fit, the
                 method's state cannot be kept, or the world has no room for what belongs in it.
         """
-        layout, seed = layout_of(self.world), self.config.run.seed
+        layout, seed = self.layout, self.config.run.seed
         check_memory(self.config, layout)
         state = _first(self.method, layout, seed, ancestor)
         checkpoint.refuse_unkept(state, self.method.title)

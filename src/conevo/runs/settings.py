@@ -115,6 +115,7 @@ def settings_of(config: RunConfig) -> list[tuple[str, Setting, Any]]:
     parts = (
         ("run", RunSettings, config.run),
         ("world", type(config.world_params), config.world_params),
+        ("controller", type(config.controller), config.controller),
         ("method", type(config.method_config), config.method_config),
     )
     return [

@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import ValidationError
 
+from conevo.controllers.registry import controller, genome_of
 from conevo.errors import ConevoError, UsageError
 from conevo.outside import line_of
 from conevo.parameters import wrong_values
@@ -146,11 +147,15 @@ def _of_scenarios(a_world: World) -> Iterator[str]:
 
 
 def random_teams(a_world: World, n: int) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.int32]]:
-    """Return a pool of random neurons and ``n`` teams of networks made of it [N, R, U]."""
-    spec, r = a_world.controller, a_world.n_robots
-    pool = stream(1, "check", "pool").uniform(-1, 1, (n * r * spec.n_hidden, spec.n_genes))
-    teams = np.full((n, r, spec.max_hidden), -1, dtype=np.int32)
-    teams[:, :, : spec.n_hidden] = np.arange(len(pool)).reshape(n, r, -1)
+    """Return a pool of random genotypes and ``n`` teams of controllers made of it [N, R, U].
+
+    They are of the controller that the world suggests.
+    """
+    genome = genome_of(controller(world=a_world), a_world)
+    r = a_world.n_robots
+    pool = stream(1, "check", "pool").uniform(-1, 1, (n * r * genome.n_parts, genome.n_genes))
+    teams = np.full((n, r, genome.max_parts), -1, dtype=np.int32)
+    teams[:, :, : genome.n_parts] = np.arange(len(pool)).reshape(n, r, -1)
     return pool.astype(np.float32), teams
 
 

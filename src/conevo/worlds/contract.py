@@ -6,13 +6,19 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from conevo.controllers import ControllerSpec
 from conevo.errors import UsageError, unknown_name
-from conevo.kernels.network import OUT, WIDE, Networks
 from conevo.worlds.measures import measures_of
 from conevo.worlds.protocol import Simulation, World
 
 __all__ = ["PHASES", "TEAM_PHASE", "faults", "refuse_faults", "scenario_faults", "sizes_of"]
+
+
+@wp.struct
+class _Nothing:
+    """What a Warp struct looks like."""
+
+    number: int
+
 
 # The phases of an epoch, each with the numbers it gets after team, scene and p.
 PHASES = {
@@ -32,6 +38,8 @@ STATE = {
     "switches": int,
     "performance": float,
 }
+STRUCT = type(_Nothing)
+WIDE = ("inputs", "outputs")  # [R, S] and [R, O]
 RECORDED = ("action", "fitness")
 
 
@@ -55,7 +63,6 @@ def sizes_of(world: World, simulation: Simulation) -> dict[str, int]:
 def faults(world: World, simulation: Simulation) -> Iterator[str]:
     """Yield what is wrong with a world's names, controller, phases and structs."""
     yield from _of_names(world)
-    yield from _of_controller(world.controller)
     yield from _of_phases(simulation)
     if _is_struct(simulation.state):
         yield from _of_state(world, simulation)
@@ -71,11 +78,11 @@ def faults(world: World, simulation: Simulation) -> Iterator[str]:
 
 
 def _is_struct(kind: Any) -> bool:
-    return isinstance(kind, type(Networks))
+    return isinstance(kind, STRUCT)
 
 
 def _of_names(world: World) -> Iterator[str]:
-    for what in ("actions", "castes", "heuristics"):
+    for what in ("inputs", "outputs", "actions", "castes", "heuristics"):
         names: Any = getattr(world, what)
         if not (isinstance(names, tuple) and names and all(isinstance(n, str) for n in names)):
             yield f"{what} must be a tuple of names, as in ('rest',), not {names!r}"
@@ -83,17 +90,6 @@ def _of_names(world: World) -> Iterator[str]:
             yield f"{what} has {twice!r} twice"
     if len(world.castes) < len(world.actions):
         yield f"castes has {len(world.castes)} names, fewer than the {len(world.actions)} actions"
-
-
-def _of_controller(spec: Any) -> Iterator[str]:
-    if not isinstance(spec, ControllerSpec):
-        yield f"controller must return a ControllerSpec, not {type(spec).__name__}"
-        return
-    for name, most in (("n_sensors", None), ("n_hidden", int(WIDE)), ("n_outputs", int(OUT))):
-        value = getattr(spec, name)
-        if not isinstance(value, int) or value < 1 or (most is not None and value > most):
-            allowed = f"1 to {most}" if most else "1 or more"
-            yield f"controller: {name} must be {allowed}, not {value!r}"
 
 
 def _of_phases(simulation: Simulation) -> Iterator[str]:
@@ -132,17 +128,16 @@ def _place(function: Any) -> str:
 def _of_state(world: World, simulation: Simulation) -> Iterator[str]:
     state = simulation.state
     fields = {name: var.type for name, var in state.vars.items()}
-    if fields.get("nets") is not Networks:
-        yield f"{state.key} needs a field 'nets: Networks'"
-    for name, kind in STATE.items():
-        wanted = f"'{name}: wp.array[{kind.__name__}]'"
+    for name, kind in (STATE | dict.fromkeys(WIDE, float)).items():
+        ndim = 2 if name in WIDE else 1
+        wanted = f"'{name}: wp.array{'2d' if ndim == 2 else ''}[{kind.__name__}]'"
         if name not in fields:
             yield f"{state.key} needs a field {wanted}"
-        elif not _is_array_of(fields[name], kind):
+        elif not _is_array_of(fields[name], kind, ndim):
             yield f"{state.key}.{name} must be declared as {wanted}"
     arrays = {name for name, kind in fields.items() if wp.types.is_array(kind)}
     for name, kind in fields.items():
-        if name not in ("nets", *STATE) and not (name in arrays and kind.ndim == 1):
+        if name not in (*WIDE, *STATE) and not (name in arrays and kind.ndim == 1):
             yield f"{state.key}.{name} must be a one-dimensional array: only those keep a value"
     yield from _of_sizes(world, simulation, arrays)
     for what in ("recorded", "recorded_at_end"):
@@ -168,8 +163,9 @@ def _of_sizes(world: World, simulation: Simulation, arrays: set[str]) -> Iterato
             yield f"Simulation.sizes[{name!r}] must be {fixed[name][0]} ({fixed[name][1]})"
 
 
-def _is_array_of(kind: Any, dtype: Any) -> bool:
-    return wp.types.is_array(kind) and kind.ndim == 1 and wp.types.types_equal(kind.dtype, dtype)
+def _is_array_of(kind: Any, dtype: Any, ndim: int = 1) -> bool:
+    is_right = wp.types.is_array(kind) and kind.ndim == ndim
+    return is_right and wp.types.types_equal(kind.dtype, dtype)
 
 
 def _of_scene(scene: Any) -> Iterator[str]:

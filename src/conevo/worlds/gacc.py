@@ -90,17 +90,15 @@ import numpy as np
 import numpy.typing as npt
 from annotated_types import Ge, Gt, Le
 
-from conevo.controllers import ControllerSpec
 from conevo.errors import UsageError
 from conevo.parameters import parameters
 from conevo.rng import stream
 from conevo.worlds.gacc_dynamics import FUNCTIONS
 from conevo.worlds.gacc_plans import TYPES, Plan, plan
-from conevo.worlds.gacc_senses import N_SENSORS
 from conevo.worlds.gacc_state import Params, Scene, Team
 from conevo.worlds.measures import Measure
 from conevo.worlds.places import draw_places
-from conevo.worlds.protocol import Scenarios, Simulation, kernel_params
+from conevo.worlds.protocol import Scenarios, Simulation, kernel_params, names_of
 
 __all__ = ["GaccParams", "GaccScenarios", "GaccWorld"]
 
@@ -163,10 +161,6 @@ class GaccParams:
     """(side) longest side of an obstacle."""
     obstacle_gap: Annotated[float, Gt(0), Le(0.05)] = 0.03  # Choice: around every obstacle
     """(side) least distance of an obstacle from walls, home area and the others."""
-    n_hidden: Annotated[int, Ge(2), Le(16)] = 10
-    """(neurons) hidden neurons of a controller at the start."""
-    max_hidden: Annotated[int, Ge(2), Le(32)] = 20  # Choice: twice the initial number
-    """(neurons) hidden neurons a controller can grow to."""
 
     def __post_init__(self) -> None:
         for low, high in (
@@ -214,6 +208,17 @@ class GaccWorld:
     params: GaccParams = field(default_factory=GaccParams)
 
     name: ClassVar[str] = "gacc-v1"
+    inputs: ClassVar[tuple[str, ...]] = (
+        *names_of(("objects", "robots", "home"), 8),
+        *(f"demand {kind}" for kind in TYPES),
+    )
+    outputs: ClassVar[tuple[str, ...]] = (
+        *(f"detect {kind}" for kind in TYPES),
+        *("move: dx", "move: dy"),
+        *(f"grip {kind}" for kind in TYPES),
+    )
+    # Section 6.2.7. Choice: controllers can grow to twice the initial number.
+    controller: ClassVar[dict[str, Any]] = {"n_hidden": 10, "max_hidden": 20, "bias": True}
     actions: ClassVar[tuple[str, ...]] = (
         *(f"detect {kind}" for kind in TYPES),
         "move",
@@ -251,17 +256,6 @@ class GaccWorld:
     def plan(self) -> Plan:
         """What is to be built."""
         return plan(self.environment)
-
-    @property
-    def controller(self) -> ControllerSpec:
-        """The robot's network (section 6.2.7)."""
-        return ControllerSpec(
-            n_sensors=int(N_SENSORS),
-            n_hidden=self.params.n_hidden,
-            n_outputs=8,
-            max_hidden=self.params.max_hidden,
-            bias=True,
-        )
 
     def scenarios(self, keys: Sequence[int]) -> GaccScenarios:
         """Return one scenario per key: obstacles, objects and starts at random places.

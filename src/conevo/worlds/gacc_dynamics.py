@@ -8,7 +8,7 @@ holds; but ``resolve`` is one referee, robot 0, since objects compete for places
 import warp as wp
 
 from conevo.kernels.actions import PREFERENCE, begin_counting, count_action, heuristic_action
-from conevo.kernels.network import highest
+from conevo.kernels.outputs import highest
 from conevo.kernels.random import uniform
 from conevo.kernels.steps import is_taken, random_step, steered_step
 from conevo.worlds.gacc_senses import sense
@@ -208,11 +208,11 @@ def act(team: Team, scene: Scene, p: Params, i: int, t: int) -> None:
     if team.heuristic[i] >= 0:
         follow_preferences(team, scene, p, i, t)
     else:
-        output = highest(team.nets, i, 8)
+        output = highest(team.outputs, i, 8)
         team.chosen[i] = wp.where(output <= MOVE, output, output - 1)  # outputs 3 and 4: move
         if team.chosen[i] == MOVE:
-            sums = team.nets.sums[i]
-            propose(team, scene, p, i, steered_step(sums[3], sums[4], p.move_range))
+            step = steered_step(team.outputs[i, 3], team.outputs[i, 4], p.move_range)
+            propose(team, scene, p, i, step)
     a = team.chosen[i]
     if a >= GRIP and team.held[i] == NONE:
         team.target[i] = within_grip(team, scene, p, i, t, a - GRIP)

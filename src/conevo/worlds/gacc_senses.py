@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import warp as wp
 
 from conevo.kernels.geometry import octant
-from conevo.kernels.network import first_input
 from conevo.kernels.random import uniform
 from conevo.kernels.sensing import closest_in_octants, mark
 from conevo.worlds.gacc_state import (
@@ -21,9 +20,8 @@ from conevo.worlds.gacc_state import (
     is_lying,
 )
 
-__all__ = ["N_SENSORS", "sense"]
+__all__ = ["sense"]
 
-N_SENSORS = wp.constant(27)
 SENSING = wp.constant(16)  # counters of random numbers, from here on one for each thing
 
 if TYPE_CHECKING:
@@ -137,7 +135,6 @@ def sense(team: Team, scene: Scene, p: Params, i: int, t: int) -> None:
     """
     if team.energy[i] <= 0.0:
         return
-    base = first_input(team.nets, i)
     x = team.x[i]
     y = team.y[i]
     things = octants()
@@ -161,8 +158,8 @@ def sense(team: Team, scene: Scene, p: Params, i: int, t: int) -> None:
     if d2 < p.home_range_2:
         home[octant(dx, dy)] = p.home / wp.max(wp.sqrt(d2), p.home)
     for o in range(8):
-        team.nets.inputs[base + o] = things[o]
-        team.nets.inputs[base + 8 + o] = robots[o]
-        team.nets.inputs[base + 16 + o] = home[o]
+        team.inputs[i, o] = things[o]
+        team.inputs[i, 8 + o] = robots[o]
+        team.inputs[i, 16 + o] = home[o]
     for kind in range(3):
-        team.nets.inputs[base + 24 + kind] = team.demand[kind]
+        team.inputs[i, 24 + kind] = team.demand[kind]

@@ -6,7 +6,6 @@ The rules and the choices stand on the card of ``worlds.gacc``.
 import warp as wp
 
 from conevo.kernels.actions import NONE
-from conevo.kernels.network import Networks
 from conevo.kernels.steps import is_taken
 
 __all__ = [
@@ -104,7 +103,8 @@ class Scene:
 class Team:
     """State of a team, flat over a batch. R robots, K objects, C complex objects."""
 
-    nets: Networks
+    inputs: wp.array2d[float]  # [R, 27]
+    outputs: wp.array2d[float]  # [R, 8]
     x: wp.array[float]
     y: wp.array[float]
     to_x: wp.array[float]

@@ -31,16 +31,15 @@ Version history:
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Annotated, ClassVar
+from typing import Annotated, Any, ClassVar
 
 from annotated_types import Ge, Le
 
-from conevo.controllers import ControllerSpec
 from conevo.errors import UsageError
 from conevo.parameters import parameters
 from conevo.worlds.arena import ArenaParams, ArenaScenarios, draw_scenarios, simulate
 from conevo.worlds.measures import Measure
-from conevo.worlds.protocol import Simulation
+from conevo.worlds.protocol import Simulation, names_of
 from conevo.worlds.pursuit_dynamics import ACTIONS, PREY_FUNCTIONS
 
 __all__ = ["PreyParams", "PreyWorld"]
@@ -54,10 +53,6 @@ class PreyParams(ArenaParams):
     """fewest obstacles, and fewest predators, of an epoch (section 4.3)."""
     most: Annotated[int, Ge(0), Le(6)] = 6
     """most obstacles, and most predators, of an epoch."""
-    n_hidden: Annotated[int, Ge(2), Le(16)] = 5
-    """(neurons) hidden neurons of a controller at the start (section 4.1)."""
-    max_hidden: Annotated[int, Ge(2), Le(32)] = 10
-    """(neurons) hidden neurons a controller can grow to. Choice: twice the initial number."""
 
     def __post_init__(self) -> None:
         if self.most < self.least:
@@ -72,6 +67,10 @@ class PreyWorld:
     params: PreyParams = field(default_factory=PreyParams)
 
     name: ClassVar[str] = "prey-v1"
+    inputs: ClassVar[tuple[str, ...]] = names_of(("infrared",), 8)
+    outputs: ClassVar[tuple[str, ...]] = ("left wheel", "right wheel")
+    # Section 4.1 and fig. 4.2. Choice: controllers can grow to twice the initial number.
+    controller: ClassVar[dict[str, Any]] = {"n_hidden": 5, "max_hidden": 10, "recurrent": False}
     actions: ClassVar[tuple[str, ...]] = ACTIONS
     castes: ClassVar[tuple[str, ...]] = actions
     performance: ClassVar[tuple[Measure, ...]] = (
@@ -89,17 +88,6 @@ class PreyWorld:
     def n_robots(self) -> int:
         """Number of prey."""
         return 1 + (self.experiment - 1) // 3
-
-    @property
-    def controller(self) -> ControllerSpec:
-        """The prey's network (fig. 4.2)."""
-        return ControllerSpec(
-            n_sensors=8,
-            n_hidden=self.params.n_hidden,
-            n_outputs=2,
-            max_hidden=self.params.max_hidden,
-            recurrent=False,
-        )
 
     @property
     def _predators(self) -> tuple[int, int]:

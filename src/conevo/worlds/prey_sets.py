@@ -26,6 +26,7 @@ FORMAT = "conevo prey set 1"
 SHIPPED = "prey-v1.npz"
 MOST_BYTES = 2**24  # of a file, packed and unpacked
 N_GENES = 10  # eight sensors, two wheels (fig. 4.2)
+WEIGHT_SCALE = 10.0  # weight of gene 1 (table 4.3)
 
 
 @dataclass(frozen=True)

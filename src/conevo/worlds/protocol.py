@@ -9,11 +9,15 @@ from typing import Any, ClassVar, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from conevo.controllers import ControllerSpec
 from conevo.errors import UsageError, unknown_name
 from conevo.worlds.measures import Measure
 
-__all__ = ["Outcome", "Scenarios", "Simulation", "World", "kernel_params"]
+__all__ = ["Outcome", "Scenarios", "Simulation", "World", "kernel_params", "names_of"]
+
+
+def names_of(groups: Sequence[str], n: int) -> tuple[str, ...]:
+    """Return names of sensors, ``n`` of each group: "light 0", "light 1", ..."""
+    return tuple(f"{group} {k}" for group in groups for k in range(n))
 
 
 @dataclass(frozen=True)
@@ -50,9 +54,10 @@ class Scenarios:
 class Simulation:
     """The Warp side of a world: what ``worlds.rollout`` needs to run it.
 
-    state: struct type of a team's state, with a field ``nets`` of networks; its other arrays are
-        flat over a batch of teams. sizes: elements that one team needs of those that do not have
-        one for each robot; the world's names tell those of ``counts`` and ``performance``.
+    state: struct type of a team's state, whose arrays are flat over a batch of teams; ``inputs``
+        [R, S] and ``outputs`` [R, O] are what the robots' controllers read and write. sizes:
+        elements that one team needs of those that do not have one for each robot; the world's names
+        tell those of ``counts`` and ``performance``.
     scene: struct type of a scenario; its arrays are those of the scenarios object, by name: flat
         over the scenarios, or of two and more dimensions if all scenarios share them.
     params_type, params: struct type of the parameters, and the parameters.
@@ -117,6 +122,10 @@ class World(Protocol):
 
     Attributes:
         name: with its version, "rover-v1".
+        inputs: S names, of what each robot senses.
+        outputs: O names, of what its controller gives: any real numbers.
+        controller: settings of the controller that the source gives such robots; those that another
+            controller has, too, hold for it as well.
         actions: A names; the state array ``action`` holds indices into them.
         castes: C names, one per column of ``Outcome.counts``: the caste of a robot that spends most
             of its life on it. Most worlds count actions, so castes are actions; a world that tells
@@ -132,6 +141,9 @@ class World(Protocol):
     """
 
     name: ClassVar[str]
+    inputs: ClassVar[tuple[str, ...]]
+    outputs: ClassVar[tuple[str, ...]]
+    controller: ClassVar[dict[str, Any]]
     actions: ClassVar[tuple[str, ...]]
     castes: ClassVar[tuple[str, ...]]
     heuristics: ClassVar[tuple[str, ...]]
@@ -151,10 +163,6 @@ class World(Protocol):
     @property
     def params(self) -> Any:
         """Its parameters, a dataclass; ``iterations``, those of one epoch, is among them."""
-
-    @property
-    def controller(self) -> ControllerSpec:
-        """Shape of the robots' controllers."""
 
     def scenarios(self, keys: Sequence[int]) -> Scenarios:
         """Return one scenario per key: the same key always gives the same scenario."""

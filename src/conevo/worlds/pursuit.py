@@ -41,19 +41,18 @@ Version history:
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
-from annotated_types import Ge, Gt, Le
+from annotated_types import Ge, Le
 
-from conevo.controllers import ControllerSpec
 from conevo.errors import UsageError, unknown_name
 from conevo.parameters import parameters
 from conevo.worlds import prey_sets
 from conevo.worlds.arena import ArenaParams, ArenaScenarios, draw_scenarios, simulate
 from conevo.worlds.measures import Measure
-from conevo.worlds.protocol import Simulation
+from conevo.worlds.protocol import Simulation, names_of
 from conevo.worlds.pursuit_dynamics import ACTIONS, PURSUIT_FUNCTIONS
 
 __all__ = ["PursuitParams", "PursuitWorld"]
@@ -80,10 +79,6 @@ class PursuitParams(ArenaParams):
     """(cm) or it moved less than this. Choice: 0.2."""
     capture_predators: Annotated[int, Ge(1), Le(6)] = 2
     """(predators) that must be within light range (section 4.1: two)."""
-    n_hidden: Annotated[int, Ge(2), Le(16)] = 6
-    """(neurons) hidden neurons of a controller at the start (section 4.1)."""
-    max_hidden: Annotated[int, Gt(0), Le(32)] = 12
-    """(neurons) hidden neurons a controller can grow to. Choice: twice the initial number."""
 
     def __post_init__(self) -> None:
         if self.prey in PREY_MODES:
@@ -111,6 +106,10 @@ class PursuitWorld:
     params: PursuitParams = field(default_factory=PursuitParams)
 
     name: ClassVar[str] = "pursuit-v1"
+    inputs: ClassVar[tuple[str, ...]] = names_of(("infrared", "light"), 8)
+    outputs: ClassVar[tuple[str, ...]] = ("left wheel", "right wheel")
+    # Section 4.1. Choice: controllers can grow to twice the initial number.
+    controller: ClassVar[dict[str, Any]] = {"n_hidden": 6, "max_hidden": 12}
     actions: ClassVar[tuple[str, ...]] = ACTIONS
     castes: ClassVar[tuple[str, ...]] = actions
     performance: ClassVar[tuple[Measure, ...]] = (
@@ -148,16 +147,6 @@ class PursuitWorld:
         """Number of prey."""
         return 1 + (self.team_type - 1) // 5
 
-    @property
-    def controller(self) -> ControllerSpec:
-        """The predator's network (fig. 4.3)."""
-        return ControllerSpec(
-            n_sensors=16,
-            n_hidden=self.params.n_hidden,
-            n_outputs=2,
-            max_hidden=self.params.max_hidden,
-        )
-
     def scenarios(self, keys: Sequence[int]) -> ArenaScenarios:
         """Return one scenario per key: random places and headings."""
         obstacles = self.params.n_obstacles
@@ -188,4 +177,4 @@ class PursuitWorld:
         if PREY_MODES.get(self.params.prey, 0) != 0:
             return np.zeros((0, 8), dtype=np.float32), np.zeros((0, 2), dtype=np.float32)
         found = prey_sets.load(None if self.params.prey == "shaped" else self.params.prey)
-        return found.weights(self.n_prey, self.controller.weight_scale)
+        return found.weights(self.n_prey, prey_sets.WEIGHT_SCALE)

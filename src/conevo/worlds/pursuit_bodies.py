@@ -6,7 +6,7 @@ Nitschke 2009, sections 4.1, 4.3, 4.6.6. What happens to them is ``worlds.pursui
 import warp as wp
 
 from conevo.kernels.khepera import RADIUS, eight, see_disc, see_wall, steer, wrap
-from conevo.kernels.network import Networks, sigmoid
+from conevo.kernels.outputs import sigmoid
 from conevo.kernels.random import uniform
 
 __all__ = [
@@ -70,7 +70,8 @@ class Scene:
 class Team:
     """State of a team and its opponents, flat over a batch. B bodies, R robots, Q prey."""
 
-    nets: Networks
+    inputs: wp.array2d[float]  # [R, S]
+    outputs: wp.array2d[float]  # [R, 2]
     heuristic: wp.array[int]
     x: wp.array[float]
     y: wp.array[float]
@@ -249,8 +250,8 @@ def command(team: Team, scene: Scene, p: Params, b: int, t: int) -> wp.vec2f:
     if b < p.n_robots:
         h = team.heuristic[b]
         if h == NONE:
-            sums = team.nets.sums[b]
-            return wp.vec2f(2.0 * sigmoid(sums[0]) - 1.0, 2.0 * sigmoid(sums[1]) - 1.0)
+            left = 2.0 * sigmoid(team.outputs[b, 0]) - 1.0
+            return wp.vec2f(left, 2.0 * sigmoid(team.outputs[b, 1]) - 1.0)
         if p.team_is_prey != 0:
             h += 1
     elif is_prey(p, b):

@@ -11,7 +11,6 @@ import warp as wp
 
 from conevo.kernels.actions import begin_counting, count_action
 from conevo.kernels.khepera import RADIUS, drive
-from conevo.kernels.network import first_input
 from conevo.worlds.pursuit_bodies import (
     NONE,
     Params,
@@ -73,21 +72,19 @@ def reset(team: Team, scene: Scene, p: Params, i: int) -> None:
 @wp.func
 def sense(team: Team, scene: Scene, p: Params, i: int, t: int) -> None:
     """Fill robot ``i``'s sensor inputs, and those of prey that are not the team."""
-    n_sensors = scene.clamp.shape[1]
-    base = first_input(team.nets, i)
     seen = look(team, scene, p, i, False)
     for k in range(8):
-        team.nets.inputs[base + k] = seen[k]
+        team.inputs[i, k] = seen[k]
         team.infrared[i * 8 + k] = seen[k]
     if p.team_is_prey == 0:
         light = look(team, scene, p, i, True)
         for k in range(8):
-            team.nets.inputs[base + 8 + k] = light[k]
+            team.inputs[i, 8 + k] = light[k]
     k = int(0)
-    while k < n_sensors:
+    while k < scene.clamp.shape[1]:
         held = scene.clamp[i, k]
         if not wp.isnan(held):
-            team.nets.inputs[base + k] = held
+            team.inputs[i, k] = held
         k += 1
     b = i + p.n_robots
     while b < scene.n_bodies[0]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, fields
 from importlib import import_module
 from pathlib import Path
@@ -51,6 +50,11 @@ class WorldEntry:
 
         return checked(getattr(import_module(self.module), self.params_name), "world")
 
+    @property
+    def world_class(self) -> Any:
+        """The class of its environments."""
+        return getattr(import_module(self.module), self.world_name)
+
     def address(self, environment: str) -> str:
         """What ``resolve`` finds an environment of this world by."""
         return f"{self.file}:{environment}" if self.file else f"{self.name}/{environment}"
@@ -65,9 +69,7 @@ class WorldEntry:
         if not isinstance(params, part):  # of a plain dataclass, which has checked nothing
             given = {one.name: getattr(params, one.name) for one in fields(params) if one.init}
             params = part(**given)
-        make: Callable[[str, Any], World] = getattr(import_module(self.module), self.world_name)
-        built = make(environment, params)
-        _ = built.controller  # refuses fewer slots than neurons
+        built: World = self.world_class(environment, params)
         _ = measures_of(built)  # refuses what are no measures
         return built
 

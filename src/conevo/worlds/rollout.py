@@ -1,7 +1,8 @@
 """The single episode loop: ``evaluate`` runs batches of teams, ``record`` watches one of them.
 
-Teams are rows of a genotype pool: the kernel builds each network itself, so a generation of ten
-thousand teams needs no unpacked weights. Batches larger than the workspace run in parts.
+Teams are rows of a genotype pool: a kernel builds each team's controllers itself, once for all its
+scenarios, so a generation of ten thousand teams needs no unpacked weights. Batches larger than the
+workspace run in parts.
 """
 
 from dataclasses import dataclass
@@ -12,44 +13,48 @@ import numpy as np
 import numpy.typing as npt
 import warp as wp
 
+from conevo.controllers.base import Controller, Mind
+from conevo.controllers.registry import controller as make_controller
+from conevo.controllers.registry import genome_of, refuse_misfit
 from conevo.errors import EnvironmentFailure
 from conevo.kernels import engine
 from conevo.kernels.engine import barrier
-from conevo.kernels.network import WIDE, Shape, load, out_vector, think, wide_vector
 from conevo.worlds.contract import PHASES, refuse_faults, sizes_of
 from conevo.worlds.measures import measures_of
 from conevo.worlds.protocol import Outcome, Scenarios, Simulation, World
 
-__all__ = ["Rollout", "check_device", "episode_kernel"]
+__all__ = ["Rollout", "check_device", "episode_kernel", "loading_kernel"]
 
-# Worlds simulated at once: bounds memory (about 0.13 MB each), keeps all threads or blocks busy.
+# Worlds simulated at once: bounds memory, keeps all threads or blocks busy.
 CHUNK = 512
 CUDA_CHUNK = 8192
 
 
 @wp.struct
 class Job:
-    """What a launch is to do: which networks play, in how many scenarios, which iterations."""
+    """What a launch is to do: which teams play, in how many scenarios, which iterations.
 
-    shape: Shape
-    genes: wp.array2d[float]
-    slots: wp.array3d[int]
+    first_team: number of the batch's first team among all, which tells the round that a team is of.
+    """
+
     heuristic: wp.array2d[int]
     n_worlds: int
+    n_teams: int
     n_scenarios: int
+    n_scenes: int
     n_robots: int
+    first_team: int
+    teams_per_round: int
     t_begin: int
     t_end: int
 
 
-def episode_kernel(simulation: Simulation) -> Any:
+def episode_kernel(simulation: Simulation, mind: Mind) -> Any:
     """Return the kernel that runs a world's iterations ``t_begin`` to ``t_end``."""
     f = simulation.functions
     structs = (simulation.state, simulation.scene, simulation.params_type)
-    phases = [f[name] for name in PHASES]
-    if "settle" in f:
-        return _settling_kernel(*structs, *phases, f["settle"])
-    return _episode_kernel(*structs, *phases)
+    brain = (mind.weights, mind.memory, mind.shape_type, mind.clear, mind.think)
+    return _episode_kernel(*structs, *brain, *(f[name] for name in PHASES), f.get("settle"))
 
 
 @cache
@@ -57,54 +62,11 @@ def _episode_kernel(
     State: Any,
     Scene: Any,
     Params: Any,
-    reset: Any,
-    sense: Any,
-    act: Any,
-    commit: Any,
-    resolve: Any,
-    outcome: Any,
-) -> Any:
-    view_team, view_scene = engine.view_of(State), engine.view_of(Scene)
-
-    @wp.kernel(module="unique", module_options=engine.options, grid_stride=False)
-    def episode(batch: State, scenes: Scene, p: Params, job: Job, first: int) -> None:
-        index, lane = wp.tid()
-        b = first + index
-        lanes = wp.block_dim()
-        n = b // job.n_scenarios
-        team = view_team(batch, b, job.n_worlds)
-        scene = view_scene(scenes, b % job.n_scenarios, job.n_scenarios)
-        if job.t_begin == 0:
-            for i in range(lane, job.n_robots, lanes):
-                reset(team, scene, p, i)
-                load(team.nets, job.shape, i, job.genes, job.slots, n)
-                team.heuristic[i] = job.heuristic[n, i]
-            barrier()
-        for t in range(job.t_begin, job.t_end):
-            for i in range(lane, job.n_robots, lanes):
-                sense(team, scene, p, i, t)
-                if team.heuristic[i] < 0:
-                    think(team.nets, job.shape, i)
-                act(team, scene, p, i, t)
-            barrier()
-            for i in range(lane, job.n_robots, lanes):
-                commit(team, scene, p, i, t)
-            barrier()
-            for i in range(lane, job.n_robots, lanes):
-                resolve(team, scene, p, i, t)
-            barrier()
-        if lane == 0:
-            outcome(team, scene, p, job.t_end)
-
-    return episode
-
-
-# A text of its own, so that a world without the phase keeps its kernel and its kernel's hash.
-@cache
-def _settling_kernel(
-    State: Any,
-    Scene: Any,
-    Params: Any,
+    Weights: Any,
+    Memory: Any,
+    Shape: Any,
+    clear: Any,
+    think: Any,
     reset: Any,
     sense: Any,
     act: Any,
@@ -113,35 +75,52 @@ def _settling_kernel(
     outcome: Any,
     settle: Any,
 ) -> Any:
-    view_team, view_scene = engine.view_of(State), engine.view_of(Scene)
+    view_team, view_scene = engine.view_of(State), engine.view_of(Scene, has_shared=True)
+    view_weights, view_memory = engine.view_of(Weights), engine.view_of(Memory)
+    settles = settle is not None
 
     @wp.kernel(module="unique", module_options=engine.options, grid_stride=False)
-    def episode(batch: State, scenes: Scene, p: Params, job: Job, first: int) -> None:
+    def episode(
+        batch: State, scenes: Scene, p: Params, brains: Weights, memories: Memory, shape: Shape,
+        job: Job, first: int,
+    ) -> None:  # fmt: skip
         index, lane = wp.tid()
         b = first + index
         lanes = wp.block_dim()
         n = b // job.n_scenarios
+        place = (job.first_team + n) // job.teams_per_round * job.n_scenarios + b % job.n_scenarios
         team = view_team(batch, b, job.n_worlds)
-        scene = view_scene(scenes, b % job.n_scenarios, job.n_scenarios)
+        scene = view_scene(scenes, place, job.n_scenes)
+        weights = view_weights(brains, n, job.n_teams)
+        memory = view_memory(memories, b, job.n_worlds)
         if job.t_begin == 0:
             for i in range(lane, job.n_robots, lanes):
                 reset(team, scene, p, i)
-                load(team.nets, job.shape, i, job.genes, job.slots, n)
+                clear(memory, shape, i)
+                for k in range(team.inputs.shape[1]):
+                    team.inputs[i, k] = 0.0
+                for k in range(team.outputs.shape[1]):
+                    team.outputs[i, k] = 0.0
                 team.heuristic[i] = job.heuristic[n, i]
             barrier()
         for t in range(job.t_begin, job.t_end):
             for i in range(lane, job.n_robots, lanes):
                 sense(team, scene, p, i, t)
+            barrier()
+            for i in range(lane, job.n_robots, lanes):
                 if team.heuristic[i] < 0:
-                    think(team.nets, job.shape, i)
+                    think(weights, memory, shape, team.inputs, team.outputs, i)
+            barrier()
+            for i in range(lane, job.n_robots, lanes):
                 act(team, scene, p, i, t)
             barrier()
             for i in range(lane, job.n_robots, lanes):
                 commit(team, scene, p, i, t)
             barrier()
-            if lane == 0:
-                settle(team, scene, p, t)
-            barrier()
+            if wp.static(settles):
+                if lane == 0:
+                    settle(team, scene, p, t)
+                barrier()
             for i in range(lane, job.n_robots, lanes):
                 resolve(team, scene, p, i, t)
             barrier()
@@ -149,6 +128,25 @@ def _settling_kernel(
             outcome(team, scene, p, job.t_end)
 
     return episode
+
+
+@cache
+def loading_kernel(Weights: Any, Shape: Any, load: Any) -> Any:
+    """Return the kernel that builds the controllers of teams, a block for each team."""
+    view_weights = engine.view_of(Weights)
+
+    @wp.kernel(module="unique", module_options=engine.options, grid_stride=False)
+    def loading(
+        brains: Weights, shape: Shape, genes: wp.array2d[float], rows: wp.array3d[int],
+        n_teams: int, first: int,
+    ) -> None:  # fmt: skip
+        index, lane = wp.tid()
+        n = first + index
+        weights = view_weights(brains, n, n_teams)
+        for i in range(lane, rows.shape[1], wp.block_dim()):
+            load(weights, shape, i, genes, rows, n)
+
+    return loading
 
 
 def check_device(device: str) -> None:
@@ -162,10 +160,16 @@ def check_device(device: str) -> None:
 
 @dataclass
 class _Workspace:
-    """Arrays of a batch of at most ``n`` worlds, used again and again."""
+    """Arrays of a batch, used again and again.
 
-    n: int
+    At most ``n_worlds`` worlds with a state and a memory each, and ``n_teams`` teams' weights.
+    """
+
+    n_worlds: int
+    n_teams: int
     state: Any
+    memory: Any
+    weights: Any
 
 
 class Rollout:
@@ -173,20 +177,27 @@ class Rollout:
 
     Args:
         world: the world and environment to run.
+        controller: of the robots; by default the one that the world suggests.
         n_threads: CPU threads; all usable ones by default. Results do not depend on it.
         device: "cpu" or a CUDA device as Warp names it.
         lanes: lanes of a CPU block (for tests of the CUDA form; needs Warp's CPU blocks).
 
     Raises:
-        UsageError: the world lacks what the engine needs of it.
+        UsageError: the world lacks what the engine needs of it, or the controller does not fit it.
         EnvironmentFailure: the device does not exist.
     """
 
     def __init__(
-        self, world: World, n_threads: int | None = None, device: str = "cpu", lanes: int = 1
+        self,
+        world: World,
+        controller: Controller | None = None,
+        n_threads: int | None = None,
+        device: str = "cpu",
+        lanes: int = 1,
     ) -> None:
         engine.start()
         self.world = world
+        self.controller = controller or make_controller(world=world)
         self.device = device
         self.n_threads = n_threads or engine.usable_threads()
         self.lanes = 32 if device != "cpu" else lanes
@@ -195,38 +206,33 @@ class Rollout:
         with engine.building:
             self._simulation = world.simulation()
             refuse_faults(world, self._simulation)
-            self._kernel = episode_kernel(self._simulation)
+            refuse_misfit(self.controller, world)
+            self.genome = genome_of(self.controller, world)
+            self._mind = self.controller.mind(len(world.inputs), len(world.outputs))
+            self._kernel = episode_kernel(self._simulation, self._mind)
+            mind = self._mind
+            self._loading = loading_kernel(mind.weights, mind.shape_type, mind.load)
         self._sizes = sizes_of(world, self._simulation)
-        spec = world.controller
-        shape = Shape()
-        shape.n_sensors = spec.n_sensors
-        shape.n_context = spec.n_context
-        shape.n_inputs = spec.n_inputs
-        shape.n_outputs = spec.n_outputs
-        shape.n_slots = spec.max_hidden
-        shape.n_chunks = -(-spec.max_hidden // int(WIDE))
-        shape.weight_scale = spec.weight_scale
-        shape.bias = float(spec.bias)
-        self._shape = shape
         self._is_built = False
         self._workspace: _Workspace | None = None
 
     def build(self) -> Self:
-        """Compile and load the kernel, which the first launch does otherwise; return this rollout.
+        """Compile and load the kernels, which the first launch does otherwise; return this rollout.
 
         Raises:
             UsageError: the world's functions cannot be compiled; names file and line.
             EnvironmentFailure: the compiled kernel cannot be written.
         """
         if not self._is_built:
-            engine.build(self._kernel, self.device, self.lanes)
+            for kernel in (self._kernel, self._loading):
+                engine.build(kernel, self.device, self.lanes)
             self._is_built = True
         return self
 
     @property
     def kernel_hash(self) -> str:
-        """Sixteen hex digits that change with anything the kernel is made of."""
-        return engine.kernel_hash(self._kernel)
+        """Sixteen hex digits that change with anything the kernels are made of."""
+        return engine.kernel_hash(self._kernel, self._loading)
 
     def evaluate(
         self,
@@ -234,30 +240,39 @@ class Rollout:
         teams: npt.NDArray[np.int32],
         scenarios: Scenarios,
         heuristic: npt.NDArray[np.int32] | None = None,
+        rounds: int = 1,
     ) -> Outcome:
-        """Run every team in every scenario and return what happened.
+        """Run every team in every scenario of its round and return what happened.
 
         Args:
-            genes: pool of neuron genotypes [K, G], float32.
-            teams: pool rows of the neurons [N, R, U] (team, robot, slot), -1 for an empty slot.
-            scenarios: E scenarios of this world.
-            heuristic: [N, R], index of a heuristic controller of the world, -1 for the network.
+            genes: pool of genotypes [K, G], float32.
+            teams: pool rows of the parts [N, R, U] (team, robot, slot), -1 for an empty slot.
+            scenarios: E scenarios of this world for each round, one round after another.
+            heuristic: [N, R], index of a heuristic controller of the world, -1 for the robot's own.
+            rounds: the teams come in so many parts of equal length, each with its own scenarios.
 
         Raises:
             ValueError: shapes or rows that do not fit this world.
         """
         genes, teams, heuristic = self._checked(genes, teams, heuristic)
-        n_teams, e, r = len(teams), len(scenarios), self.world.n_robots
+        n_teams, r = len(teams), self.world.n_robots
+        e, odd = divmod(len(scenarios), rounds)
+        if odd or n_teams % rounds:
+            raise ValueError(f"{n_teams} teams, {len(scenarios)} scenarios: not {rounds} rounds")
         n_castes = len(self.world.castes)
         parts = []
         scene = self._scene(scenarios)
+        job = self._job(len(scenarios), e, n_teams // rounds)
         step = max(1, self._chunk // e)
+        pool = self._array(genes)
         for first in range(0, n_teams, step):
             some = slice(first, min(first + step, n_teams))
-            batch = self._batch((some.stop - some.start) * e)
-            job = self._job(genes, teams[some], heuristic[some], e)
-            self._launch(batch, scene, job, (some.stop - some.start) * e)
-            parts.append(self._collect(batch, some.stop - some.start, e))
+            n = some.stop - some.start
+            batch = self._batch(n * e, n)
+            job.first_team, job.heuristic = first, self._array(heuristic[some])
+            self._load(batch, pool, teams[some])
+            self._launch(batch, scene, job, n * e)
+            parts.append(self._collect(batch, n, e))
         joined = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
         return Outcome(
             fitness=joined["fitness"].reshape(n_teams, e, r),
@@ -281,36 +296,38 @@ class Rollout:
         The same kernel as ``evaluate``, launched one iteration at a time, so the same bits.
 
         Args:
-            genes: pool of neuron genotypes [K, G].
+            genes: pool of genotypes [K, G].
             team: pool rows [R, U].
             scenarios: exactly one scenario.
             heuristic: [R] or None.
 
         Returns:
             The world's recorded arrays, each [T, its size], and those it records at the end as they
-            are; ``inputs`` [T, R, sensors + context], of every iteration with the context that it
-            left; ``sums`` [T, R, outputs], weighted sums of the output units; ``performance``
-            [T, measures], each as if the epoch ended there.
+            are; ``inputs`` [T, R, S] and ``outputs`` [T, R, O] of every iteration; ``hidden``
+            [T, R, U], the activation of the part in each slot; ``performance`` [T, measures], each
+            as if the epoch ended there.
         """
         if len(scenarios) != 1:
             raise ValueError(f"record takes one scenario, got {len(scenarios)}")
         genes, teams, modes = self._checked(
             genes, team[None], None if heuristic is None else heuristic[None]
         )
-        scene, batch = self._scene(scenarios), self._batch(1)
-        job = self._job(genes, teams, modes, 1)
-        names = dict.fromkeys((*self._simulation.recorded, "performance"))
-        steps: dict[str, list[npt.NDArray[Any]]] = {name: [] for name in (*names, "inputs", "sums")}
+        scene, batch = self._scene(scenarios), self._batch(1, 1)
+        job = self._job(1, 1, 1)
+        job.heuristic = self._array(modes)
+        self._load(batch, self._array(genes), teams)
+        names = dict.fromkeys((*self._simulation.recorded, "performance", "inputs", "outputs"))
+        steps: dict[str, list[npt.NDArray[Any]]] = {name: [] for name in (*names, "hidden")}
         state, sizes, r = batch.state, self._sizes, self.world.n_robots
-        n_inputs, n_outputs = self._shape.n_inputs, self._shape.n_outputs
+        slots = self._mind.sizes[self._mind.probe]
         for t in range(self.world.params.iterations):
             job.t_begin, job.t_end = t, t + 1
             self._launch(batch, scene, job, 1)
             for name in names:
-                steps[name].append(getattr(state, name).numpy()[: sizes[name]].copy())
-            inputs = state.nets.inputs.numpy()[: r * n_inputs]
-            steps["inputs"].append(inputs.reshape(r, n_inputs).copy())
-            steps["sums"].append(state.nets.sums.numpy()[:r, :n_outputs].copy())
+                rows = r if name in ("inputs", "outputs") else sizes[name]
+                steps[name].append(getattr(state, name).numpy()[:rows].copy())
+            seen = getattr(batch.memory, self._mind.probe).numpy()[: r * slots].reshape(r, slots)
+            steps["hidden"].append(seen[:, : self.genome.max_parts].copy())
         final = {n: getattr(state, n).numpy() for n in self._simulation.recorded_at_end}
         return {name: np.stack(values) for name, values in steps.items()} | {
             name: values[: sizes[name]].copy() for name, values in final.items()
@@ -322,11 +339,11 @@ class Rollout:
         teams: npt.NDArray[np.int32],
         heuristic: npt.NDArray[np.int32] | None,
     ) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.int32], npt.NDArray[np.int32]]:
-        spec, r = self.world.controller, self.world.n_robots
-        if genes.ndim != 2 or genes.shape[1] != spec.n_genes:
-            raise ValueError(f"genes must be [K, {spec.n_genes}], got {list(genes.shape)}")
-        if teams.ndim != 3 or teams.shape[1:] != (r, spec.max_hidden):
-            raise ValueError(f"teams must be [N, {r}, {spec.max_hidden}], got {list(teams.shape)}")
+        genome, r = self.genome, self.world.n_robots
+        if genes.ndim != 2 or genes.shape[1] != genome.n_genes:
+            raise ValueError(f"genes must be [K, {genome.n_genes}], got {list(genes.shape)}")
+        if teams.ndim != 3 or teams.shape[1:] != (r, genome.max_parts):
+            raise ValueError(f"teams must be [N, {r}, {genome.max_parts}], got {list(teams.shape)}")
         if not len(teams):
             raise ValueError("teams must hold at least one team")
         if teams.min() < -1 or teams.max() >= len(genes):
@@ -359,53 +376,56 @@ class Rollout:
         values = np.ascontiguousarray(values)  # views are made from pointers: strides would be lost
         return wp.array(values, dtype=dtype, device=self.device, copy=self.device != "cpu")
 
-    def _job(
-        self,
-        genes: npt.NDArray[np.float32],
-        teams: npt.NDArray[np.int32],
-        heuristic: npt.NDArray[np.int32],
-        n_scenarios: int,
-    ) -> Any:
+    def _job(self, n_scenes: int, n_scenarios: int, teams_per_round: int) -> Any:
         job = Job()
-        job.shape = self._shape
-        job.genes = self._array(genes)
-        job.slots = self._array(teams)
-        job.heuristic = self._array(heuristic)
         job.n_scenarios = n_scenarios
+        job.n_scenes = n_scenes
         job.n_robots = self.world.n_robots
+        job.first_team = 0
+        job.teams_per_round = teams_per_round
         job.t_begin, job.t_end = 0, self.world.params.iterations
         return job
 
-    def _batch(self, n: int) -> _Workspace:
-        """Return a workspace of at least n worlds."""
-        if self._workspace is None or self._workspace.n < n:
-            r, chunks = self.world.n_robots, self._shape.n_chunks
-            state = self._simulation.state()
+    def _batch(self, n_worlds: int, n_teams: int) -> _Workspace:
+        """Return a workspace of at least so many worlds and teams."""
+        had = self._workspace
+        if had is None or had.n_worlds < n_worlds or had.n_teams < n_teams:
+            if had is not None:
+                n_worlds, n_teams = max(n_worlds, had.n_worlds), max(n_teams, had.n_teams)
+            self._workspace = None  # frees what was there before more is taken
+            r, mind = self.world.n_robots, self._mind
+            state, memory, weights = self._simulation.state(), mind.memory(), mind.weights()
             for name, size in self._sizes.items():
-                dtype = self._simulation.state.vars[name].type.dtype
-                setattr(state, name, wp.zeros(n * size, dtype=dtype, device=self.device))
-            nets = state.nets
-            slots = chunks * int(WIDE)
-            zeros = {"device": self.device}
-            nets.w_in = wp.zeros(n * r * chunks * self._shape.n_inputs, dtype=wide_vector, **zeros)
-            nets.w_out = wp.zeros(n * r * slots, dtype=out_vector, **zeros)
-            nets.filled = wp.zeros(n * r * chunks, dtype=wide_vector, **zeros)
-            nets.n_used = wp.zeros(n * r, dtype=int, **zeros)
-            nets.inputs = wp.zeros(n * r * self._shape.n_inputs, dtype=float, **zeros)
-            nets.sums = wp.zeros(n * r, dtype=out_vector, **zeros)
-            self._workspace = _Workspace(n, state)
+                wide = {"inputs": len(self.world.inputs), "outputs": len(self.world.outputs)}
+                shape = (n_worlds * r, wide[name]) if name in wide else n_worlds * size
+                setattr(state, name, self._zeros(shape, self._simulation.state, name))
+            for name in mind.memory.vars:
+                size = n_worlds * r * mind.sizes[name]
+                setattr(memory, name, self._zeros(size, mind.memory, name))
+            for name in mind.weights.vars:
+                size = n_teams * r * mind.sizes[name]
+                setattr(weights, name, self._zeros(size, mind.weights, name))
+            self._workspace = _Workspace(n_worlds, n_teams, state, memory, weights)
+        assert self._workspace is not None
         return self._workspace
 
+    def _zeros(self, shape: Any, struct: Any, name: str) -> Any:
+        return wp.zeros(shape, dtype=struct.vars[name].type.dtype, device=self.device)
+
+    def _load(self, batch: _Workspace, pool: Any, teams: npt.NDArray[np.int32]) -> None:
+        """Build the controllers of some teams."""
+        inputs = [batch.weights, self._mind.shape, pool, self._array(teams), batch.n_teams]
+        self._run(self._loading, len(teams), inputs)
+
     def _launch(self, batch: _Workspace, scene: Any, job: Any, n: int) -> None:
+        job.n_worlds, job.n_teams = batch.n_worlds, batch.n_teams
+        brains = (batch.weights, batch.memory, self._mind.shape)
+        self._run(self._kernel, n, [batch.state, scene, self._simulation.params, *brains, job])
+
+    def _run(self, kernel: Any, n: int, inputs: list[Any]) -> None:
         self.build()
-        job.n_worlds = batch.n
         engine.launch(
-            self._kernel,
-            n,
-            [batch.state, scene, self._simulation.params, job],
-            device=self.device,
-            n_threads=self.n_threads,
-            lanes=self.lanes,
+            kernel, n, inputs, device=self.device, n_threads=self.n_threads, lanes=self.lanes
         )
 
     def _collect(self, batch: _Workspace, n_teams: int, e: int) -> dict[str, npt.NDArray[Any]]:

@@ -44,14 +44,13 @@ import numpy as np
 import numpy.typing as npt
 from annotated_types import Ge, Gt, Le
 
-from conevo.controllers import ControllerSpec
 from conevo.kernels.geometry import COVER_WORDS
 from conevo.parameters import parameters
 from conevo.rng import stream
 from conevo.worlds import canals, rocks
 from conevo.worlds.measures import Measure
 from conevo.worlds.places import draw_places
-from conevo.worlds.protocol import Scenarios, Simulation, kernel_params
+from conevo.worlds.protocol import Scenarios, Simulation, kernel_params, names_of
 from conevo.worlds.rover_dynamics import FUNCTIONS, ROCK_CELLS, Params, Scene, Team
 
 __all__ = ["RoverParams", "RoverScenarios", "RoverWorld"]
@@ -110,10 +109,6 @@ class RoverParams:
     """(side) a rover may not come closer than this to another."""
     fitness: Literal["eq_5_4", "value_times_area"] = "eq_5_4"
     """what a rover is credited with: eq. 5.4, or value times area."""
-    n_hidden: Annotated[int, Ge(2), Le(16)] = 10
-    """(neurons) hidden neurons of a controller at the start."""
-    max_hidden: Annotated[int, Ge(2), Le(32)] = 20  # Choice: twice the initial number
-    """(neurons) hidden neurons a controller can grow to."""
 
     @property
     def ranges(self) -> tuple[float, float, float]:
@@ -164,6 +159,10 @@ class RoverWorld:
     params: RoverParams = field(default_factory=RoverParams)
 
     name: ClassVar[str] = "rover-v1"
+    inputs: ClassVar[tuple[str, ...]] = names_of(("rovers", "red rocks"), 8)
+    outputs: ClassVar[tuple[str, ...]] = ("low", "med", "hi", "move: dx", "move: dy")
+    # Section 5.2. Choice: controllers can grow to twice the initial number.
+    controller: ClassVar[dict[str, Any]] = {"n_hidden": 10, "max_hidden": 20}
     actions: ClassVar[tuple[str, ...]] = ("low", "med", "hi", "move")
     castes: ClassVar[tuple[str, ...]] = actions
     performance: ClassVar[tuple[Measure, ...]] = (
@@ -182,16 +181,6 @@ class RoverWorld:
     def n_robots(self) -> int:
         """Number of rovers."""
         return self.params.n_robots
-
-    @property
-    def controller(self) -> ControllerSpec:
-        """The rover's network (section 5.2)."""
-        return ControllerSpec(
-            n_sensors=16,
-            n_hidden=self.params.n_hidden,
-            n_outputs=5,
-            max_hidden=self.params.max_hidden,
-        )
 
     def scenarios(self, keys: Sequence[int]) -> RoverScenarios:
         """Return one scenario per key: rock sites and types, starts outside canals, lander."""

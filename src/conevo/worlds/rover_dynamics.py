@@ -11,7 +11,7 @@ import warp as wp
 
 from conevo.kernels.actions import NONE, begin_counting, count_action, heuristic_action
 from conevo.kernels.geometry import COVER_CELLS, COVER_WORDS, cover_disc, covered_by_any, octant
-from conevo.kernels.network import Networks, first_input, highest
+from conevo.kernels.outputs import highest
 from conevo.kernels.random import uniform
 from conevo.kernels.sensing import closest_in_octants, is_marked, mark
 from conevo.kernels.steps import is_taken, random_step, steered_step
@@ -76,7 +76,8 @@ class Scene:
 class Team:
     """State of a team, flat over a batch. R robots, K rocks."""
 
-    nets: Networks
+    inputs: wp.array2d[float]  # [R, 16]
+    outputs: wp.array2d[float]  # [R, 5]
     x: wp.array[float]
     y: wp.array[float]
     to_x: wp.array[float]
@@ -136,11 +137,10 @@ def sense(team: Team, scene: Scene, p: Params, i: int, t: int) -> None:
     """
     if team.energy[i] <= 0.0:
         return
-    base = first_input(team.nets, i)
     x = team.x[i]
     y = team.y[i]
     for k in range(16):
-        team.nets.inputs[base + k] = 0.0
+        team.inputs[i, k] = 0.0
     near = wp.uint64(0)
     j = int(0)
     while j < p.n_robots:
@@ -158,7 +158,7 @@ def sense(team: Team, scene: Scene, p: Params, i: int, t: int) -> None:
                 dy = team.y[j] - y
                 d2 = wp.max(dx * dx + dy * dy, p.min_distance_2)
                 setting = float(team.setting[j] + 1)
-                team.nets.inputs[base + o] = setting * p.min_distance_2 / (3.0 * d2)
+                team.inputs[i, o] = setting * p.min_distance_2 / (3.0 * d2)
     a = team.action[i]
     if a != NONE and a < MOVE:
         r = p.ranges[a]
@@ -183,7 +183,7 @@ def sense(team: Team, scene: Scene, p: Params, i: int, t: int) -> None:
                 k += 1
             row += 1
         for o in range(8):
-            team.nets.inputs[base + 8 + o] = z[o] / (1.0 + z[o])
+            team.inputs[i, 8 + o] = z[o] / (1.0 + z[o])
 
 
 # --- act ------------------------------------------------------------------------------------------
@@ -219,10 +219,9 @@ def act(team: Team, scene: Scene, p: Params, i: int, t: int) -> None:
         a = heuristic_action(uniform(scene.seed[0], t, HEURISTIC, i), own, MOVE, N_ACTIONS)
         step = random_step(uniform(scene.seed[0], t, HEURISTIC + 1, i), p.move_range)
     else:
-        a = wp.min(highest(team.nets, i, 5), MOVE)  # outputs 3 and 4: move
+        a = wp.min(highest(team.outputs, i, 5), MOVE)  # outputs 3 and 4: move
         if a == MOVE:
-            sums = team.nets.sums[i]
-            step = steered_step(sums[3], sums[4], p.move_range)
+            step = steered_step(team.outputs[i, 3], team.outputs[i, 4], p.move_range)
     team.chosen[i] = a
     if a == MOVE:
         x = team.x[i] + step[0]

@@ -14,15 +14,13 @@ import numpy.typing as npt
 import warp as wp
 
 from conevo.kernels import engine
-from conevo.kernels.network import OUT, load, think
 from conevo.worlds.contract import PHASES
 from conevo.worlds.protocol import Scenarios, World
 from conevo.worlds.rollout import Job, Rollout
 
 __all__ = ["STEPS", "Stepper"]
 
-# In a rollout each robot senses, thinks and acts before the next does: "act" is all three.
-STEPS = ("reset", "act", "commit", "settle", "resolve", "outcome", "sense")
+STEPS = ("reset", "sense", "think", "act", "commit", "settle", "resolve", "outcome")
 Order = npt.NDArray[np.int32]
 Arrays = dict[str, npt.NDArray[Any]]
 
@@ -32,6 +30,11 @@ def _stepping_kernel(
     State: Any,
     Scene: Any,
     Params: Any,
+    Weights: Any,
+    Memory: Any,
+    Shape: Any,
+    clear: Any,
+    think: Any,
     reset: Any,
     sense: Any,
     act: Any,
@@ -40,50 +43,48 @@ def _stepping_kernel(
     outcome: Any,
     settle: Any,
 ) -> Any:
-    view_team, view_scene = engine.view_of(State), engine.view_of(Scene)
-    if settle is None:
-
-        @wp.func
-        def settle(team: State, scene: Scene, p: Params, t: int) -> None:
-            """Settle nothing."""
-
+    view_team, view_scene = engine.view_of(State), engine.view_of(Scene, has_shared=True)
+    view_weights, view_memory = engine.view_of(Weights), engine.view_of(Memory)
+    settles = settle is not None
     checked = engine.options | {"mode": "debug"}
 
     @wp.kernel(module="unique", module_options=checked, grid_stride=False)
     def step(
-        batch: State, scenes: Scene, p: Params, job: Job, order: wp.array2d[int], phase: int,
-        t: int, unused: float,
+        batch: State, scenes: Scene, p: Params, brains: Weights, memories: Memory, shape: Shape,
+        job: Job, order: wp.array2d[int], phase: int, t: int,
     ) -> None:  # fmt: skip
         b = wp.tid()
         n = b // job.n_scenarios
         team = view_team(batch, b, job.n_worlds)
         scene = view_scene(scenes, b % job.n_scenarios, job.n_scenarios)
-        if phase == 3:
-            settle(team, scene, p, t)
-        if phase == 5:
+        weights = view_weights(brains, n, job.n_teams)
+        memory = view_memory(memories, b, job.n_worlds)
+        if wp.static(settles):
+            if phase == 5:
+                settle(team, scene, p, t)
+        if phase == 7:
             outcome(team, scene, p, t + 1)
         for k in range(order.shape[1]):
             i = order[b, k]
             if i >= 0:
                 if phase == 0:
                     reset(team, scene, p, i)
-                    load(team.nets, job.shape, i, job.genes, job.slots, n)
+                    clear(memory, shape, i)
+                    for j in range(team.inputs.shape[1]):
+                        team.inputs[i, j] = 0.0
+                    for j in range(team.outputs.shape[1]):
+                        team.outputs[i, j] = 0.0
                     team.heuristic[i] = job.heuristic[n, i]
                 if phase == 1:
                     sense(team, scene, p, i, t)
-                    if team.heuristic[i] < 0:
-                        think(team.nets, job.shape, i)
-                        sums = team.nets.sums[i]
-                        for o in range(job.shape.n_outputs, OUT):
-                            sums[o] = unused
-                        team.nets.sums[i] = sums
+                if phase == 2 and team.heuristic[i] < 0:
+                    think(weights, memory, shape, team.inputs, team.outputs, i)
+                if phase == 3:
                     act(team, scene, p, i, t)
-                if phase == 2:
-                    commit(team, scene, p, i, t)
                 if phase == 4:
-                    resolve(team, scene, p, i, t)
+                    commit(team, scene, p, i, t)
                 if phase == 6:
-                    sense(team, scene, p, i, t)
+                    resolve(team, scene, p, i, t)
 
     return step
 
@@ -97,8 +98,6 @@ class Stepper(Rollout):
         teams: pool rows of the neurons [N, R, U].
         scenarios: E scenarios.
         heuristic: [N, R], -1 for the network.
-        unused: what the output sums beyond those of the controller are set to; by default what they
-            are in a rollout.
     """
 
     def __init__(
@@ -108,23 +107,24 @@ class Stepper(Rollout):
         teams: npt.NDArray[np.int32],
         scenarios: Scenarios,
         heuristic: npt.NDArray[np.int32],
-        unused: float | None = None,
     ) -> None:
         super().__init__(world, n_threads=1)
-        sim, functions = self._simulation, self._simulation.functions
+        sim, functions, mind = self._simulation, self._simulation.functions, self._mind
         with engine.building:
             self._kernel = _stepping_kernel(
                 *(sim.state, sim.scene, sim.params_type),
+                *(mind.weights, mind.memory, mind.shape_type, mind.clear, mind.think),
                 *(functions[name] for name in PHASES),
                 functions.get("settle"),
             )
         self.n_worlds = len(teams) * len(scenarios)
         self._scenes = self._scene(scenarios)
-        self._task = self._job(*self._checked(genes, teams, heuristic), len(scenarios))
-        self._state = self._batch(self.n_worlds).state
-        self._task.n_worlds = self.n_worlds
-        self._unused = self._shape.bias if unused is None else unused
-        self.build()
+        genes, teams, heuristic = self._checked(genes, teams, heuristic)
+        self._task = self._job(len(scenarios), len(scenarios), len(teams))
+        self._task.heuristic = self._array(heuristic)
+        self._task.n_worlds, self._task.n_teams = self.n_worlds, len(teams)
+        self._epochs = self._batch(self.n_worlds, len(teams))
+        self._load(self._epochs, self._array(genes), teams)
 
     @property
     def natural(self) -> Order:
@@ -140,27 +140,29 @@ class Stepper(Rollout):
             order: [B, R] robots in the order in which they are visited, -1 for none.
             t: the iteration.
         """
-        arguments = [self._state, self._scenes, self._simulation.params, self._task]
+        batch, mind = self._epochs, self._mind
+        arguments = [batch.state, self._scenes, self._simulation.params]
+        arguments += [batch.weights, batch.memory, mind.shape, self._task]
         seen = wp.array(np.ascontiguousarray(order), dtype=int, device="cpu")
-        more = [seen, STEPS.index(name), t, self._unused]
+        more = [seen, STEPS.index(name), t]
         wp.launch(self._kernel, dim=self.n_worlds, inputs=[*arguments, *more], device="cpu")
 
     def arrays(self) -> Arrays:
         """Return the state, each array [B, its size]: what is written there, the next step sees.
 
-        ``inputs`` and ``sums`` are those of the networks, [B, R, inputs] and [B, R, 8].
+        ``inputs`` [B, R, S] and ``outputs`` [B, R, O] are what controllers read and write.
         """
         n, r = self.n_worlds, self.world.n_robots
-        seen = {name: getattr(self._state, name).numpy().reshape(n, -1) for name in self._sizes}
-        nets = self._state.nets
-        seen["inputs"] = nets.inputs.numpy().reshape(n, r, -1)
-        seen["sums"] = nets.sums.numpy().reshape(n, r, -1)
+        state = self._epochs.state
+        seen = {name: getattr(state, name).numpy().reshape(n, -1) for name in self._sizes}
+        for name in ("inputs", "outputs"):
+            seen[name] = getattr(state, name).numpy().reshape(n, r, -1)
         return seen
 
     def epoch(self, iterations: int) -> Iterator[tuple[str, int]]:
         """Yield the steps of an epoch, in turn, with their iterations."""
         yield "reset", 0
-        middle = [s for s in STEPS[1:5] if s != "settle" or s in self._simulation.functions]
+        middle = [s for s in STEPS[1:7] if s != "settle" or s in self._simulation.functions]
         for t in range(iterations):
             for name in middle:
                 yield name, t

@@ -1,8 +1,7 @@
 """Epochs of a world run step by step in several forms at once, and what that shows.
 
 The same teams play in the order of a rollout, with robots visited in reverse and in random order,
-with other numbers in output sums that the controller does not have, and in memory that another
-epoch has used. All of them must agree, bit for bit, after each step.
+and in memory that another epoch has used. All of them must agree, bit for bit, after each step.
 """
 
 from collections.abc import Iterator
@@ -10,7 +9,6 @@ from collections.abc import Iterator
 import numpy as np
 import numpy.typing as npt
 
-from conevo.kernels.network import OUT
 from conevo.rng import stream
 from conevo.worlds.measures import measures_of
 from conevo.worlds.protocol import Scenarios, World
@@ -19,7 +17,6 @@ from conevo.worlds.stepping import Arrays, Order, Stepper
 __all__ = ["Trial"]
 
 SENTINEL = np.full(1, -7.7712321e-19, np.float32)  # no result: what still holds it was not written
-UNUSED = 40.0  # in place of output sums that the controller does not have
 RESULTS = ("fitness", "counts", "switches", "performance")
 Seen = tuple[str, list[str], str]  # topic, problems, what is said if there are none
 
@@ -53,7 +50,6 @@ class Trial:
         self.n_worlds = self.plain.n_worlds
         self._simulation = world.simulation()
         self._order: list[str] = []
-        self._outputs: list[str] = []
         self._sensors: list[str] = []
         self._counts: list[str] = []
         self._executed = np.zeros((self.n_worlds, world.n_robots, len(world.actions)), int)
@@ -65,13 +61,11 @@ class Trial:
         plain, iterations = self.plain, self.world.params.iterations
         robots = stream(1, "check", "order")
         others = {"reverse": Stepper(*self._task), "random": Stepper(*self._task)}
-        if self.world.controller.n_outputs < int(OUT):
-            others["unused"] = Stepper(*self._task, unused=UNUSED)
         for name in ("fitness", "performance"):
             for stepper in (plain, *others.values()):
                 stepper.arrays()[name][:] = SENTINEL
         for step, t in plain.epoch(iterations):
-            if step == "act" and t in (0, 1, iterations // 2):
+            if step == "sense" and t in (0, 1, iterations // 2):
                 self._look_at_sensors(t)
             before = {name: values.copy() for name, values in plain.arrays().items()}
             plain.step(step, plain.natural, t)
@@ -84,9 +78,7 @@ class Trial:
                 stepper.step(step, order, t)
                 if found := _differences(plain.arrays(), stepper.arrays()):
                     del others[kind]
-                    if kind == "unused":
-                        self._explain_outputs(step, found)
-                    elif not self._order:
+                    if not self._order:
                         self._explain_order(step, t, found, before)
             if step == "resolve":
                 self._count(plain.arrays()["action"])
@@ -106,47 +98,33 @@ class Trial:
         """Run "sense" alone, robot by robot, on inputs that hold what nobody writes."""
         if self._sensors:
             return
-        spec, arrays = self.world.controller, self.plain.arrays()
+        arrays, names = self.plain.arrays(), self.world.inputs
         kept = {name: values.copy() for name, values in arrays.items()}
         mark = SENTINEL.view(np.uint32)[0]
         plays = np.repeat(self._heuristic < 0, self.n_worlds // self._n_teams, axis=0)
-        written = np.zeros((self.world.n_robots, spec.n_sensors), bool)
+        written = np.zeros((self.world.n_robots, len(names)), bool)
         for i in range(self.world.n_robots):
             arrays["inputs"][:] = SENTINEL
             self.plain.step("sense", _only(self.plain.natural, i), t)
             seen = (arrays["inputs"].view(np.uint32) != mark)[plays[:, i]]
-            written[i] = seen[:, i, : spec.n_sensors].any(axis=0)
-            seen[:, i, : spec.n_sensors] = False
+            written[i] = seen[:, i].any(axis=0)
+            seen[:, i] = False
             if seen.any():
-                _, robot, k = (int(x[0]) for x in np.nonzero(seen))
-                which = f"input {k}" if robot == i else f"inputs of robot {robot}"
-                self._sensors.append(
-                    f"sense writes {which} for robot {i}; with n_sensors = {spec.n_sensors} a "
-                    f"robot's sensors are its inputs 0 to {spec.n_sensors - 1}"
-                )
+                _, robot, _ = (int(x[0]) for x in np.nonzero(seen))
+                self._sensors.append(f"sense writes inputs of robot {robot} for robot {i}")
                 break
             for name, values in arrays.items():
                 values[:] = kept[name]
         for name, values in arrays.items():
             values[:] = kept[name]
         if missing := [] if self._sensors else np.flatnonzero(~written.any(axis=0)).tolist():
-            names = ", ".join(map(str, missing))
-            self._sensors.append(
-                f"sense never writes sensor {names}, but n_sensors = {spec.n_sensors}"
-            )
-
-    def _explain_outputs(self, step: str, names: list[str]) -> None:
-        n = self.world.controller.n_outputs
-        self._outputs.append(
-            f"{step} uses outputs that the controller does not have ({', '.join(names)} change "
-            f"with them): with n_outputs = {n} they are 0 to {n - 1}"
-        )
+            which = ", ".join(f"{k} ({names[k]})" for k in missing)
+            self._sensors.append(f"sense never writes input {which}")
 
     def _explain_order(self, step: str, t: int, names: list[str], before: Arrays) -> None:
         """Say which step depends on the order of robots, and who writes what is not its own."""
-        phase = "sense or act" if step == "act" else step
         text = (
-            f"{phase} gives other results if robots are visited in another order "
+            f"{step} gives other results if robots are visited in another order "
             f"({', '.join(f'`{name}`' for name in names)} differ in iteration {t})"
         )
         probe, r = Stepper(*self._task), self.world.n_robots
@@ -184,9 +162,8 @@ class Trial:
 
     def seen(self) -> Iterator[Seen]:
         """Yield topics with what is wrong, after the run."""
-        spec = self.world.controller
-        yield "sensors", self._sensors, f"all {spec.n_sensors} are written, and nothing else"
-        yield "outputs", self._outputs, f"none beyond the {spec.n_outputs} is used"
+        n = len(self.world.inputs)
+        yield "sensors", self._sensors, f"all {n} inputs are written, and nothing else"
         yield "values", list(self._of_values()), "fitness and performance are written and finite"
         done = np.asarray(self._executed.any(axis=(0, 1)))
         idle = ", ".join(name for a, name in enumerate(self.world.actions) if not done[a])
@@ -262,6 +239,6 @@ def _only(order: Order, i: int) -> Order:
 
 
 def _differences(a: Arrays, b: Arrays) -> list[str]:
-    """Return the names of the arrays that differ, output sums left out."""
-    bits = ((n, a[n].view(np.uint8), b[n].view(np.uint8)) for n in a if n != "sums")
+    """Return the names of the arrays that differ."""
+    bits = ((n, a[n].view(np.uint8), b[n].view(np.uint8)) for n in a)
     return [name for name, one, other in bits if not np.array_equal(one, other)]

@@ -1,0 +1,122 @@
+"""The controllers by name. Reading names, titles and summaries loads neither numpy nor Warp."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, cast
+
+from conevo.errors import UsageError, unknown_name
+
+if TYPE_CHECKING:
+    from conevo.controllers.base import Controller, Genome
+
+__all__ = [
+    "CONTROLLERS",
+    "DEFAULT",
+    "ControllerEntry",
+    "controller",
+    "find",
+    "genome_of",
+    "refuse_misfit",
+    "suggested",
+]
+
+DEFAULT = "srn"
+
+
+@dataclass(frozen=True)
+class ControllerEntry:
+    """One kind of controller.
+
+    Attributes:
+        name: how it is asked for.
+        title: its name as published.
+        summary: one line on what it is.
+        source: where it is described.
+        target: "module:Class" below this package, loaded when needed.
+    """
+
+    name: str
+    title: str
+    summary: str
+    source: str
+    target: str
+
+    @property
+    def settings_class(self) -> type[Any]:
+        """The frozen dataclass of its settings, which is the controller."""
+        module, _, name = self.target.partition(":")
+        return cast("type[Any]", getattr(import_module(f"conevo.controllers.{module}"), name))
+
+
+CONTROLLERS: dict[str, ControllerEntry] = {
+    entry.name: entry
+    for entry in (
+        ControllerEntry(
+            "srn",
+            "Simple recurrent network",
+            "one hidden layer that sees its own activations of the iteration before",
+            "Elman 1990; Nitschke 2009, sections 3.1, 4.1, 5.2, 6.2.7",
+            "srn:Srn",
+        ),
+    )
+}
+
+
+def find(name: str) -> ControllerEntry:
+    """Return the entry of a name.
+
+    Raises:
+        UsageError: there is none.
+    """
+    if name not in CONTROLLERS:
+        raise unknown_name("controller", name, CONTROLLERS)
+    return CONTROLLERS[name]
+
+
+def suggested(name: str, world: Any) -> dict[str, Any]:
+    """Return a world's settings of its robots' controllers, of those that a controller has.
+
+    Args:
+        name: of the controller.
+        world: a world or its class, whose ``controller`` holds them.
+    """
+    known = {field.name for field in fields(find(name).settings_class)}
+    settings: Mapping[str, Any] = world.controller
+    return {key: value for key, value in settings.items() if key in known}
+
+
+def controller(name: str = DEFAULT, world: Any = None, **settings: Any) -> Controller:
+    """Return a controller, for example ``controller("srn", n_hidden=4)``.
+
+    Args:
+        name: one of ``CONTROLLERS``.
+        world: whose settings hold where ``settings`` has none.
+        settings: fields of the controller that differ from their defaults.
+
+    Raises:
+        UsageError: an unknown name, an unknown field, or a value out of bounds.
+    """
+    found = find(name).settings_class
+    known = {field.name for field in fields(found)}
+    for key in settings:
+        if key not in known:
+            raise unknown_name("setting", key, known, f"of controller {name!r}")
+    base = {} if world is None else suggested(name, world)
+    return cast("Controller", found(**base | settings))
+
+
+def genome_of(controller: Controller, world: Any) -> Genome:
+    """Return what a world's controllers are built from."""
+    return controller.genome(len(world.inputs), len(world.outputs))
+
+
+def refuse_misfit(controller: Controller, world: Any) -> None:
+    """Raise UsageError if a controller does not fit a world's inputs and outputs."""
+    if len(world.outputs) > controller.max_outputs:
+        raise UsageError(
+            f"controller {controller.name!r} has at most {controller.max_outputs} outputs, and "
+            f"{world.name} has {len(world.outputs)}"
+        )

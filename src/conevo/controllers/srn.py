@@ -1,0 +1,256 @@
+"""A simple recurrent (Elman) network built from neuron genotypes: the thesis' controller.
+
+Nitschke 2009, sections 3.1, 4.1, 5.2 and 6.2.7. One hidden layer of sigmoid units sees the inputs
+and the hidden layer's own activations of the iteration before. A genotype is one hidden neuron: its
+input weights (inputs, then context) followed by its output weights. A connection weight is
+``weight_scale`` times its gene.
+
+Choice: the context keeps the *initial* number of hidden units. Hidden neurons live in numbered
+slots; slot k < n_hidden feeds context input k; an empty slot feeds 0; slots from n_hidden on feed
+no context. So all genotypes of a world have the same length and recombination between populations
+is always defined (the thesis fixes the inputs while the hidden layer changes).
+
+The shape is data (``Shape``), so one compiled kernel serves every size of network a world can have.
+Hidden slots are computed ``WIDE`` at a time.
+"""
+
+from typing import Annotated, ClassVar
+
+import numpy as np
+import warp as wp
+from annotated_types import Ge, Gt, Le
+
+from conevo.controllers.base import Bools, Floats, Genome, Mind
+from conevo.errors import UsageError
+from conevo.kernels.outputs import sigmoid, sigmoid_of
+from conevo.parameters import parameters
+
+__all__ = ["Srn"]
+
+WIDE = wp.constant(16)
+OUT = wp.constant(8)
+wide_vector = wp.types.vector(length=16, dtype=float)
+out_vector = wp.types.vector(length=8, dtype=float)
+
+
+@wp.struct
+class Shape:
+    """Sizes of a network as the kernels need them."""
+
+    n_sensors: int
+    n_context: int
+    n_inputs: int
+    n_outputs: int
+    n_slots: int
+    n_chunks: int
+    weight_scale: float
+    bias: float
+
+
+@wp.struct
+class Weights:
+    """Weights of a team's networks (or, flat, of a batch of teams).
+
+    w_in [R, chunks, inputs] of 16 slots; w_out [R, slots] of 8 outputs; filled [R, chunks] of 16
+    slots, 1 where a slot holds a neuron; n_used [R], one above the last filled slot.
+    """
+
+    w_in: wp.array[wide_vector]
+    w_out: wp.array[out_vector]
+    filled: wp.array[wide_vector]
+    n_used: wp.array[int]
+
+
+@wp.struct
+class Memory:
+    """Activations of a team's hidden neurons [R, chunks * 16], 0 in empty slots."""
+
+    hidden: wp.array[float]
+
+
+@wp.func
+def load(
+    weights: Weights,
+    shape: Shape,
+    i: int,
+    genes: wp.array2d[float],
+    rows: wp.array3d[int],
+    n: int,
+) -> None:
+    """Build robot ``i``'s network from neuron genotypes; see ``controllers.base.Mind``."""
+    used = int(0)
+    for chunk in range(shape.n_chunks):
+        filled = wide_vector()
+        for k in range(WIDE):
+            slot = chunk * WIDE + k
+            row = int(-1)
+            if slot < shape.n_slots:
+                row = rows[n, i, slot]
+            out = out_vector()
+            if row >= 0:
+                used = slot + 1
+                filled[k] = 1.0
+                for o in range(shape.n_outputs):
+                    out[o] = shape.weight_scale * genes[row, shape.n_inputs + o]
+            weights.w_out[(i * shape.n_chunks + chunk) * WIDE + k] = out
+        weights.filled[i * shape.n_chunks + chunk] = filled
+        for j in range(shape.n_inputs):
+            w = wide_vector()
+            for k in range(WIDE):
+                slot = chunk * WIDE + k
+                if filled[k] > 0.0:
+                    w[k] = shape.weight_scale * genes[rows[n, i, slot], j]
+            weights.w_in[(i * shape.n_chunks + chunk) * shape.n_inputs + j] = w
+    weights.n_used[i] = used
+
+
+@wp.func
+def clear(memory: Memory, shape: Shape, i: int) -> None:
+    """Let robot ``i`` remember nothing."""
+    slots = shape.n_chunks * WIDE
+    for k in range(slots):
+        memory.hidden[i * slots + k] = 0.0
+
+
+@wp.func
+def think(
+    weights: Weights,
+    memory: Memory,
+    shape: Shape,
+    inputs: wp.array2d[float],
+    outputs: wp.array2d[float],
+    i: int,
+) -> None:
+    """Run robot ``i``'s network once: inputs to output sums, hidden activations to next context.
+
+    An output is the weighted sum of its unit: the highest sum is the highest activation, exactly
+    even where several activations are 1 to the last bit. An empty slot neither contributes to an
+    output nor feeds the context.
+    """
+    hidden = i * shape.n_chunks * WIDE
+    used = weights.n_used[i]
+    first = wide_vector()
+    out = out_vector()
+    for k in range(OUT):
+        out[k] = shape.bias
+    for chunk in range((used + WIDE - 1) // WIDE):
+        c = i * shape.n_chunks + chunk
+        h = wide_vector()
+        for k in range(WIDE):
+            h[k] = shape.bias
+        w = c * shape.n_inputs
+        j = int(0)
+        while j < shape.n_sensors:  # not range: see worlds.rover_dynamics
+            h += weights.w_in[w + j] * inputs[i, j]
+            j += 1
+        w += shape.n_sensors
+        j = int(0)
+        while j < shape.n_context:
+            h += weights.w_in[w + j] * memory.hidden[hidden + j]
+            j += 1
+        for k in range(WIDE):
+            h[k] = sigmoid(h[k])
+        h = wp.cw_mul(h, weights.filled[c])
+        k = int(0)
+        while k < wp.min(used - chunk * WIDE, WIDE):
+            out += weights.w_out[c * WIDE + k] * h[k]
+            k += 1
+        if chunk == 0:
+            first = h
+        else:
+            for k in range(WIDE):
+                memory.hidden[hidden + chunk * WIDE + k] = h[k]
+    # Written only now: every chunk must read the context of the previous iteration.
+    for k in range(WIDE):
+        memory.hidden[hidden + k] = first[k]
+    for o in range(shape.n_outputs):
+        outputs[i, o] = out[o]
+
+
+@parameters("controller")
+class Srn:
+    """Settings of a simple recurrent network; see the module.
+
+    Attributes:
+        n_hidden (neurons): hidden neurons at the start, and context inputs.
+        max_hidden (neurons): hidden neurons that it can grow to.
+        recurrent: whether it has context inputs; without it is feed-forward.
+        bias: whether hidden and output units have a bias, of weight 1 and not evolved.
+        weight_scale: connection weight of gene 1 (tables 4.3, 5.5, 6.5: weights in [-10, 10]).
+
+    Raises:
+        UsageError: fewer slots than neurons at the start.
+    """
+
+    n_hidden: Annotated[int, Ge(1), Le(16)] = 10
+    max_hidden: Annotated[int, Ge(1), Le(32)] = 20
+    recurrent: bool = True
+    bias: bool = False
+    weight_scale: Annotated[float, Gt(0), Le(1000)] = 10.0
+
+    name: ClassVar[str] = "srn"
+    max_outputs: ClassVar[int] = 8
+    n_memory: ClassVar[int] = 1
+
+    def __post_init__(self) -> None:
+        if self.max_hidden < self.n_hidden:
+            raise UsageError(
+                f"controller.max_hidden ({self.max_hidden}) must not be below n_hidden "
+                f"({self.n_hidden})"
+            )
+
+    @property
+    def n_context(self) -> int:
+        """Number of context inputs: the initial number of hidden units, 0 if feed-forward."""
+        return self.n_hidden if self.recurrent else 0
+
+    def genome(self, n_inputs: int, n_outputs: int) -> Genome:
+        """Return what a network is built from: hidden neurons."""
+        return Genome(self.n_hidden, self.max_hidden, n_inputs + self.n_context + n_outputs)
+
+    def mind(self, n_inputs: int, n_outputs: int) -> Mind:
+        """Return the Warp side."""
+        shape = Shape()
+        shape.n_sensors = n_inputs
+        shape.n_context = self.n_context
+        shape.n_inputs = n_inputs + self.n_context
+        shape.n_outputs = n_outputs
+        shape.n_slots = self.max_hidden
+        shape.n_chunks = chunks = -(-self.max_hidden // int(WIDE))
+        shape.weight_scale = self.weight_scale
+        shape.bias = float(self.bias)
+        slots = chunks * int(WIDE)
+        return Mind(
+            weights=Weights,
+            memory=Memory,
+            shape=shape,
+            shape_type=Shape,
+            sizes={
+                "w_in": chunks * shape.n_inputs,
+                "w_out": slots,
+                "filled": chunks,
+                "n_used": 1,
+                "hidden": slots,
+            },
+            load=load,
+            clear=clear,
+            think=think,
+            probe="hidden",
+        )
+
+    def forward(
+        self, genes: Floats, active: Bools, memory: Floats, inputs: Floats, n_outputs: int
+    ) -> tuple[Floats, Floats]:
+        """Run robots' networks once; see ``controllers.base.Controller``."""
+        weights = np.float32(self.weight_scale) * genes
+        context = memory[:, : self.n_context, 0]
+        seen = np.concatenate([inputs, context], axis=1)
+        hidden = np.full(active.shape, np.float32(self.bias))
+        for j in range(seen.shape[1]):
+            hidden = hidden + weights[:, :, j] * seen[:, j, None]
+        hidden = sigmoid_of(hidden) * active
+        outputs = np.full((len(inputs), n_outputs), np.float32(self.bias))
+        for k in range(active.shape[1]):
+            filled = outputs + weights[:, k, seen.shape[1] :] * hidden[:, k, None]
+            outputs = np.where(active[:, k, None], filled, outputs)
+        return outputs, hidden[:, :, None]
