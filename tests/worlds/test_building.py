@@ -36,7 +36,6 @@ MISTAKES = {
     "argument": ("light(team, scene, i))\n\n\n", "light(team, scene))\n\n\n", "(in resolve: "),
     "scenarios": ("(self.n_robots + 1, 2)", "(self.n_robot + 1, 2)", "AttributeError: "),
     "simulation": ("params = Params()", "params = Prams()", "NameError: name 'Prams'"),
-    "controller": ("n_outputs=4", "n_output=4", "TypeError: ControllerSpec"),
 }  # fmt: skip
 
 

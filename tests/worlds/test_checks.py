@@ -21,13 +21,16 @@ DECLARED = {
     "arguments": (
         "def act(team: Team, scene: Scene, p: Params, i: int, t: int)",
         "def act(team: Team, scene: Scene, p: Params, i: int)",
-        "structure", "bad.py:104: phase act must be declared as act(team, scene, p, i, t)",
+        "structure", "bad.py:105: phase act must be declared as act(team, scene, p, i, t)",
     ),
     "types": (
         "def act(team: Team, scene: Scene,", "def act(scene: Scene, team: Team,",
         "structure", "phase act must be declared as act(team, scene, p, i, t), of types Team",
     ),
-    "nets": ("    nets: Networks\n", "", "structure", "Team needs a field 'nets: Networks'"),
+    "inputs": ("    inputs: wp.array2d[float]\n", "", "structure",
+               "Team needs a field 'inputs: wp.array2d[float]'"),
+    "flat": ("    outputs: wp.array2d[float]", "    outputs: wp.array[float]", "structure",
+             "Team.outputs must be declared as 'outputs: wp.array2d[float]'"),
     "field": ("    fitness: wp.array[float]\n", "", "structure", "Team needs a field 'fitness: "),
     "dtype": ("    action: wp.array[int]", "    action: wp.array[float]", "structure",
               "Team.action must be declared as 'action: wp.array[int]'"),
@@ -35,8 +38,17 @@ DECLARED = {
                "Team.chosen must be a one-dimensional array"),
     "scene": ("    places: wp.array[float]", "    places: float", "structure",
               "Scene.places must be an array"),
-    "outputs": ("n_outputs=4", "n_outputs=9", "structure", "n_outputs must be 1 to 8, not 9"),
-    "sensors": ("n_sensors=2", "n_sensors='2'", "structure", "n_sensors must be 1 or more"),
+    "outputs": ('"dx", "dy")', '"dx", "dy", *"abcde")', "structure",
+                "controller 'srn' has at most 8 outputs, and light-v1 has 9"),
+    "sensors": ('("light x", "light y")', '("light x")', "structure",
+                "inputs must be a tuple of names, as in ('rest',), not 'light x'"),
+    "same": ('"light y"', '"light x"', "structure", "inputs has 'light x' twice"),
+    "no inputs": ('    inputs: ClassVar[tuple[str, ...]] = ("light x", "light y")\n', "",
+                  "world", "world light-v1 needs inputs, a tuple of names, one of each"),
+    "setting": ('{"n_hidden": 4', '{"n_hiden": 4', "structure",
+                "unknown setting 'n_hiden' in the controller of light-v1; did you mean 'n_hidden'"),
+    "settings": ('{"n_hidden": 4, "max_hidden": 8}', '("n_hidden", 4)', "structure",
+                 "world light-v1: controller must be a dict of settings, as in {'n_hidden': 4}"),
     "castes": ("] = actions", "] = ('rest')", "structure", "castes must be a tuple of names"),
     "fewer": ("] = actions", "] = ('rest',)", "structure", "fewer than the 2 actions"),
     "twice": ('("idler",)', '("idler", "idler")', "structure", "heuristics has 'idler' twice"),
@@ -66,9 +78,9 @@ DECLARED = {
                 "scenarios", "must have a row for each of 3 scenarios, got shape [1, 4, 2]"),
     "infinite": ("np.float32) for key", "np.float32) * np.float32('inf') for key", "scenarios",
                  "places has values that are not finite"),
-    "missing": ("places=places, ", "", "world", "bad.py:174: TypeError: LightSc"),
+    "missing": ("places=places, ", "", "world", "bad.py:172: TypeError: LightSc"),
     "name": ("1.0 - wp.length", "one - wp.length", "world",
-             "bad.py:127: Referencing undefined symbol: one (in resolve: team.fitness[i] = one -"),
+             "bad.py:128: Referencing undefined symbol: one (in resolve: team.fitness[i] = one -"),
     "class": ('"LightWorld"', '"LightWord"', "world",
               "unknown class 'LightWord' in its ENTRY; did you mean 'LightWorld'?"),
 }  # fmt: skip
@@ -81,18 +93,18 @@ PLAYED = {
                "commit gives other results if robots are visited in another order (`x` differ in "
                "iteration 0): robot 0 writes `x` of robot 1; a phase writes its own robot's data"),
     "early": ("act", "team.x[i] = team.x[(i + 1) % 3]", "order",
-              "sense or act gives other results if robots are visited in another order (`x`"),
+              "act gives other results if robots are visited in another order (`x`"),
+    "peek": ("sense", "team.inputs[i, 0] = team.inputs[(i + 1) % 3, 1]", "order",
+             "sense gives other results if robots are visited in another order (`inputs` differ"),
     "shared": ("commit", "move_light(team, i)", "order",
                "robot 0 writes `moved`, which others read or write in the same phase; move it in "
                "settle(team, scene, p, t), which runs once for the team"),
     "sum": ("resolve", "team.moved[0] = team.moved[0] + team.x[i]", "order",
             "3 robots write `moved`"),
-    "sensor": ("sense", "team.nets.inputs[first_input(team.nets, i) + 2] = 1.0", "sensors",
-               "sense writes input 2 for robot 0; with n_sensors = 2 a robot's sensors are its"),
-    "neighbour": ("sense", "team.nets.inputs[first_input(team.nets, 2 - i)] = 1.0", "sensors",
+    "neighbour": ("sense", "team.inputs[2 - i, 0] = 1.0", "sensors",
                   "sense writes inputs of robot 2 for robot 0"),
-    "output": ("act", "team.x[i] = 0.1 * team.nets.sums[i][4]", "outputs",
-               "act uses outputs that the controller does not have (x change with them)"),
+    "output": ("act", "team.outputs[(i + 1) % 3, 0] = 9.0", "order",
+               "robot 0 writes `outputs` of robot 1; a phase writes its own robot's data"),
     "action": ("commit", "team.action[i] = 2", "counts", "action is 2; it must be -1 (none) or"),
     "column": ("commit", "team.counts[2 * i] = team.counts[2 * i] + 1", "counts", "counts sum"),
     "switches": ("commit", "team.switches[i] = 0", "counts", "switches are not those of `action`"),
@@ -179,18 +191,37 @@ def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str]:
     return int(caught.value.code or 0), out
 
 
+# What is changed, and the line that is then found to be wrong.
+OUTSIDE = {
+    "counts": (("i, a, a)", "i, a, a + 1)"),
+               "count_action(team.action, team.switches, team.counts, i, a, a + 1)"),
+    "output": (("heuristic_action(uniform(", "int(team.outputs[i, 4]) + heuristic_action(uniform("),
+               "team.chosen[i] = int(team.outputs[i, 4]) + heuristic_action(uniform("
+               "scene.seed[0], t, 0, i), 0, 1, 2)"),
+    "dy": (("team.outputs[i, 3], p.step", "team.outputs[i, 4], p.step"),
+           "step = steered_step(team.outputs[i, 2], team.outputs[i, 4], p.step)"),
+    "highest": (("highest(team.outputs, i, 2)", "highest(team.outputs, i, 5)"),
+                "team.chosen[i] = highest(team.outputs, i, 5)"),
+    "input": (("team.inputs[i, 1] = way[1]", "team.inputs[i, 2] = way[1]"),
+              "team.inputs[i, 2] = way[1]"),
+    "robot": (("team.inputs[i, 1] = way[1]", "team.inputs[i + 1, 1] = way[1]"),
+              "team.inputs[i + 1, 1] = way[1]"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", OUTSIDE)
 def test_an_index_outside_an_array_is_found_with_its_line(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    change = ("i, a, a)", "i, a, a + 1)")
+    change, line = OUTSIDE[name]
     imports = ("from conevo.rng", "from beside import NOTHING\nfrom conevo.rng")
     (tmp_path / "beside.py").write_text("NOTHING = 0\n")
     file = written(tmp_path / "bad.py", change, imports)
     code, out = run(capsys, str(file))
     assert code == 2
     assert "ok       file          bad.py, which imports beside.py" in out
-    line = "count_action(team.action, team.switches, team.counts, i, a, a + 1)"
-    assert f"problem  memory        {file}:122: in `{line}` an index lies outside its" in out
+    number = 1 + [text.strip() for text in file.read_text().splitlines()].index(line)
+    assert f"problem  memory        {file}:{number}: in `{line}` an index lies outside its" in out
     assert out.endswith("1 problem\n")
 
 
@@ -210,7 +241,7 @@ def test_a_sound_world_has_no_problem_and_a_wrong_name_is_one_line(
     assert (code, out.splitlines()[-1]) == (0, "no problems")
     topics = [line.split()[1] for line in out.splitlines()[:-1]]
     assert topics[:5] == ["file", "parameters", "structure", "scenarios", "memory"]
-    assert topics[5:] == [*("sensors", "outputs", "values", "counts", "order", "reset"),
+    assert topics[5:] == [*("sensors", "values", "counts", "order", "reset"),
                           *("heuristics", "record", "random")]  # fmt: skip
     for name, words in (("rovr", "did you mean 'rover'"), (f"{tmp_path}/no.py", "cannot read")):
         with pytest.raises(SystemExit) as caught:

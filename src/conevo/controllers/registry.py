@@ -82,9 +82,22 @@ def suggested(name: str, world: Any) -> dict[str, Any]:
     Args:
         name: of the controller.
         world: a world or its class, whose ``controller`` holds them.
+
+    Raises:
+        UsageError: no such controller, or the world has no settings or one of no controller.
     """
     known = {field.name for field in fields(find(name).settings_class)}
-    settings: Mapping[str, Any] = world.controller
+    settings: Mapping[str, Any] = getattr(world, "controller", {})
+    if not isinstance(settings, Mapping):
+        raise UsageError(
+            f"world {world.name}: controller must be a dict of settings, as in {{'n_hidden': 4}}, "
+            f"not {settings!r}"
+        )
+    if others := settings.keys() - known:
+        kinds = [entry.settings_class for entry in CONTROLLERS.values()]
+        anywhere = {field.name for kind in kinds for field in fields(kind)}
+        for key in sorted(others - anywhere):
+            raise unknown_name("setting", key, anywhere, f"in the controller of {world.name}")
     return {key: value for key, value in settings.items() if key in known}
 
 

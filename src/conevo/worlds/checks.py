@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import ValidationError
 
-from conevo.controllers.registry import controller, genome_of
+from conevo.controllers.registry import controller, genome_of, refuse_misfit
 from conevo.errors import ConevoError, UsageError
 from conevo.outside import line_of
 from conevo.parameters import wrong_values
@@ -91,7 +91,17 @@ def _declared(entry: WorldEntry, environment: str) -> Iterator[Finding]:
         built = entry.build(name, entry.params_class())
         if name == environment:
             fine = "names, controller, phases, state, scene"
-            yield from _topic("structure", faults(built, built.simulation()), fine)
+            yield from _topic("structure", _of_structure(built), fine)
+
+
+def _of_structure(built: World) -> Iterator[str]:
+    found = list(faults(built, built.simulation()))
+    yield from found
+    if not found:
+        try:
+            refuse_misfit(controller(world=built), built)
+        except UsageError as error:
+            yield str(error)
 
 
 def _of_parameters(params_class: Any) -> Iterator[str]:

@@ -125,7 +125,7 @@ class World(Protocol):
         inputs: S names, of what each robot senses.
         outputs: O names, of what its controller gives: any real numbers.
         controller: settings of the controller that the source gives such robots; those that another
-            controller has, too, hold for it as well.
+            controller has, too, hold for it as well. Without any, the controller's defaults hold.
         actions: A names; the state array ``action`` holds indices into them.
         castes: C names, one per column of ``Outcome.counts``: the caste of a robot that spends most
             of its life on it. Most worlds count actions, so castes are actions; a world that tells

@@ -63,13 +63,17 @@ class WorldEntry:
         """Return one environment of this world.
 
         Raises:
-            UsageError: parameters that are not allowed, or do not fit together.
+            UsageError: parameters that are not allowed, or do not fit together, or a world without
+                inputs or outputs.
         """
         part = self.params_class
         if not isinstance(params, part):  # of a plain dataclass, which has checked nothing
             given = {one.name: getattr(params, one.name) for one in fields(params) if one.init}
             params = part(**given)
         built: World = self.world_class(environment, params)
+        for name in ("inputs", "outputs"):
+            if not hasattr(built, name):
+                raise UsageError(f"world {built.name} needs {name}, a tuple of names, one of each")
         _ = measures_of(built)  # refuses what are no measures
         return built
 
