@@ -25,9 +25,9 @@ def rollout() -> Rollout:
 @pytest.fixture(scope="module")
 def team(rollout: Rollout) -> Team:
     """Random controllers, some with more neurons than others."""
-    spec, rng = rollout.world.controller, np.random.default_rng(4)
-    genes = rng.uniform(-1, 1, (6, spec.max_hidden, spec.n_genes)).astype(np.float32)
-    active = np.arange(spec.max_hidden) < rng.integers(5, 12, (6, 1))
+    genome, rng = rollout.genome, np.random.default_rng(4)
+    genes = rng.uniform(-1, 1, (6, genome.max_parts, genome.n_genes)).astype(np.float32)
+    active = np.arange(genome.max_parts) < rng.integers(5, 12, (6, 1))
     return Team(0, genes, active, np.zeros(6), np.zeros(6))
 
 

@@ -149,17 +149,18 @@ def by_hand(outputs: list[tuple[float, float]], **params: Any) -> Observation:
         f"team-{len(outputs) - 1}",
         PursuitParams(iterations=200, arena_cm=60.0, prey="heuristic", **params),
     )
-    genes = np.zeros((len(outputs), world.controller.max_hidden, 24), dtype=np.float32)
+    rollout = Rollout(world, n_threads=1)
+    genes = np.zeros((len(outputs), rollout.genome.max_parts, 24), dtype=np.float32)
     genes[:, 0, 22:] = outputs
     active = np.zeros(genes.shape[:2], dtype=bool)
     active[:, 0] = True
     zeros = np.zeros(len(outputs))
     team = Team(0, genes, active, zeros, zeros)
-    rollout = Rollout(world, n_threads=1)
     pool, (rows,) = team.as_trial()
     keys = tuple(range(4))
     records = tuple(rollout.record(pool, rows, world.scenarios([key])) for key in keys)
-    return Observation(world, team, 5, keys, records, setting_of(world), Rules(), 1)
+    mind, setting = rollout.controller, setting_of(world)
+    return Observation(world, mind, team, 5, keys, records, setting, Rules(), 1)
 
 
 def test_a_predator_that_always_stands_is_idle_and_reproduces_it() -> None:
@@ -255,7 +256,7 @@ def test_trials_begin_where_instances_did_with_one_predator_clamped(seen, played
     places = [(one["x"], one["y"], one["heading"]) for one in seen.records]
     for scenario, record in played[: first["trials"]]:
         held = np.array(first["sensors"], dtype=np.float32)
-        assert (record["inputs"][:, first["predator"], :16] == held).all()
+        assert (record["inputs"][:, first["predator"]] == held).all()
         others = np.delete(scenario.clamp, first["predator"], axis=0)
         assert np.isnan(others).all()
         start = (scenario.x[0], scenario.y[0], scenario.heading[0])
@@ -274,7 +275,7 @@ def test_predators_put_together_are_clamped_only_if_asked(seen, played, is_clamp
         for i, role in enumerate(row["roles"]):
             is_held = is_clamped and bool(role) and bool(seen.instances(role, i))
             assert np.isnan(scenario.clamp[i]).all() != is_held
-            constant = (record["inputs"][:, i, :16] == record["inputs"][0, i, :16]).all()
+            constant = (record["inputs"][:, i] == record["inputs"][0, i]).all()
             assert constant or not is_held
 
 
@@ -369,7 +370,7 @@ def test_table_4_5_replaces_the_specialized_by_the_heuristic(runs) -> None:
     for row in rows:
         run = conevo.Run(row["run"])
         world = PursuitWorld(run.config.environment, run.config.world_params)
-        rollout = Rollout(world, n_threads=1)
+        rollout = Rollout(world, run.config.controller, n_threads=1)
         scenarios = world.scenarios([fold(run.config.run.seed, "lesion", k) for k in range(5)])
         genes, teams = run.champion.as_trial()
         labels = [life.label for life in observe(run, 5, threads=1).lifetimes]

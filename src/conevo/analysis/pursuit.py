@@ -25,6 +25,7 @@ from conevo.analysis.behaviours import (
 from conevo.analysis.captures import Capture, find_captures
 from conevo.analysis.fittest import equip
 from conevo.analysis.sensors import Spell, average, find_spells, profile, sample
+from conevo.controllers.base import Controller
 from conevo.errors import UsageError
 from conevo.kernels.khepera import AXLE, RADIUS
 from conevo.rng import fold, stream
@@ -45,6 +46,7 @@ class Observation:
 
     Attributes:
         world: its world.
+        controller: of its robots.
         team: its controllers.
         seed: the scenarios' root.
         keys: [E] of the scenarios.
@@ -55,6 +57,7 @@ class Observation:
     """
 
     world: PursuitWorld
+    controller: Controller
     team: Team
     seed: int
     keys: tuple[int, ...]
@@ -91,7 +94,7 @@ class Observation:
 
     @property
     def inputs(self) -> list[npt.NDArray[Any]]:
-        """Sensor inputs of each epoch [T, R, 16 and the context]."""
+        """Sensor inputs of each epoch [T, R, 16]."""
         return [record["inputs"] for record in self.records]
 
     @property
@@ -184,6 +187,7 @@ def watch(
     records = tuple(lab.rollout.record(genes, rows, world.scenarios([key])) for key in keys)
     return Observation(
         world=world,
+        controller=lab.rollout.controller,
         team=team,
         seed=seed,
         keys=keys,

@@ -56,7 +56,7 @@ def reproduce_individuals(seen: Observation) -> list[dict[str, Any]]:
     """
     params = dataclasses.replace(seen.world.params, iterations=TRIAL)
     world = dataclasses.replace(seen.world, params=params)
-    rollout = Rollout(world, n_threads=seen.n_threads)
+    rollout = Rollout(world, seen.controller, seen.n_threads)
     rows = []
     for predator in range(world.n_robots):
         for behaviour in BEHAVIOURS:
@@ -105,7 +105,7 @@ def reproduce_collectives(
         trials: test simulations of each.
         clamped: hold each predator's sensors at its averages of its role.
     """
-    rollout = Rollout(seen.world, n_threads=seen.n_threads)
+    rollout = Rollout(seen.world, seen.controller, seen.n_threads)
     rows = []
     for collective in COLLECTIVES[:-1]:
         own = [one.roles for one in seen.all_captures if one.collective == collective]

@@ -71,7 +71,7 @@ def average(found: Sequence[Spell], inputs: Inputs) -> npt.NDArray[np.float64]:
 
     Args:
         found: at least one instance.
-        inputs: of each epoch [T, R, 16 or more], proximity first.
+        inputs: of each epoch [T, R, 16], proximity first.
     """
     means = [_during(one, inputs).mean(axis=0) for one in found]
     return np.asarray(np.mean(means, axis=0), dtype=np.float64)
@@ -82,7 +82,7 @@ def profile(found: Sequence[Spell], inputs: Inputs) -> Profile:
 
     Args:
         found: at least one instance.
-        inputs: of each epoch [T, R, 16 or more], proximity first.
+        inputs: of each epoch [T, R, 16], proximity first.
     """
     portions = np.mean([_portions(_during(one, inputs)) for one in found], axis=0)
     return Profile(
