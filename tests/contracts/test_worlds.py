@@ -16,7 +16,7 @@ from conevo.worlds.trial import Trial
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 OUTSIDE = [f"{EXAMPLES}/light.py:dark-1", f"{EXAMPLES}/ball.py:far-1"]
 ITERATIONS = 25
-TOPICS = ("sensors", "outputs", "values", "counts", "order", "reset", "heuristics")
+TOPICS = ("sensors", "values", "counts", "order", "reset", "heuristics")
 CASES = [
     f"{entry.name}/{environment}"
     for entry in WORLDS.values()
@@ -58,7 +58,8 @@ def test_a_world_is_what_its_entry_says(path, some_world):
     entry, environment = resolve(path)
     assert (some_world.name, some_world.environment) == (entry.name, environment)
     assert some_world.params == entry.params_class(iterations=ITERATIONS)
-    for names in (some_world.actions, measures_of(some_world), some_world.heuristics):
+    given = (some_world.inputs, some_world.outputs, some_world.actions, some_world.heuristics)
+    for names in (*given, measures_of(some_world)):
         assert isinstance(names, tuple)
         assert len(set(names)) == len(names) > 0
     assert len(some_world.castes) >= len(some_world.actions)
@@ -115,8 +116,9 @@ def test_record_equals_evaluate_bit_for_bit(some_world):
     for n in range(2):
         seen = rollout.record(genes, teams[n], scenarios, heuristic[n])
         assert seen["fitness"].shape == (ITERATIONS, some_world.n_robots)
-        n_inputs = some_world.controller.n_inputs
-        assert seen["inputs"].shape == (ITERATIONS, some_world.n_robots, n_inputs)
+        for name in ("inputs", "outputs"):
+            width = len(getattr(some_world, name))
+            assert seen[name].shape == (ITERATIONS, some_world.n_robots, width)
         assert seen["fitness"][-1].tobytes() == out.fitness[n, 0].tobytes()
         ended = np.array([out.performance[one.name][n, 0] for one in measures_of(some_world)])
         assert seen["performance"][-1].tobytes() == ended.tobytes()

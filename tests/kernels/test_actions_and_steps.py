@@ -9,7 +9,7 @@ import warp as wp
 
 from conevo.kernels import engine
 from conevo.kernels.actions import NONE, begin_counting, count_action, heuristic_action
-from conevo.kernels.network import Networks, first_input, highest, out_vector
+from conevo.kernels.outputs import highest
 from conevo.kernels.steps import is_taken, random_step, steered_step
 
 engine.start()
@@ -37,10 +37,9 @@ def choose(u: wp.array[float], own: int, a: wp.array[int]):
 
 
 @wp.kernel
-def look(nets: Networks, n: int, first: wp.array[int], best: wp.array[int]):
+def look(outputs: wp.array2d[float], n: int, best: wp.array[int]):
     i = wp.tid()
-    first[i] = first_input(nets, i)
-    best[i] = highest(nets, i, n)
+    best[i] = highest(outputs, i, n)
 
 
 @wp.kernel
@@ -95,14 +94,11 @@ def test_the_last_action_is_the_last_even_where_rounding_would_go_beyond_it():
 
 
 def test_the_highest_output_is_the_first_of_equals_among_those_asked_for():
-    sums = np.random.default_rng(4).integers(-2, 3, (40, 8)).astype(np.float32)
-    nets = Networks()
-    nets.inputs, nets.n_used, nets.sums = zeros(40 * 7, float), zeros(40), array(sums, out_vector)
+    outputs = np.random.default_rng(4).integers(-2, 3, (40, 8)).astype(np.float32)
     for n in (1, 3, 8):
-        first, best = zeros(40), zeros(40)
-        wp.launch(look, 40, [nets, n, first, best], device="cpu")
-        assert first.numpy().tolist() == [7 * i for i in range(40)]
-        assert best.numpy().tolist() == sums[:, :n].argmax(axis=1).tolist()
+        best = zeros(40)
+        wp.launch(look, 40, [array(outputs, float), n, best], device="cpu")
+        assert best.numpy().tolist() == outputs[:, :n].argmax(axis=1).tolist()
 
 
 def test_a_random_step_has_its_length_and_a_steered_one_at_most_that():

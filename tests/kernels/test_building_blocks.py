@@ -8,22 +8,15 @@ import warp as wp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from conevo.controllers.srn import Memory, Shape, Srn, Weights, clear, load, think
 from conevo.kernels import engine
 from conevo.kernels.geometry import COVER_WORDS, cover_disc, covered_by_any, octant
-from conevo.kernels.network import (
-    Networks,
-    Shape,
-    load,
-    out_vector,
-    sigmoid,
-    think,
-    wide_vector,
-)
+from conevo.kernels.outputs import sigmoid, sigmoid_of
 from conevo.kernels.random import uniform
 from oracles import rover_oracle, splitmix
 
 engine.start()
-networks_of = engine.view_of(Networks)
+weights_of, memory_of = engine.view_of(Weights), engine.view_of(Memory)
 
 
 @wp.kernel
@@ -54,23 +47,28 @@ def squash(a: wp.array[float], y: wp.array[float]):
 
 @wp.kernel
 def run_networks(
-    batch: Networks,
+    brains: Weights,
+    memories: Memory,
     shape: Shape,
     genes: wp.array2d[float],
     slots: wp.array3d[int],
     sensors: wp.array2d[float],
+    inputs: wp.array2d[float],
+    sums: wp.array2d[float],
     outputs: wp.array3d[float],
 ):
-    nets = networks_of(batch, 1, 2)  # the second of two teams: views must not overlap
+    weights = weights_of(brains, 1, 2)  # the second of two teams: views must not overlap
+    memory = memory_of(memories, 1, 2)
     for i in range(2):
-        load(nets, shape, i, genes, slots, 0)
+        load(weights, shape, i, genes, slots, 0)
+        clear(memory, shape, i)
     for t in range(sensors.shape[0]):
         for i in range(2):
             for k in range(shape.n_sensors):
-                nets.inputs[i * shape.n_inputs + k] = sensors[t, k]
-            think(nets, shape, i)
+                inputs[i, k] = sensors[t, k]
+            think(weights, memory, shape, inputs, sums, i)
             for o in range(shape.n_outputs):
-                outputs[t, i, o] = sigmoid(nets.sums[i][o])
+                outputs[t, i, o] = sigmoid(sums[i, o])
 
 
 def array(values, dtype):
@@ -160,28 +158,27 @@ def test_sigmoid_is_the_logistic_function_within_a_millionth():
     wp.launch(squash, len(a), [array(a, float), y], device="cpu")
     assert np.abs(y.numpy() - 1 / (1 + np.exp(-a.astype(float)))).max() < 1e-6
     assert (np.diff(y.numpy()) >= -1e-6).all()
+    assert y.numpy().tobytes() == sigmoid_of(a).tobytes()  # numpy's is the same bits
 
 
-def shape_of(n_sensors, n_context, n_outputs, n_slots, bias=0.0):
-    shape = Shape()
-    shape.n_sensors, shape.n_context, shape.n_outputs = n_sensors, n_context, n_outputs
-    shape.n_inputs, shape.n_slots = n_sensors + n_context, n_slots
-    shape.n_chunks, shape.weight_scale, shape.bias = -(-n_slots // 16), 10.0, bias
-    return shape
-
-
-def run_kernel(shape, genes, slots, sensors):
-    nets = Networks()
-    r, inputs, chunks = 2, shape.n_inputs, shape.n_chunks
-    nets.w_in = wp.zeros(2 * r * chunks * inputs, dtype=wide_vector, device="cpu")
-    nets.w_out = wp.zeros(2 * r * chunks * 16, dtype=out_vector, device="cpu")
-    nets.filled = wp.zeros(2 * r * chunks, dtype=wide_vector, device="cpu")
-    nets.n_used = wp.zeros(2 * r, dtype=int, device="cpu")
-    nets.inputs = wp.zeros(2 * r * inputs, dtype=float, device="cpu")
-    nets.sums = wp.zeros(2 * r, dtype=out_vector, device="cpu")
-    outputs = wp.zeros((len(sensors), r, shape.n_outputs), dtype=float, device="cpu")
-    inputs = [nets, shape, array(genes, float), array(slots[None], int), array(sensors, float)]
-    wp.launch(run_networks, 1, [*inputs, outputs], device="cpu")
+def run_kernel(mind, n_sensors, n_outputs, genes, slots, sensors):
+    """Outputs [T, 2, O] of the second of two teams of two robots; the first one's stay empty."""
+    kind = mind.mind(n_sensors, n_outputs)
+    weights, memory = Weights(), Memory()
+    for struct in (weights, memory):
+        for name, var in struct._cls.vars.items():
+            empty = wp.zeros(4 * kind.sizes[name], dtype=var.type.dtype, device="cpu")
+            empty.numpy()[:] = -7
+            setattr(struct, name, empty)
+    inputs, sums = (wp.zeros((2, n), dtype=float, device="cpu") for n in (n_sensors, n_outputs))
+    outputs = wp.zeros((len(sensors), 2, n_outputs), dtype=float, device="cpu")
+    given = [array(genes, float), array(slots[None], int), array(sensors, float)]
+    arguments = [weights, memory, kind.shape, *given, inputs, sums, outputs]
+    wp.launch(run_networks, 1, arguments, device="cpu")
+    for struct in (weights, memory):
+        for name in struct._cls.vars:
+            first, _ = np.split(getattr(struct, name).numpy(), 2)
+            assert (first == -7).all(), name
     return outputs.numpy()
 
 
@@ -198,9 +195,13 @@ def test_think_is_an_elman_network(n_sensors, n_context, n_outputs, n_slots, bia
     slots[0, 2] = -1
     slots[1, : n_slots // 2] = rng.permutation(60)[: n_slots // 2]
     sensors = rng.random((10, n_sensors)).astype(np.float32)
-    outputs = run_kernel(
-        shape_of(n_sensors, n_context, n_outputs, n_slots, bias), genes, slots, sensors
+    mind = Srn(
+        n_hidden=n_context or n_slots,
+        max_hidden=n_slots,
+        recurrent=n_context > 0,
+        bias=bool(bias),
     )
+    outputs = run_kernel(mind, n_sensors, n_outputs, genes, slots, sensors)
     for i in range(2):
         context = np.zeros(n_context)
         for t in range(10):

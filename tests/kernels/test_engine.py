@@ -11,6 +11,7 @@ import pytest
 import warp as wp
 
 import conevo
+from conevo.controllers.registry import controller
 from conevo.errors import EnvironmentFailure
 from conevo.kernels import engine
 from conevo.worlds.registry import WORLDS, world
@@ -113,7 +114,9 @@ def first_environment(entry):
 @pytest.mark.parametrize("entry", WORLDS.values(), ids=WORLDS)
 def test_the_cuda_form_compiles_for_sm_90_without_a_device(entry, tmp_path):
     engine.start()
-    kernel = episode_kernel(first_environment(entry).simulation())
+    task = first_environment(entry)
+    mind = controller(world=task).mind(len(task.inputs), len(task.outputs))
+    kernel = episode_kernel(task.simulation(), mind)
     files = wp.compile_aot_module(kernel.module, arch=90, module_dir=tmp_path)
     assert [f.suffixes[-2:] for f in files] == [[".sm90", ".cubin"]]
     assert files[0].read_bytes()[:4] == b"\x7fELF"
@@ -143,7 +146,8 @@ def test_a_missing_cuda_device_is_one_clear_line():
 
 def test_kernel_hash_is_the_same_for_all_environments_and_sizes_of_a_world():
     one = Rollout(world("rover/complex-1")).kernel_hash
-    assert Rollout(world("rover/simple-10", n_robots=3, n_hidden=4)).kernel_hash == one
+    small = world("rover/simple-10", n_robots=3)
+    assert Rollout(small, controller(world=small, n_hidden=4)).kernel_hash == one
     two = Rollout(world("pursuit/team-1")).kernel_hash
     assert Rollout(world("pursuit/team-10", prey="random", arena_cm=1000.0)).kernel_hash == two
     assert one != two

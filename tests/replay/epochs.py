@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from conevo.controllers.registry import controller, genome_of
 from conevo.replay.recording import record_epoch
 from conevo.replay.trajectory import Trajectory
 from conevo.rng import fold, stream
@@ -18,10 +19,10 @@ TASKS = ("rover/complex-5", "pursuit/team-7", "prey/shaping-3", "gacc/complex-5"
 
 def random_team(a_world, seed=0):
     """Return a pool and the rows of one team of networks, of more neurons than at the start."""
-    spec, r = a_world.controller, a_world.n_robots
-    used = min(spec.n_hidden + 1, spec.max_hidden)
-    pool = stream(seed, "pool").uniform(-1, 1, (r * used, spec.n_genes)).astype(np.float32)
-    team = np.full((r, spec.max_hidden), -1, dtype=np.int32)
+    genome, r = genome_of(controller(world=a_world), a_world), a_world.n_robots
+    used = min(genome.n_parts + 1, genome.max_parts)
+    pool = stream(seed, "pool").uniform(-1, 1, (r * used, genome.n_genes)).astype(np.float32)
+    team = np.full((r, genome.max_parts), -1, dtype=np.int32)
     team[:, :used] = np.arange(len(pool)).reshape(r, used)
     team[0, 0] = -1  # a hole among the neurons
     return pool, team

@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 
 from conevo.errors import EnvironmentFailure, UsageError
 from conevo.replay.channel import Channel
-from conevo.replay.recording import hidden_activations
 from conevo.replay.trajectory import Trajectory
 from conevo.rng import fold
 from conevo.worlds.registry import world
@@ -68,9 +67,14 @@ def test_a_trajectory_is_what_the_kernels_did(task):
             wanted = seen[name].astype(np.float64)
             allowed = 0.0 if seen[name].dtype.kind in "biu" else kept.step / 2
             assert np.abs(kept.values - wanted).max() <= allowed + 1e-9 * np.abs(wanted).max(), name
-    n = a_world.controller.n_sensors
     sensors = channels["sensors"]
-    assert np.abs(sensors.values - seen["inputs"][:, :, :n]).max() <= sensors.step / 2 + 1e-9
+    assert sensors.values.shape == (60, a_world.n_robots, len(a_world.inputs))
+    assert np.abs(sensors.values - seen["inputs"]).max() <= sensors.step / 2 + 1e-9
+    outputs = 1 / (1 + np.exp(-seen["outputs"].astype(np.float64)))
+    for name, wanted in (("hidden", seen["hidden"]), ("outputs", outputs)):
+        kept = channels[name]
+        assert kept.values.shape == wanted.shape
+        assert np.abs(kept.values - wanted).max() <= kept.step / 2 + 1e-9, name
     assert about["fitness"] == [float(value) for value in out.fitness[0, 0]]
     assert about["performance"] == {k: float(v[0, 0]) for k, v in out.performance.items()}
     for name, value in about["performance"].items():
@@ -82,23 +86,27 @@ def test_a_trajectory_is_what_the_kernels_did(task):
 
 
 @pytest.mark.parametrize("task", TASKS)
-def test_hidden_activations_are_those_of_the_kernel(task):
-    """Those that the kernel keeps (the context) agree, and all of them make its outputs."""
+def test_hidden_activations_are_those_of_a_network(task):
+    """They follow from sensors and the activations before, and outputs from them, in float64."""
     a_world = world(task, iterations=60)
-    spec = a_world.controller
     genes, team = random_team(a_world)
     rollout = Rollout(a_world, n_threads=1)
+    mind, n_sensors = rollout.controller, len(a_world.inputs)
     seen = rollout.record(genes, team, a_world.scenarios([fold(3, "test", 0)]))
-    hidden = hidden_activations(spec, genes, team, seen["inputs"])
-    assert hidden.shape == (60, a_world.n_robots, spec.max_hidden)
+    hidden = seen["hidden"].astype(np.float64)
+    assert hidden.shape == (60, a_world.n_robots, rollout.genome.max_parts)
     assert not hidden[:, team < 0].any()
-    context = seen["inputs"][:, :, spec.n_sensors :]
-    assert np.abs(hidden[:, :, : spec.n_context] - context).max(initial=0.0) < 1e-4
-    if not spec.recurrent:
-        assert spec.n_context == 0
-    weights = spec.weight_scale * genes[team][:, :, spec.n_inputs :]
-    sums = np.einsum("tru,ruo->tro", hidden, weights) + spec.bias
-    assert np.abs(sums - seen["sums"]).max() < 1e-3
+    assert hidden[:, team >= 0].any()
+    n_context = mind.n_hidden if mind.recurrent else 0
+    weights = mind.weight_scale * genes[team].astype(np.float64)
+    w_in, w_out = np.split(weights, [n_sensors + n_context], axis=2)
+    context = np.concatenate([np.zeros_like(hidden[:1]), hidden[:-1]])[:, :, :n_context]
+    inputs = np.concatenate([seen["inputs"], context], axis=2)
+    sums = np.einsum("tri,rui->tru", inputs, w_in) + mind.bias
+    wanted = np.where(team >= 0, 1 / (1 + np.exp(-sums)), 0.0)
+    assert np.abs(hidden - wanted).max() < 1e-4
+    sums = np.einsum("tru,ruo->tro", hidden, w_out) + mind.bias
+    assert np.abs(sums - seen["outputs"]).max() < 1e-3
 
 
 def test_heuristic_robots_have_no_activations():
@@ -255,7 +263,7 @@ def test_a_header_cannot_ask_for_more_than_the_file_has(tmp_path):
             head, {"descr": "|u1", "fortran_order": False, "shape": (2**40,)}
         )
         archive.writestr("about.npy", head.getvalue())
-    assert "another size" in refused(tmp_path / "bad.npz", out.getvalue())
+    assert "whose size is not that of its header" in refused(tmp_path / "bad.npz", out.getvalue())
 
 
 def test_a_small_file_cannot_unpack_to_a_huge_one(tmp_path, monkeypatch):

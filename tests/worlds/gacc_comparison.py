@@ -114,18 +114,18 @@ def judge(w, sums, detected):
 
 def check_iteration(w, seen, t, tally):
     """Assert that the recorded iteration follows from the oracle's state; leave it the oracle's."""
-    inputs = seen["inputs"][t].astype(float)
+    inputs, hidden = (seen[name][t].astype(float) for name in ("inputs", "hidden"))
     found, sums = set(), []
     for i, robot in enumerate(w.robots):
         if robot.energy > 0.0:
-            found |= check_senses(w, i, inputs[i, :27], tally)
+            found |= check_senses(w, i, inputs[i], tally)
         else:
-            assert inputs[i, :27].tolist() == robot.inputs, (t, i)
+            assert inputs[i].tolist() == robot.inputs, (t, i)
         sums.append(None)
         if isinstance(robot.mind, Network):
-            both = np.array([*inputs[i, :27], *robot.context])
+            both = np.array([*inputs[i], *robot.context])
             sums[i], context = robot.mind.think(both, len(robot.context))
-            assert np.abs(inputs[i, 27:] - context).max() < 1e-4, (t, i)
+            assert np.abs(hidden[i, : len(context)] - context).max() < 1e-4, (t, i)
         action, situation = int(seen["action"][t, i]), int(seen["situation"][t, i])
         check_choice(w, i, sums[i], action, situation, tally)
     detected = [t if k in found and b.detected == UNDETECTED else b.detected

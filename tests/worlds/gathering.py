@@ -10,6 +10,7 @@ from dataclasses import fields, replace
 
 import numpy as np
 
+from conevo.controllers.registry import controller, genome_of
 from conevo.rng import stream
 from conevo.worlds.registry import world
 from oracles import gacc_oracle as oracle
@@ -71,9 +72,9 @@ def script(phases, n_genes=45, n_inputs=37, move_range=0.01):
     return genes.astype(np.float32)
 
 
-def team(robots, spec, move_range=0.01):
+def team(robots, genome, move_range=0.01):
     """Genes, slots and heuristics of robots (x, y, script or name of a heuristic controller)."""
-    genes, slots = [], np.full((len(robots), spec.max_hidden), -1, np.int32)
+    genes, slots = [], np.full((len(robots), genome.max_parts), -1, np.int32)
     heuristic = np.full(len(robots), -1, np.int32)
     for i, (_, _, mind) in enumerate(robots):
         if isinstance(mind, str):
@@ -82,7 +83,7 @@ def team(robots, spec, move_range=0.01):
         first = sum(map(len, genes))
         genes.append(script(mind, move_range=move_range))
         slots[i, : len(mind)] = first + np.arange(len(mind))
-    genes.append(np.zeros((1, spec.n_genes), np.float32))
+    genes.append(np.zeros((1, genome.n_genes), np.float32))
     return np.concatenate(genes), slots, heuristic
 
 
@@ -129,7 +130,8 @@ def gathering(robots, objects, plans, *, ordered=None, obstacles=(), **params):
             for k, name in enumerate(("left", "bottom", "right", "top"))
         },
     )
-    genes, slots, heuristic = team(robots, a_world.controller, a_world.params.move_range)
+    genome = genome_of(controller(world=a_world), a_world)
+    genes, slots, heuristic = team(robots, genome, a_world.params.move_range)
     return a_world, (genes, slots, scenarios, heuristic), numbers
 
 
@@ -139,14 +141,16 @@ def gathering(robots, objects, plans, *, ordered=None, obstacles=(), **params):
 def random_team(a_world, seed, scale=0.3):
     """Networks with random empty slots, some of them beyond the context."""
     rng = stream(seed, "team")
-    spec = a_world.controller
-    r, u = a_world.n_robots, spec.max_hidden
-    genes = rng.uniform(-scale, scale, (r * u, spec.n_genes)).astype(np.float32)
+    mind = controller(world=a_world)
+    genome = genome_of(mind, a_world)
+    r, u = a_world.n_robots, genome.max_parts
+    genes = rng.uniform(-scale, scale, (r * u, genome.n_genes)).astype(np.float32)
     # Rather gather than detect; which of both changes with what is seen and remembered.
-    genes[:, spec.n_inputs : spec.n_inputs + 3] -= 0.05
+    first = len(a_world.inputs) + mind.n_context
+    genes[:, first : first + 3] -= 0.05
     slots = np.arange(r * u, dtype=np.int32).reshape(r, u)
     slots[rng.random((r, u)) < 0.4] = -1
-    slots[:, spec.n_hidden + 2 :] = -1
+    slots[:, mind.n_hidden + 2 :] = -1
     return genes, slots
 
 
@@ -182,9 +186,9 @@ def crowded(scenarios, seed, robots=0.3, objects=0.3, e=0):
 def build(a_world, genes, slots, scenarios, heuristic):
     """The oracle's world at the start of a scenario."""
     s, p = scenarios, a_world.params
-    nets = networks(genes, slots, a_world.controller.n_inputs)
+    n_context = controller(world=a_world).n_context
+    nets = networks(genes, slots, len(a_world.inputs) + n_context)
     minds = [net if h < 0 else oracle.HEURISTICS[h] for net, h in zip(nets, heuristic, strict=True)]
-    n_context = a_world.controller.n_context
     robots = [
         Robot(float(x), float(y), mind, energy=p.energy, context=[0.0] * n_context)
         for x, y, mind in zip(s.start_x[0], s.start_y[0], minds, strict=True)
@@ -225,8 +229,8 @@ def load(w, seen, t):
             setattr(robot, name, value)
     for i, robot in enumerate(w.robots):
         robot.counts = seen["counts"][t].reshape(len(w.robots), -1)[i].tolist()
-        robot.inputs = seen["inputs"][t, i, :27].tolist()
-        robot.context = seen["inputs"][t, i, 27:].tolist()
+        robot.inputs = seen["inputs"][t, i].tolist()
+        robot.context = seen["hidden"][t, i, : len(robot.context)].tolist()
     for name, ours in OBJECT.items():
         for block, value in zip(w.objects, seen[name][t].tolist(), strict=True):
             setattr(block, ours, value)

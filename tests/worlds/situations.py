@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from conevo.controllers.registry import controller, genome_of
 from conevo.rng import stream
 from conevo.worlds.prey_sets import PreySet, save
 from conevo.worlds.registry import world
@@ -27,10 +28,10 @@ def half_sum(command):
     return math.atanh(min(max(command, -1 + 1e-13), 1 - 1e-13))
 
 
-def drivers(wheels, spec):
+def drivers(wheels, genome):
     """Networks [K, G] and slots [R, U] of robots with constant wheels."""
-    genes = np.zeros((len(wheels), spec.n_genes), np.float32)
-    slots = np.full((len(wheels), spec.max_hidden), -1, np.int32)
+    genes = np.zeros((len(wheels), genome.n_genes), np.float32)
+    slots = np.full((len(wheels), genome.max_parts), -1, np.int32)
     for i, (left, right) in enumerate(wheels):
         genes[i, -2:] = 2 * half_sum(left) / 30, 2 * half_sum(right) / 30  # 6 x 10 gene / 2
         if (left, right) != IDLE:
@@ -87,11 +88,11 @@ def placed(a_world, poses, obstacles):
 
 
 def play(a_world, wheels, scenarios, heuristic):
-    genes, slots = drivers(wheels, a_world.controller)
+    rollout = Rollout(a_world, n_threads=1)
+    genes, slots = drivers(wheels, rollout.genome)
     modes = np.full(a_world.n_robots, -1, np.int32)
     if heuristic is not None:
         modes[:] = heuristic
-    rollout = Rollout(a_world, n_threads=1)
     seen = rollout.record(genes, slots, scenarios, modes)
     out = rollout.evaluate(genes, slots[None], scenarios, modes[None])
     result = {name: float(value[0, 0]) for name, value in out.performance.items()}
@@ -126,9 +127,9 @@ def split(result):
 
 def random_team(a_world, seed, scale=0.15):
     rng = stream(seed, "team")
-    spec = a_world.controller
-    slots = np.arange(a_world.n_robots * spec.max_hidden, dtype=np.int32)
-    genes = rng.uniform(-scale, scale, (len(slots), spec.n_genes)).astype(np.float32)
+    genome = genome_of(controller(world=a_world), a_world)
+    slots = np.arange(a_world.n_robots * genome.max_parts, dtype=np.int32)
+    genes = rng.uniform(-scale, scale, (len(slots), genome.n_genes)).astype(np.float32)
     genes[:, -2:] += 0.2 * scale
     return genes, slots.reshape(a_world.n_robots, -1)
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from conevo.controllers.registry import controller
 from conevo.errors import UsageError
 from conevo.rng import fold, stream
 from conevo.runs.config import resolve
@@ -73,7 +74,8 @@ def test_a_turned_arena_is_a_turned_outcome(environment, prey, seed, turns, netw
     assert np.abs(after["y"] - y).max() < 0.01
     assert np.array_equal(seen["collided"], after["collided"])
     assert np.array_equal(seen["captured"], after["captured"])
-    assert np.abs(seen["inputs"] - after["inputs"]).max() < 0.01
+    for name in ("inputs", "hidden"):
+        assert np.abs(seen[name] - after[name]).max() < 0.01, name
 
 
 MIRROR = [7, 6, 5, 4, 3, 2, 1, 0]  # a sensor's partner on the other side
@@ -101,7 +103,8 @@ def test_a_mirrored_arena_with_mirrored_networks_is_a_mirrored_outcome(seed, net
     assert np.abs(after["x"] - seen["x"]).max() < 0.01
     assert np.abs(after["y"] - (70 - seen["y"])).max() < 0.01
     assert np.abs(np.sin((after["heading"] + seen["heading"]) / 2)).max() < 0.01
-    assert np.abs(after["inputs"][:, :, order[:-2]] - seen["inputs"]).max() < 0.01
+    assert np.abs(after["inputs"][:, :, order[:16]] - seen["inputs"]).max() < 0.01
+    assert np.abs(after["hidden"] - seen["hidden"]).max() < 0.01
     assert np.array_equal(seen["collided"], after["collided"])
     swapped = np.array([STOP, FORWARD, RIGHT, LEFT, REVERSE])[after["action"]]
     assert (swapped == seen["action"]).mean() > 0.99
@@ -126,7 +129,7 @@ def test_relabelling_predators_and_prey_relabels_the_outcome_exactly(networks):
     assert seen["collided"].sum() > 100
     for name in ("x", "y", "heading", "left", "right", "collided"):
         assert np.array_equal(seen[name][:, bodies], after[name]), name
-    for name in ("action", "fitness", "inputs"):
+    for name in ("action", "fitness", "inputs", "outputs", "hidden"):
         assert np.array_equal(seen[name][:, order], after[name]), name
     assert np.array_equal(seen["captured"][:, ::-1], after["captured"])
 
@@ -175,7 +178,8 @@ def test_nobody_ever_leaves_overlaps_or_outruns_its_wheels(path, params, seed):
     assert not steps[seen["collided"][:, :b] == 1].any()
     turns = np.diff(seen["heading"][:, :b], axis=0)
     assert not turns[seen["collided"][1:, :b] == 1].any()
-    assert ((seen["inputs"] >= 0) & (seen["inputs"] <= 1)).all()
+    for name in ("inputs", "hidden"):
+        assert ((seen[name] >= 0) & (seen[name] <= 1)).all()
 
 
 def test_absent_bodies_leave_no_trace_of_other_teams():
@@ -201,7 +205,7 @@ def test_absent_bodies_leave_no_trace_of_other_teams():
 def test_team_types_of_table_4_2(path, robots, prey):
     a_world = world(path)
     assert a_world.n_robots == robots
-    assert a_world.controller.n_inputs == 22
+    assert len(a_world.inputs) + controller(world=a_world).n_context == 22
     scenarios = a_world.scenarios([1])
     assert scenarios.n_bodies.tolist() == [robots + prey]
     assert scenarios.x.shape == (1, robots + prey)
@@ -259,7 +263,7 @@ def test_shaping_experiments_have_two_to_six_of_each(experiment):
     a_world = world(f"prey/shaping-{experiment}")
     robots = 1 + (experiment > 3)
     assert a_world.n_robots == robots
-    assert (a_world.controller.n_inputs, a_world.controller.n_context) == (8, 0)
+    assert (len(a_world.inputs), controller(world=a_world).n_context) == (8, 0)
     scenarios = a_world.scenarios(range(400))
     predators = np.bincount(scenarios.n_bodies - robots, minlength=7)
     obstacles = np.bincount(scenarios.n_obstacles, minlength=7)
@@ -280,8 +284,9 @@ def test_defaults_and_the_printed_arena():
     assert printed.world_params.arena_cm == 1000
     a_world = world("pursuit/team-3", arena_cm=1000.0, iterations=30)
     start = a_world.scenarios([5])
-    genes, slots = drivers([AHEAD] * 4, a_world.controller)
-    seen = Rollout(a_world).record(genes, slots, start)
+    rollout = Rollout(a_world)
+    genes, slots = drivers([AHEAD] * 4, rollout.genome)
+    seen = rollout.record(genes, slots, start)
     ahead = start.x[0, :4] + 30 * 0.8 * np.cos(start.heading[0, :4])
     inside = (np.abs(ahead - 500) < 470) & (np.abs(start.y[0, :4] - 500) < 470)
     assert inside.any()
@@ -341,11 +346,12 @@ def test_the_prey_of_a_file_play(tmp_path, environment, slots):
     path, prey = tmp_path / "mine.npz", prey_set(3, slots)
     save(path, prey)
     a_world = world(f"pursuit/{environment}", prey=str(path), iterations=2)
-    genes, hidden = drivers([IDLE, IDLE], a_world.controller)
+    rollout = Rollout(a_world)
+    genes, hidden = drivers([IDLE, IDLE], rollout.genome)
     scenarios = a_world.scenarios([1])
     q = scenarios.x.shape[1] - 2
     poses = [(10, 10, 0), (90, 10, 0), (30, 60, 0), (70, 60, 0)][: 2 + q]  # prey that see nothing
-    seen = Rollout(a_world).record(genes, hidden, placed(a_world, poses, ()))
+    seen = rollout.record(genes, hidden, placed(a_world, poses, ()))
     networks = prey.one if q == 1 else prey.two
     sums = 10 * networks[:, :, 8:].sum(axis=1) * 0.5
     assert seen["left"][0, 2:] == pytest.approx(np.tanh(sums[:, 0] / 2), abs=1e-5)
@@ -404,7 +410,6 @@ def test_a_digest_belongs_to_a_file(prey_file):
         ("capture_share", 1.5),
         ("capture_predators", 0),
         ("iterations", 0),
-        ("max_hidden", 5),
         ("prey", 3),
         ("arena", 100),
     ],

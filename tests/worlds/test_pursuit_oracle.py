@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pytest
 
+from conevo.controllers.registry import controller, genome_of
 from conevo.rng import fold, stream
 from conevo.worlds.registry import world
 from conevo.worlds.rollout import Rollout
@@ -188,7 +189,7 @@ def params_of(p):
 def build(a_world, genes, slots, scenarios, heuristic):
     """The oracle's world of a scenario of one of the two worlds."""
     r, b = a_world.n_robots, int(scenarios.n_bodies[0])
-    n_inputs = a_world.controller.n_inputs
+    n_inputs = len(a_world.inputs) + controller(world=a_world).n_context
     minds = oracle.networks(genes, slots, n_inputs)
     names = {"heuristic": Dodger(), "random": Walker()}
     if a_world.name == "pursuit-v1":
@@ -291,7 +292,7 @@ def compare(a_world, genes, slots, scenarios, heuristic):
     rollout = Rollout(a_world)
     seen = rollout.record(genes, slots, scenarios, heuristic)
     w = build(a_world, genes, slots, scenarios, heuristic)
-    r, n_sensors = a_world.n_robots, a_world.controller.n_sensors
+    r, n_context = a_world.n_robots, controller(world=a_world).n_context
     robots, prey = range(r), w.prey
     tally = Tally()
     grain = 2e-5 + 2e-7 * a_world.params.arena_cm
@@ -301,21 +302,20 @@ def compare(a_world, genes, slots, scenarios, heuristic):
     refused = np.zeros((a_world.params.iterations, len(w.bodies)), bool)
     for t in range(a_world.params.iterations):
         tally.steps += 1
-        inputs = seen["inputs"][t].astype(float)
+        inputs, hidden = (seen[name][t].astype(float) for name in ("inputs", "hidden"))
         left, right = seen["left"][t].astype(float), seen["right"][t].astype(float)
         for b in w.bodies:
             if w.dead[b]:
                 assert left[b] == right[b] == 0.0
                 continue
             if b in robots:
-                check_sensors(w, b, inputs[b, :n_sensors], tally)
-            check_wheels(
-                w, b, (left[b], right[b]), inputs[b, :n_sensors] if b in robots else None, tally
-            )
+                check_sensors(w, b, inputs[b], tally)
+            check_wheels(w, b, (left[b], right[b]), inputs[b] if b in robots else None, tally)
             if b in robots:
                 if isinstance(w.minds[b], Network):
-                    assert np.abs(w.context[b] - inputs[b, n_sensors:]).max(initial=0) < 1e-4
-                    w.context[b] = list(inputs[b, n_sensors:])
+                    context = hidden[b, :n_context]
+                    assert np.abs(w.context[b] - context).max(initial=0) < 1e-4
+                    w.context[b] = list(context)
                 edge = abs(max(abs(left[b]), abs(right[b])) - 0.1) < 1e-5
                 f, turn = abs(left[b] + right[b]), abs(left[b] - right[b])
                 if not edge and abs(f - turn) > 1e-5:
@@ -378,13 +378,14 @@ def compare(a_world, genes, slots, scenarios, heuristic):
 def random_team(a_world, seed, scale):
     """Networks with random empty slots, some of them beyond the context."""
     rng = stream(seed, "team")
-    spec = a_world.controller
-    r, u = a_world.n_robots, spec.max_hidden
-    genes = rng.uniform(-scale, scale, (r * u, spec.n_genes)).astype(np.float32)
+    mind = controller(world=a_world)
+    genome = genome_of(mind, a_world)
+    r, u = a_world.n_robots, genome.max_parts
+    genes = rng.uniform(-scale, scale, (r * u, genome.n_genes)).astype(np.float32)
     genes[:, -2:] += 0.2 * scale  # rather ahead than back
     slots = np.arange(r * u, dtype=np.int32).reshape(r, u)
     slots[rng.random((r, u)) < 0.3] = -1
-    slots[:, spec.n_hidden + 1 :] = -1
+    slots[:, mind.n_hidden + 1 :] = -1
     return genes, slots
 
 
