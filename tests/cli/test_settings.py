@@ -25,8 +25,12 @@ def test_a_setting_is_listed_as_it_is_declared(say) -> None:
     rows = {row["setting"]: row for row in json.loads(
         say("list", "settings", "pursuit/team-3", "--method", "mesp", "--json").out)}  # fmt: skip
     config = resolve("pursuit/team-3", "mesp", "desk")
-    parts = {"run": config.run, "world": config.world_params, "method": config.method_config}
-    assert list(rows) == [f"{name}.{f.name}" for name in parts for f in fields(parts[name])]
+    parts = {"run": config.run, "world": config.world_params, "controller": config.controller}
+    parts["method"] = config.method_config
+    names = [f"{name}.{f.name}" for name in parts for f in fields(parts[name])]
+    names.insert(names.index("controller.n_hidden"), "controller.name")
+    assert list(rows) == names
+    assert (rows["controller.name"]["value"], rows["controller.n_hidden"]["default"]) == ("srn", 6)
     for name, row in rows.items():
         section, _, key = name.partition(".")
         assert row["value"] == getattr(parts[section], key)

@@ -41,7 +41,7 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_the_digest_is_of_all_that_decides_results_and_of_nothing_else(package: Path) -> None:
     digest = code_digest.__wrapped__
     assert digest() == code_digest()  # wherever it is installed
-    for name in ("evolution/variation.py", "kernels/network.py", "runs/loop.py", "rng.py"):
+    for name in ("evolution/variation.py", "controllers/srn.py", "runs/loop.py", "rng.py"):
         before, text = digest(), (package / name).read_text()
         (package / name).write_text(text + "\n")
         assert digest() != before, name

@@ -178,7 +178,7 @@ BAD = [
     ({"overrides": {"run.target": float("nan")}}, ["run.target = nan", "must be a finite number"]),
     ({"overrides": {"world.low_range": 3.0}}, ["world.low_range = 3.0", "must be less than"]),
     ({"overrides": {"world.low_accuracy": "x"}}, ["world.low_accuracy = 'x'", "valid number"]),
-    ({"overrides": {"world.max_hidden": 4}}, ["max_hidden", "n_hidden"]),
+    ({"overrides": {"controller.max_hidden": 4}}, ["max_hidden", "n_hidden"]),
     ({"overrides": {"method.evaluation": "all"}}, ["method.evaluation", "'systematic'"]),
     ({"overrides": {"method.elite_portion": 0}}, ["method.elite_portion = 0", "greater than 0"]),
 ]  # fmt: skip

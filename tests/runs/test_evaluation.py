@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from conevo.controllers.registry import controller
 from conevo.evolution.protocol import Trials
 from conevo.rng import stream
 from conevo.runs.evaluation import describe, make_evaluator, score
@@ -57,9 +58,10 @@ def test_a_portrait_names_castes_by_the_most_executed_action() -> None:
 
 
 def test_a_generation_shares_scenarios_and_fixed_ones_are_the_same_in_all() -> None:
-    task = world("rover/complex-1", n_robots=3, iterations=60, n_hidden=2, max_hidden=2)
+    task = world("rover/complex-1", n_robots=3, iterations=60)
+    small = controller(world=task, n_hidden=2, max_hidden=2)
     evaluate = make_evaluator(
-        Rollout(task, n_threads=1), task, seed=1, epochs=2, fittest_epochs=3, credit="robot"
+        Rollout(task, small, 1), task, seed=1, epochs=2, fittest_epochs=3, credit="robot"
     )
     genes = stream(1, "genes").uniform(-1, 1, (6, 23)).astype(np.float32)
     team = np.arange(6, dtype=np.int32).reshape(1, 3, 2)
@@ -77,9 +79,10 @@ def test_a_generation_shares_scenarios_and_fixed_ones_are_the_same_in_all() -> N
 
 def test_each_round_of_trials_meets_scenarios_of_its_own() -> None:
     """The first round those of the generation, every further one as many others."""
-    task = world("rover/complex-1", n_robots=3, iterations=60, n_hidden=2, max_hidden=2)
+    task = world("rover/complex-1", n_robots=3, iterations=60)
+    small = controller(world=task, n_hidden=2, max_hidden=2)
     evaluate = make_evaluator(
-        Rollout(task, n_threads=1), task, seed=1, epochs=2, fittest_epochs=3, credit="robot"
+        Rollout(task, small, 1), task, seed=1, epochs=2, fittest_epochs=3, credit="robot"
     )
     genes = stream(1, "genes").uniform(-1, 1, (6, 23)).astype(np.float32)
     team = np.arange(6, dtype=np.int32).reshape(1, 3, 2)

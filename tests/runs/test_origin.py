@@ -67,13 +67,13 @@ def test_an_unfinished_or_changed_origin_is_refused(tmp_path: Path) -> None:
 
 
 def test_a_run_may_be_bred_from_the_champion_of_another(tmp_path: Path) -> None:
-    origin = evolve_tiny(tmp_path / "origin", world__max_hidden=2)
+    origin = evolve_tiny(tmp_path / "origin", controller__max_hidden=2)
     run = conevo.evolve(
         "rover/complex-2",
         "mesp",
         "smoke",
         out=tmp_path / "run",
-        overrides=tiny_settings("mesp", world__max_hidden=2),
+        overrides=tiny_settings("mesp", controller__max_hidden=2),
         threads=1,
         origin=origin.path,
         of_champion=True,
@@ -94,9 +94,9 @@ def test_a_run_may_be_bred_from_the_champion_of_another(tmp_path: Path) -> None:
 def test_controllers_of_other_sizes_are_refused(of_champion: bool, tmp_path: Path) -> None:
     origin = evolve_tiny(tmp_path / "origin")
     for task, changes, words in (
-        ("gacc/complex-1", {}, r"sensors became \d+"),
-        (TASK, {"world__n_hidden": 3}, "2 context inputs became 3"),
-        (TASK, {"world__max_hidden": 5}, "4 slots for neurons became 5"),
+        ("gacc/complex-1", {}, "16 inputs became 27"),
+        (TASK, {"controller__n_hidden": 3}, "23 genes of a part became 24"),
+        (TASK, {"controller__max_hidden": 5}, "4 slots for parts became 5"),
     ):
         config = resolve(task, "cone", "smoke", overrides=tiny_settings("cone", task, **changes))
         with pytest.raises(UsageError, match=f"do not fit this world: .*{words}"):

@@ -126,7 +126,7 @@ def test_the_champion_is_the_best_of_the_fittest_teams_in_scenarios_of_their_own
         for one, record in zip(about["finalists"], by_fitness, strict=True):
             team = run.team(one["generation"])
             assert team is not None
-            played = conevo.Rollout(world, n_threads=1).evaluate(
+            played = conevo.Rollout(world, run.config.controller, 1).evaluate(
                 *team.as_trial(), world.scenarios(keys)
             )
             fitness = played.fitness[0].astype(float).mean(axis=1)
@@ -235,7 +235,7 @@ def test_the_testing_phase_is_the_team_in_the_addressed_scenarios(tmp_path: Path
     world = run.config
     place = conevo.world(TASK, **world.tables()["world"])
     keys = [fold(1, "test", k) for k in range(4)]
-    outcome = conevo.Rollout(place, n_threads=1).evaluate(
+    outcome = conevo.Rollout(place, run.config.controller, 1).evaluate(
         *champion.as_trial(), place.scenarios(keys)
     )
     areas = outcome.performance["area"][0].astype(float)

@@ -128,10 +128,10 @@ def test_the_last_team_is_tested_in_the_environment_of_every_stage(tmp_path: Pat
     own = shaping.stages[2].test_result
     assert own is not None
     assert own["champion"].items() <= last.items()
-    world = conevo.world(TASKS[0], n_robots=3, iterations=12, n_hidden=2, max_hidden=4)
+    world = conevo.world(TASKS[0], n_robots=3, iterations=12)
     champion = shaping.stages[2].champion
     assert champion is not None
-    outcome = conevo.Rollout(world, n_threads=1).evaluate(
+    outcome = conevo.Rollout(world, shaping.stages[0].config.controller, 1).evaluate(
         *champion.as_trial(), world.scenarios([fold(1, "test", k) for k in range(3)])
     )
     values = others[0]["performance"]["value"]["values"]
@@ -330,7 +330,12 @@ def test_two_processes_do_not_work_in_one_shaping(tmp_path: Path) -> None:
 # --- what cannot be done ------------------------------------------------------------------------
 
 
-SMALL = {"run.generations": 1, "world.n_hidden": 2, "world.max_hidden": 4}  # for both worlds
+# For both worlds.
+SMALL = {"run.generations": 1, "controller.n_hidden": 2, "controller.max_hidden": 4}
+    "run.generations": 1,
+    "controller.n_hidden": 2,
+    "controller.max_hidden": 4,
+}  # for both worlds
 
 
 @pytest.mark.parametrize(

@@ -29,8 +29,8 @@ TINY: dict[str, Any] = {
     "run.n_tests": 3,
     "world.n_robots": 3,
     "world.iterations": 12,
-    "world.n_hidden": 2,
-    "world.max_hidden": 4,
+    "controller.n_hidden": 2,
+    "controller.max_hidden": 4,
     "method.genotypes": 4,
 }
 # Windows of one generation, so that thresholds and controller sizes change within five.

@@ -277,7 +277,7 @@ def resolve(
             all that it does; nothing has been written.
         EnvironmentFailure: the file cannot be read.
     """
-    from conevo.controllers.registry import find
+    from conevo.controllers.registry import find, refuse_misfit
     from conevo.evolution.methods.registry import resolve as resolve_method
     from conevo.worlds.registry import resolve as resolve_world
 
@@ -328,7 +328,7 @@ def resolve(
         method_config=built["method"],
         changed=tuple(_changed(parts, built, base)),
     )
-    config.build_world()  # refuses parameters that this world cannot have
+    refuse_misfit(config.controller, config.build_world())  # and what this world cannot have
     return config
 
 

@@ -1,8 +1,8 @@
 """The settings of a run, and every setting with its unit, bounds and meaning, as it is declared.
 
-A setting is a field of a dataclass: ``RunSettings``, a world's parameters or a method's. Its bounds
-are those of its annotation. Its unit and meaning are the text below the field: "(unit) meaning.",
-or that below the field of the class from which it is inherited.
+A setting is a field of a dataclass: of a run, a world, a controller or a method. Its bounds are those
+of its annotation. Its unit and meaning are the text below the field: "(unit) meaning.", or that
+below the field of the class from which it is inherited.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import itertools
 import re
 import textwrap
 import types
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import resources
 from typing import (
     TYPE_CHECKING,
@@ -29,6 +29,7 @@ from typing import (
 
 from annotated_types import Ge, Le
 
+from conevo.controllers.registry import CONTROLLERS, DEFAULT, suggested
 from conevo.parameters import parameters
 
 if TYPE_CHECKING:
@@ -112,16 +113,22 @@ def declared(part: type[Any]) -> list[Setting]:
 
 def settings_of(config: RunConfig) -> list[tuple[str, Setting, Any]]:
     """Return (section, setting, value) of everything that decides a run, in the file's order."""
-    parts = (
-        ("run", RunSettings, config.run),
-        ("world", type(config.world_params), config.world_params),
-        ("controller", type(config.controller), config.controller),
-        ("method", type(config.method_config), config.method_config),
-    )
+    parts = {
+        "run": config.run,
+        "world": config.world_params,
+        "controller": config.controller,
+        "method": config.method_config,
+    }
+    found = {section: declared(type(part)) for section, part in parts.items()}
+    own = suggested(config.controller.name, config.entry.world_class)
+    found["controller"] = [
+        Setting("name", DEFAULT, "", ", ".join(CONTROLLERS), "kind of controller"),
+        *(replace(one, default=own.get(one.name, one.default)) for one in found["controller"]),
+    ]
     return [
-        (section, setting, getattr(values, setting.name))
-        for section, part, values in parts
-        for setting in declared(part)
+        (section, setting, getattr(parts[section], setting.name))
+        for section, settings in found.items()
+        for setting in settings
     ]
 
 
