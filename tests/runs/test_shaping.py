@@ -332,10 +332,6 @@ def test_two_processes_do_not_work_in_one_shaping(tmp_path: Path) -> None:
 
 # For both worlds.
 SMALL = {"run.generations": 1, "controller.n_hidden": 2, "controller.max_hidden": 4}
-    "run.generations": 1,
-    "controller.n_hidden": 2,
-    "controller.max_hidden": 4,
-}  # for both worlds
 
 
 @pytest.mark.parametrize(
