@@ -99,6 +99,6 @@ def test_controllers_of_other_sizes_are_refused(of_champion: bool, tmp_path: Pat
         (TASK, {"controller__max_hidden": 5}, "4 slots for parts became 5"),
     ):
         config = resolve(task, "cone", "smoke", overrides=tiny_settings("cone", task, **changes))
-        with pytest.raises(UsageError, match=f"do not fit this world: .*{words}"):
+        with pytest.raises(UsageError, match=f"do not fit .*: .*{words}"):
             start(config, tmp_path / "run", threads=1, origin=origin, of_champion=of_champion)
     assert not (tmp_path / "run").exists()

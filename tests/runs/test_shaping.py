@@ -463,3 +463,15 @@ def test_a_kill_before_the_prey_file_is_written_is_not_noticed(tmp_path: Path) -
     one, two = (stages_content(p) for p in (path, whole.path))
     assert [one.pop("prey")[:2], two.pop("prey")[:2]] == [b"PK", b"PK"]  # they name other commands
     assert one == two
+
+
+@pytest.mark.parametrize(
+    ("setting", "value"), [("bias", True), ("recurrent", True), ("weight_scale", 5.0)]
+)
+def test_prey_that_a_prey_file_cannot_hold_are_refused(
+    setting: str, value: Any, tmp_path: Path
+) -> None:
+    settings = PREY | {f"controller.{setting}": value}
+    with pytest.raises(UsageError, match=f"controller.{setting} = {value}: prey of the pursuit"):
+        start_shaping(PREY_TASKS, "cone", "smoke", out=tmp_path / "prey", overrides=settings)
+    assert not (tmp_path / "prey").exists()

@@ -14,7 +14,6 @@ from conevo.runs.store import Store
 if TYPE_CHECKING:
     from conevo.evolution.protocol import State
     from conevo.runs.config import RunConfig
-    from conevo.runs.run import Run
 
 __all__ = ["ancestor_of", "refuse_other_controllers"]
 
@@ -57,12 +56,16 @@ def ancestor_of(
     return state, {"origin": about | {"generation": generation, "checkpoint": digest}}
 
 
-def refuse_other_controllers(origin: Run, config: RunConfig) -> None:
-    """Raise UsageError if a run's controllers are not those that another configuration has.
+def refuse_other_controllers(what: str, old: RunConfig, new: RunConfig) -> None:
+    """Raise UsageError if controllers of one configuration are not those that another has.
 
     They may have another number of hidden neurons at the start, as long as genotypes mean the same.
+
+    Args:
+        what: has the controllers, for the message.
+        old: their configuration.
+        new: of the world that they are to play in.
     """
-    old, new = origin.config, config
     there, here = old.build_world(), new.build_world()
     a, b = genome_of(old.controller, there), genome_of(new.controller, here)
     sizes = {
@@ -80,6 +83,5 @@ def refuse_other_controllers(origin: Run, config: RunConfig) -> None:
     ]
     if different:
         raise UsageError(
-            f"the controllers of {origin.path} ({origin.config.task}) do not fit this world: "
-            f"{'; '.join(different)}"
+            f"the controllers of {what} ({old.task}) do not fit {new.task}: {'; '.join(different)}"
         )

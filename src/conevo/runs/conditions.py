@@ -48,7 +48,7 @@ def test_under(
     """
     own = run.test(scenarios, seed, threads=threads)
     config = _changed(run.config, on, world, robots)
-    refuse_other_controllers(run, config)
+    refuse_other_controllers(str(run.path), run.config, config)
     lab = Lab.equip(config, threads, run.provenance["device"])
     champion = run.champion
     if champion is None:

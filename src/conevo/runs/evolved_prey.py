@@ -10,13 +10,31 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from conevo.errors import UsageError
+
 if TYPE_CHECKING:
+    from conevo.runs.config import RunConfig
     from conevo.runs.run import Run
 
-__all__ = ["PREY", "PREY_TASKS", "save_prey"]
+__all__ = ["PREY", "PREY_TASKS", "refuse_other_prey", "save_prey"]
 
 PREY = "prey.npz"
 PREY_TASKS = tuple(f"prey-v1/shaping-{number}" for number in range(1, 7))
+
+
+def refuse_other_prey(stages: Sequence[RunConfig]) -> None:
+    """Raise UsageError unless the prey are networks such as a prey file holds."""
+    from conevo.worlds.prey_sets import WEIGHT_SCALE
+
+    right = {"name": "srn", "recurrent": False, "bias": False, "weight_scale": WEIGHT_SCALE}
+    for stage in stages:
+        table = stage.tables()["controller"]
+        for key, value in right.items():
+            if table.get(key) != value:
+                raise UsageError(
+                    f"controller.{key} = {table.get(key)!r}: prey of the pursuit world are "
+                    f"feed-forward networks with controller.{key} = {value!r}"
+                )
 
 
 def save_prey(stages: Sequence[Run], path: Path) -> None:

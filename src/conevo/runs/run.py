@@ -141,7 +141,7 @@ def beginning(
     path = Path(out) if out is not None else RUNS / f"{config.label}{suffix}"
     refuse_existing(path)
     if origin is not None:
-        refuse_other_controllers(origin, config)
+        refuse_other_controllers(str(origin.path), origin.config, config)
     return path, ancestor, ancestry
 
 

@@ -1,8 +1,8 @@
 """The settings of a run, and every setting with its unit, bounds and meaning, as it is declared.
 
-A setting is a field of a dataclass: of a run, a world, a controller or a method. Its bounds are those
-of its annotation. Its unit and meaning are the text below the field: "(unit) meaning.", or that
-below the field of the class from which it is inherited.
+A setting is a field of a dataclass: of a run, a world, a controller or a method. Its bounds are
+those of its annotation. Its unit and meaning are the text below the field: "(unit) meaning.", or
+that below the field of the class from which it is inherited.
 """
 
 from __future__ import annotations

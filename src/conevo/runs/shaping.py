@@ -29,7 +29,7 @@ from conevo.reading import check, read_bytes, read_toml
 from conevo.runs.code import last_code, refuse_other_code, sessions_of
 from conevo.runs.directory import CONFIG, SHAPING, Directory, appearing, refuse_existing
 from conevo.runs.durable import replace_file
-from conevo.runs.evolved_prey import PREY, PREY_TASKS, save_prey
+from conevo.runs.evolved_prey import PREY, PREY_TASKS, refuse_other_prey, save_prey
 from conevo.runs.outline import Outline, identify, outline_of
 from conevo.runs.run import RUNS, Record, Run, Watch, start
 from conevo.runs.time_limit import TimeLimit
@@ -93,6 +93,7 @@ def start_shaping(
             not fit the next stage, or ``out`` exists; nothing was written.
         EnvironmentFailure: no such device, full disk, no permission.
     """
+    from conevo.runs.ancestry import refuse_other_controllers
     from conevo.runs.config import resolve
     from conevo.runs.inputs import keep_inputs
     from conevo.runs.lab import Lab
@@ -102,9 +103,12 @@ def start_shaping(
     configs = [resolve(task, method, preset, seed, config, overrides, place) for task in tasks]
     path = Path(out) if out is not None else RUNS / label(configs)
     refuse_existing(path)
+    if tuple(stage.task for stage in configs) == PREY_TASKS:
+        refuse_other_prey(configs)
     state: State | None = None
-    for stage in configs:
+    for before, stage in zip([configs[0], *configs], configs, strict=False):
         state = Lab.equip(stage, threads, device).first_state(state)
+        refuse_other_controllers("a stage", before, stage)
     with appearing(path) as draft:
         about = {
             "format": FORMAT,

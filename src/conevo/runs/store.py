@@ -45,6 +45,7 @@ from conevo.reading import (
     whole_lines,
 )
 from conevo.runs import checkpoint
+from conevo.runs.code import version
 from conevo.runs.directory import CONFIG, Directory, appearing, as_json
 from conevo.runs.durable import append_line, replace_file, writing
 from conevo.runs.outline import LENGTH, Outline, digest_of, read_outline
@@ -129,14 +130,26 @@ class Store(Directory):
         Raises:
             UsageError: it is not the one the run was started with, or its world is not there.
         """
-        from conevo.runs.config import resolve
-
         self.read_outline()
         text, extension = read_bytes(self.path / CONFIG, MOST_TOML), self._read_extension()
         if self._config is None or self._config[0] != text:
-            self._config = text, resolve(file=self.path / CONFIG)
+            self._config = text, self._resolve()
         config = self._config[1]
         return config.of_length(extension["length"]) if extension else config
+
+    def _resolve(self) -> RunConfig:
+        """Return what the configuration file says; name both versions if another one wrote it."""
+        from conevo.runs.config import resolve
+
+        try:
+            return resolve(file=self.path / CONFIG)
+        except UsageError as error:
+            made_by, here = self.read_provenance()["conevo"], version("conevo")
+            if made_by == here:
+                raise
+            raise UsageError(
+                f"{self.path} was made by conevo {made_by} and this is conevo {here}: {error}"
+            ) from error
 
     def read_provenance(self) -> Record:
         """Return versions, machine and sessions.
