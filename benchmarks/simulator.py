@@ -14,6 +14,8 @@ from collections.abc import Callable
 
 import numpy as np
 
+from conevo.controllers.registry import controller
+from conevo.controllers.srn import Srn
 from conevo.rng import fold, stream
 from conevo.worlds.protocol import World
 from conevo.worlds.registry import world as build_world
@@ -26,15 +28,15 @@ WORLDS = ("rover/complex-5", "pursuit/team-3", "gacc/complex-9")
 
 def workload(world: World, rollout: Rollout, batch: int) -> Callable[[], float]:
     """Return a function that evaluates ``batch`` teams once and gives team-steps per second."""
-    spec, n_robots = world.controller, world.n_robots
+    genome, n_robots = rollout.genome, world.n_robots
     rng = stream(SEED, "genes", batch)
-    slots = np.full(spec.max_hidden, -1, dtype=np.int32)
-    slots[: spec.n_hidden] = np.arange(spec.n_hidden, dtype=np.int32)
-    robots = np.arange(batch * n_robots, dtype=np.int32) * spec.n_hidden
+    slots = np.full(genome.max_parts, -1, dtype=np.int32)
+    slots[: genome.n_parts] = np.arange(genome.n_parts, dtype=np.int32)
+    robots = np.arange(batch * n_robots, dtype=np.int32) * genome.n_parts
     teams = np.where(slots >= 0, robots[:, None] + slots, -1).astype(np.int32)
-    teams = teams.reshape(batch, n_robots, spec.max_hidden)
-    n_genotypes = batch * n_robots * spec.n_hidden
-    genes = rng.uniform(-1.0, 1.0, (n_genotypes, spec.n_genes)).astype(np.float32)
+    teams = teams.reshape(batch, n_robots, genome.max_parts)
+    n_genotypes = batch * n_robots * genome.n_parts
+    genes = rng.uniform(-1.0, 1.0, (n_genotypes, genome.n_genes)).astype(np.float32)
     scenarios = world.scenarios([fold(SEED, "epoch", 0, 0)])
 
     def measure() -> float:
@@ -49,11 +51,13 @@ def workload(world: World, rollout: Rollout, batch: int) -> Callable[[], float]:
 
 def label(world: World) -> str:
     """Return what was simulated: world, robots, their networks, iterations."""
-    spec = world.controller
+    mind = controller(world=world)
+    assert isinstance(mind, Srn)
     name = f"{world.name.rpartition('-v')[0]}/{world.environment}"
+    sizes = f"{len(world.inputs) + mind.n_context}-{mind.n_hidden}-{len(world.outputs)}"
     return (
-        f"{name}, {world.n_robots} robots, {spec.n_inputs}-{spec.n_hidden}-{spec.n_outputs} "
-        f"recurrent networks, {world.params.iterations} iterations"
+        f"{name}, {world.n_robots} robots, {sizes} recurrent networks, "
+        f"{world.params.iterations} iterations"
     )
 
 

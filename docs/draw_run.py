@@ -52,7 +52,7 @@ def replay(run, scenario):
         detected [K], and the value the lander recorded.
     """
     world = world_of(run)
-    rollout = Rollout(world, n_threads=1)
+    rollout = Rollout(world, run.config.controller, n_threads=1)
     scene = world.scenarios([fold(run.config.run.seed, "test", scenario)])
     genes, teams = run.champion.as_trial()
     seen = rollout.record(genes, teams[0], scene)

@@ -203,9 +203,9 @@ def flee(prey: Prey, seed: int) -> list[Row]:
     else:
         found = load(None if kind == "shipped" else name)
         slots = np.where(found.one_active, np.arange(found.one_active.size)[None], -1)
-        wide = np.full((1, 1, world.controller.max_hidden), -1, dtype=np.int32)
-        wide[0, :, : slots.shape[1]] = slots
         teams = controlled(world, kind, -1)
+        wide = teams.slots.copy()
+        wide[0, :, : slots.shape[1]] = slots
         teams = type(teams)(found.one[0], wide, teams.heuristic, teams.kinds)
     outcome = play(world, teams, keys_of(seed, N_SCENARIOS, "flee"))
     rows = []

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 import conevo
+from conevo.controllers.registry import genome_of
 from conevo.evolution.population import random_genes
 from conevo.rng import fold, stream
 from conevo.worlds.protocol import Outcome, World
@@ -59,10 +60,10 @@ class Teams:
 
 def controlled(world: World, kind: str, who: Any) -> Teams:
     """Return one team without networks; ``who`` are its heuristic controllers [R], or one."""
-    spec, r = world.controller, world.n_robots
+    genome, r = genome_of(conevo.controller(world=world), world), world.n_robots
     return Teams(
-        np.zeros((1, spec.n_genes), dtype=np.float32),
-        np.full((1, r, spec.max_hidden), -1, dtype=np.int32),
+        np.zeros((1, genome.n_genes), dtype=np.float32),
+        np.full((1, r, genome.max_parts), -1, dtype=np.int32),
         np.broadcast_to(np.asarray(who, dtype=np.int32), (1, r)),
         (kind,),
     )
@@ -70,21 +71,21 @@ def controlled(world: World, kind: str, who: Any) -> Teams:
 
 def random_networks(world: World, n: int, seed: int, *where: str) -> Teams:
     """Return teams of random networks of the initial size, every robot different."""
-    spec, r = world.controller, world.n_robots
-    rows = (r * spec.n_hidden, spec.n_genes)
+    genome, r = genome_of(conevo.controller(world=world), world), world.n_robots
+    rows = (r * genome.n_parts, genome.n_genes)
     genes = [random_genes(stream(seed, *where, "team", k), rows) for k in range(n)]
-    slots = np.full((n, r, spec.max_hidden), -1, dtype=np.int32)
-    slots[:, :, : spec.n_hidden] = np.arange(n * rows[0]).reshape(n, r, spec.n_hidden)
+    slots = np.full((n, r, genome.max_parts), -1, dtype=np.int32)
+    slots[:, :, : genome.n_parts] = np.arange(n * rows[0]).reshape(n, r, genome.n_parts)
     modes = np.full((n, r), -1, dtype=np.int32)
     return Teams(np.concatenate(genes), slots, modes, ("random",) * n)
 
 
 def random_clones(world: World, n: int, seed: int, *where: str) -> Teams:
     """Return teams of which all robots have the same random network of the initial size."""
-    spec, r = world.controller, world.n_robots
-    genes = random_genes(stream(seed, *where, "clones"), (n * spec.n_hidden, spec.n_genes))
-    slots = np.full((n, r, spec.max_hidden), -1, dtype=np.int32)
-    slots[:, :, : spec.n_hidden] = np.arange(len(genes)).reshape(n, 1, spec.n_hidden)
+    genome, r = genome_of(conevo.controller(world=world), world), world.n_robots
+    genes = random_genes(stream(seed, *where, "clones"), (n * genome.n_parts, genome.n_genes))
+    slots = np.full((n, r, genome.max_parts), -1, dtype=np.int32)
+    slots[:, :, : genome.n_parts] = np.arange(len(genes)).reshape(n, 1, genome.n_parts)
     return Teams(genes, slots, np.full((n, r), -1, dtype=np.int32), ("clones",) * n)
 
 
@@ -92,6 +93,8 @@ def champion(run: conevo.Run, kind: str) -> Teams:
     """Return the fittest team of a run."""
     if run.champion is None:
         raise SystemExit(f"{run.path} has no champion yet")
+    if run.config.controller != conevo.controller(world=run.config.build_world()):
+        raise SystemExit(f"{run.path} has other controllers than its world suggests")
     pool, slots = run.champion.as_trial()
     return Teams(pool, slots, np.full(slots.shape[:2], -1, dtype=np.int32), (kind,))
 
