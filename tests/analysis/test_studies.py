@@ -244,9 +244,11 @@ def staged(monkeypatch: pytest.MonkeyPatch) -> list[tuple[Any, ...]]:
             for one, name in zip(told(conducts), labels, strict=True)
         ]
 
-    def keep(self: Rollout, genes: Any, teams: Any, scenarios: Any, modes: Any = None) -> Any:
+    def keep(
+        self: Rollout, genes: Any, teams: Any, scenarios: Any, modes: Any = None, rounds: int = 1
+    ) -> Any:
         played.append((teams, scenarios, modes))
-        return evaluate(self, genes, teams, scenarios, modes)
+        return evaluate(self, genes, teams, scenarios, modes, rounds)
 
     monkeypatch.setattr(pursuit, "lifetimes", label_by_hand)
     monkeypatch.setattr(Rollout, "evaluate", keep)
