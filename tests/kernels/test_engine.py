@@ -15,7 +15,7 @@ from conevo.controllers.registry import controller
 from conevo.errors import EnvironmentFailure
 from conevo.kernels import engine
 from conevo.worlds.registry import WORLDS, world
-from conevo.worlds.rollout import Rollout, episode_kernel
+from conevo.worlds.rollout import Rollout, episode_kernel, loading_kernel
 
 PACKAGE = Path(conevo.__file__).parent
 PLAY = """
@@ -116,11 +116,13 @@ def test_the_cuda_form_compiles_for_sm_90_without_a_device(entry, tmp_path):
     engine.start()
     task = first_environment(entry)
     mind = controller(world=task).mind(len(task.inputs), len(task.outputs))
-    kernel = episode_kernel(task.simulation(), mind)
-    files = wp.compile_aot_module(kernel.module, arch=90, module_dir=tmp_path)
-    assert [f.suffixes[-2:] for f in files] == [[".sm90", ".cubin"]]
-    assert files[0].read_bytes()[:4] == b"\x7fELF"
-    assert files[0].stat().st_size > 20_000
+    episode = episode_kernel(task.simulation(), mind)
+    loading = loading_kernel(mind.weights, mind.shape_type, mind.load)
+    for kernel, size in ((episode, 20_000), (loading, 5_000)):
+        files = wp.compile_aot_module(kernel.module, arch=90, module_dir=tmp_path)
+        assert [f.suffixes[-2:] for f in files] == [[".sm90", ".cubin"]]
+        assert files[0].read_bytes()[:4] == b"\x7fELF"
+        assert files[0].stat().st_size > size
 
 
 @pytest.mark.cuda

@@ -56,6 +56,33 @@ def test_a_mistake_in_a_world_is_one_line_with_its_place_and_no_run(
     assert [p.name for p in tmp_path.iterdir()] == ["light.py"]
 
 
+NAMES = '    inputs: ClassVar[tuple[str, ...]] = ("light x", "light y")\n'
+UNFIT = {
+    "setting": ('{"n_hidden": 4', '{"n_hiden": 4', "setting 'n_hiden' in the controller of"),
+    "settings": ('{"n_hidden": 4, "max_hidden": 8}', "None", "must be a dict of settings"),
+    "bound": ('"n_hidden": 4', '"n_hidden": 40', "controller.n_hidden = 40 of world 'light-v1': "),
+    "type": ('"n_hidden": 4', '"n_hidden": "4"', "controller.n_hidden = '4' of world 'light-v1': "),
+    "outputs": ('"dx", "dy")', '"dx", "dy", *"abcde")', "'srn' has at most 8 outputs, and"),
+    "inputs": (NAMES, "", "world light-v1 needs inputs, a tuple of names"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", UNFIT)
+def test_a_world_that_no_controller_fits_is_one_line_and_no_run(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    old, new, words = UNFIT[name]
+    written(tmp_path / "light.py", (old, new))
+    with pytest.raises(SystemExit) as caught:
+        main(["run", "light.py:dark-1", "--preset", "smoke"])
+    out, err = capfd.readouterr()
+    assert (caught.value.code, out, err.count("\n")) == (2, "", 1)
+    assert err.startswith("conevo: error: ")
+    assert words in err
+    assert [p.name for p in tmp_path.iterdir()] == ["light.py"]
+
+
 def test_no_campaign_appears_with_a_world_that_cannot_be_built(tmp_path: Path) -> None:
     file = written(tmp_path / "light.py", (SCORE, "third_name"))
     factors = {"world": (f"{file}:dark-1",), "method": ("homcne",)}
