@@ -80,6 +80,8 @@ def lookup(file: str, name: str | None) -> Any:
         return found
     node: ast.stmt | ast.Module | None = parsed(path)
     for part in name.split(".") if name else []:
+        if isinstance(node, ast.AnnAssign) and isinstance(node.value, ast.Dict):
+            return literal(node.value).get(part, UNKNOWN)
         if isinstance(node, ast.ClassDef):
             node = inherited(node, part)
         else:

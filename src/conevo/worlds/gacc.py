@@ -217,8 +217,11 @@ class GaccWorld:
         *("move: dx", "move: dy"),
         *(f"grip {kind}" for kind in TYPES),
     )
-    # Section 6.2.7. Choice: controllers can grow to twice the initial number.
-    controller: ClassVar[dict[str, Any]] = {"n_hidden": 10, "max_hidden": 20, "bias": True}
+    controller: ClassVar[dict[str, Any]] = {
+        "n_hidden": 10,  # section 6.2.7
+        "max_hidden": 20,  # Choice: twice the initial number
+        "bias": True,  # section 6.2.7
+    }
     actions: ClassVar[tuple[str, ...]] = (
         *(f"detect {kind}" for kind in TYPES),
         "move",

@@ -69,8 +69,11 @@ class PreyWorld:
     name: ClassVar[str] = "prey-v1"
     inputs: ClassVar[tuple[str, ...]] = names_of(("infrared",), 8)
     outputs: ClassVar[tuple[str, ...]] = ("left wheel", "right wheel")
-    # Section 4.1 and fig. 4.2. Choice: controllers can grow to twice the initial number.
-    controller: ClassVar[dict[str, Any]] = {"n_hidden": 5, "max_hidden": 10, "recurrent": False}
+    controller: ClassVar[dict[str, Any]] = {
+        "n_hidden": 5,  # section 4.1
+        "max_hidden": 10,  # Choice: twice the initial number
+        "recurrent": False,  # fig. 4.2
+    }
     actions: ClassVar[tuple[str, ...]] = ACTIONS
     castes: ClassVar[tuple[str, ...]] = actions
     performance: ClassVar[tuple[Measure, ...]] = (

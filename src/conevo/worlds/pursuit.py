@@ -108,8 +108,10 @@ class PursuitWorld:
     name: ClassVar[str] = "pursuit-v1"
     inputs: ClassVar[tuple[str, ...]] = names_of(("infrared", "light"), 8)
     outputs: ClassVar[tuple[str, ...]] = ("left wheel", "right wheel")
-    # Section 4.1. Choice: controllers can grow to twice the initial number.
-    controller: ClassVar[dict[str, Any]] = {"n_hidden": 6, "max_hidden": 12}
+    controller: ClassVar[dict[str, Any]] = {
+        "n_hidden": 6,  # section 4.1
+        "max_hidden": 12,  # Choice: twice the initial number
+    }
     actions: ClassVar[tuple[str, ...]] = ACTIONS
     castes: ClassVar[tuple[str, ...]] = actions
     performance: ClassVar[tuple[Measure, ...]] = (

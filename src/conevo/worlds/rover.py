@@ -161,8 +161,10 @@ class RoverWorld:
     name: ClassVar[str] = "rover-v1"
     inputs: ClassVar[tuple[str, ...]] = names_of(("rovers", "red rocks"), 8)
     outputs: ClassVar[tuple[str, ...]] = ("low", "med", "hi", "move: dx", "move: dy")
-    # Section 5.2. Choice: controllers can grow to twice the initial number.
-    controller: ClassVar[dict[str, Any]] = {"n_hidden": 10, "max_hidden": 20}
+    controller: ClassVar[dict[str, Any]] = {
+        "n_hidden": 10,  # section 5.2
+        "max_hidden": 20,  # Choice: twice the initial number
+    }
     actions: ClassVar[tuple[str, ...]] = ("low", "med", "hi", "move")
     castes: ClassVar[tuple[str, ...]] = actions
     performance: ClassVar[tuple[Measure, ...]] = (
