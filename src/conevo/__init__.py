@@ -17,7 +17,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from conevo.controllers.base import Controller
+    from conevo.controllers.protocol import Controller
     from conevo.controllers.registry import CONTROLLERS, controller
     from conevo.errors import ConevoError, EnvironmentFailure, UsageError
     from conevo.evolution.methods.registry import METHODS, method
@@ -56,7 +56,7 @@ _HOMES = {
     "METHODS": "evolution.methods.registry",
     "WORLDS": "worlds.registry",
     "ConevoError": "errors",
-    "Controller": "controllers.base",
+    "Controller": "controllers.protocol",
     "EnvironmentFailure": "errors",
     "Layout": "evolution.protocol",
     "Method": "evolution.protocol",

@@ -25,7 +25,7 @@ from conevo.analysis.behaviours import (
 from conevo.analysis.captures import Capture, find_captures
 from conevo.analysis.fittest import equip
 from conevo.analysis.sensors import Spell, average, find_spells, profile, sample
-from conevo.controllers.base import Controller
+from conevo.controllers.protocol import Controller
 from conevo.errors import UsageError
 from conevo.kernels.khepera import AXLE, RADIUS
 from conevo.rng import fold, stream

@@ -256,7 +256,7 @@ def _planned(
     from conevo.campaigns.campaign import CAMPAIGNS
     from conevo.campaigns.plan_file import preset_names, read_plan, read_preset
     from conevo.cli.find import campaign_at
-    from conevo.runs.config import parse_assignments
+    from conevo.runs.assignments import parse_assignments
 
     there = campaign_at(name)
     if there is not None and out is not None and Path(out).resolve() != there.path.resolve():

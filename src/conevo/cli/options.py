@@ -83,7 +83,7 @@ class Order:
     comparing: bool = False
 
     def __post_init__(self) -> None:
-        from conevo.runs.config import parse_assignments
+        from conevo.runs.assignments import parse_assignments
 
         self.style = style_of(self.as_json, self.quiet, self.verbose)
         self.overrides = parse_assignments(self.settings)

@@ -74,7 +74,7 @@ def test(
     found = find_run(run)
     if is_changed:
         from conevo.cli.summary import conditions_text
-        from conevo.runs.config import parse_assignments
+        from conevo.runs.assignments import parse_assignments
 
         world = parse_assignments(settings)
         both = found.test_under(on, world, robots, scenarios, seed, threads=threads)

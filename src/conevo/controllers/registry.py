@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, cast
 from conevo.errors import UsageError, unknown_name
 
 if TYPE_CHECKING:
-    from conevo.controllers.base import Controller, Genome
+    from conevo.controllers.protocol import Controller, Genome
 
 __all__ = [
     "CONTROLLERS",

@@ -20,7 +20,7 @@ import numpy as np
 import warp as wp
 from annotated_types import Ge, Gt, Le
 
-from conevo.controllers.base import Bools, Floats, Genome, Mind
+from conevo.controllers.protocol import Bools, Floats, Genome, Mind
 from conevo.errors import UsageError
 from conevo.kernels.outputs import sigmoid, sigmoid_of
 from conevo.parameters import parameters
@@ -77,7 +77,7 @@ def load(
     rows: wp.array3d[int],
     n: int,
 ) -> None:
-    """Build robot ``i``'s network from neuron genotypes; see ``controllers.base.Mind``."""
+    """Build robot ``i``'s network from neuron genotypes; see ``controllers.protocol.Mind``."""
     used = int(0)
     for chunk in range(shape.n_chunks):
         filled = wide_vector()
@@ -241,7 +241,7 @@ class Srn:
     def forward(
         self, genes: Floats, active: Bools, memory: Floats, inputs: Floats, n_outputs: int
     ) -> tuple[Floats, Floats]:
-        """Run robots' networks once; see ``controllers.base.Controller``."""
+        """Run robots' networks once; see ``controllers.protocol.Controller``."""
         weights = np.float32(self.weight_scale) * genes
         context = memory[:, : self.n_context, 0]
         seen = np.concatenate([inputs, context], axis=1)

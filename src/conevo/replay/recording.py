@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from conevo.analysis.fittest import equip
-from conevo.controllers.base import Controller
+from conevo.controllers.protocol import Controller
 from conevo.errors import UsageError
 from conevo.replay.channel import Channel
 from conevo.replay.trajectory import FORMAT, About, Trajectory

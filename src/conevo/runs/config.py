@@ -51,12 +51,12 @@ import tomli_w
 from conevo.controllers.registry import DEFAULT, suggested
 from conevo.errors import UsageError, shown, unknown_name
 from conevo.parameters import WrongValue, refuse_unknown
-from conevo.reading import DamagedFile, parse_toml, read_toml
+from conevo.reading import parse_toml, read_toml
 from conevo.runs.outline import LENGTH, Outline, identify, outline_of
 from conevo.runs.settings import RunSettings
 
 if TYPE_CHECKING:
-    from conevo.controllers.base import Controller
+    from conevo.controllers.protocol import Controller
     from conevo.evolution.methods.registry import MethodEntry
     from conevo.evolution.protocol import Method
     from conevo.worlds.protocol import World
@@ -65,8 +65,6 @@ if TYPE_CHECKING:
 __all__ = [
     "PRESETS",
     "RunConfig",
-    "parse_assignment",
-    "parse_assignments",
     "resolve",
 ]
 
@@ -330,36 +328,6 @@ def resolve(
     )
     refuse_misfit(config.controller, config.build_world())  # and what this world cannot have
     return config
-
-
-def parse_assignment(text: str) -> tuple[str, Any]:
-    """Return key and value of "key=value"; the value is TOML, or else plain text.
-
-    Raises:
-        UsageError: there is no "=".
-    """
-    key, equals, value = text.partition("=")
-    if not equals or not key.strip():
-        raise UsageError(f"--set {text!r}: expected key=value, for example run.generations=5")
-    try:
-        return key.strip(), parse_toml(f"value = {value}", "a value")["value"]
-    except DamagedFile:
-        return key.strip(), value.strip()
-
-
-def parse_assignments(texts: Iterable[str]) -> dict[str, Any]:
-    """Return the settings of several "key=value".
-
-    Raises:
-        UsageError: one has no "=", or two set the same key.
-    """
-    found: dict[str, Any] = {}
-    for text in texts:
-        key, value = parse_assignment(text)
-        if key in found:
-            raise UsageError(f"--set {text!r}: {key} is set twice")
-        found[key] = value
-    return found
 
 
 def _read_file(path: Path) -> Layer:

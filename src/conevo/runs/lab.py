@@ -6,7 +6,7 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
-from conevo.controllers.base import Controller
+from conevo.controllers.protocol import Controller
 from conevo.controllers.registry import genome_of
 from conevo.errors import EnvironmentFailure
 from conevo.evolution.inheritance import breed_from, hand_on

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 import warp as wp
 
-from conevo.controllers.base import Controller, Mind
+from conevo.controllers.protocol import Controller, Mind
 from conevo.controllers.registry import controller as make_controller
 from conevo.controllers.registry import genome_of, refuse_misfit
 from conevo.errors import EnvironmentFailure
