@@ -1,17 +1,20 @@
-"""What every method promises; a registry entry enrols it.
+"""What every method promises; a registry entry enrols it, and so does a file in examples/.
 
 Nothing in the first part knows what a genotype is: it may be a neuron, a network or a whole team.
 The second part is for methods that have populations of neurons or networks.
 """
 
+import re
 from dataclasses import fields, is_dataclass, replace
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from conevo.evolution import METHODS, Layout, Scores, method
 from conevo.evolution.generation import Populations
+from conevo.evolution.methods.registry import name_in, resolve
 from conevo.runs.checkpoint import difference, load_like, refuse_unkept, save
 
 LAYOUT = Layout(n_robots=3, n_hidden=3, max_hidden=5, n_genes=4)
@@ -19,9 +22,20 @@ GENOTYPES = 6
 ROUNDS = 4
 
 
+def in_files():
+    """Return "FILE.py:NAME" of every method in examples/ that is not one of the package, too."""
+    for path in sorted((Path(__file__).parents[2] / "examples").glob("*.py")):
+        found = re.search(
+            r'^ENTRY = MethodEntry\(\n    name="(.*)"', path.read_text(), re.MULTILINE
+        )
+        if found and found[1] not in METHODS:
+            yield f"{path}:{found[1]}"
+
+
 def variants():
     """Return (name, config) for every method and evaluation scheme, with short windows."""
-    for name, entry in METHODS.items():
+    for name in (*METHODS, *in_files()):
+        entry = resolve(name)
         names = {field.name for field in fields(entry.config_class)}
         small = {"genotypes": GENOTYPES, "elite_portion": 0.5}
         small |= dict.fromkeys(("stagnation_v", "stagnation_w", "stagnation_y"), 1)
@@ -38,7 +52,9 @@ def variants():
 
 VARIANTS = list(variants())
 IDS = [
-    "-".join([name, config.get("evaluation", "single"), *filter(None, [config.get("type_c")])])
+    "-".join(
+        filter(None, [name_in(name), config.get("evaluation", "single"), config.get("type_c")])
+    )
     for name, config in VARIANTS
 ]
 every_variant = pytest.mark.parametrize(("name", "config"), VARIANTS, ids=IDS)
