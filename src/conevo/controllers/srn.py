@@ -171,22 +171,20 @@ def think(
 class Srn:
     """Settings of a simple recurrent network; see the module.
 
-    Attributes:
-        n_hidden (neurons): hidden neurons at the start, and context inputs.
-        max_hidden (neurons): hidden neurons that it can grow to.
-        recurrent: whether it has context inputs; without it is feed-forward.
-        bias: whether hidden and output units have a bias, of weight 1 and not evolved.
-        weight_scale: connection weight of gene 1 (tables 4.3, 5.5, 6.5: weights in [-10, 10]).
-
     Raises:
         UsageError: fewer slots than neurons at the start.
     """
 
     n_hidden: Annotated[int, Ge(1), Le(16)] = 10
+    """(neurons) hidden neurons at the start, and context inputs."""
     max_hidden: Annotated[int, Ge(1), Le(32)] = 20
+    """(neurons) hidden neurons that it can grow to."""
     recurrent: bool = True
+    """whether it has context inputs; without it is feed-forward."""
     bias: bool = False
+    """whether hidden and output units have a bias of 1, which is not evolved."""
     weight_scale: Annotated[float, Gt(0), Le(1000)] = 10.0
+    """connection weight of gene 1 (tables 4.3, 5.5, 6.5: weights in [-10, 10])."""
 
     name: ClassVar[str] = "srn"
     max_outputs: ClassVar[int] = 8
