@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 import conevo
+from conevo.controllers.registry import CONTROLLERS
 from conevo.evolution.methods.registry import METHODS
 from conevo.runs.config import PRESETS, resolve
 from conevo.runs.settings import RunSettings, declared
@@ -116,3 +117,17 @@ def test_a_dry_run_refuses_the_place_that_the_run_would_be_refused(say, tmp_path
         said = say(*tiny("--out", "taken", *more))
         assert (said.code, said.out) == (2, "")
         assert "taken exists" in said.err or "taken already exists" in said.err
+
+
+def test_settings_of_another_controller_are_listed(say) -> None:
+    rows = json.loads(say("list", "controllers", "--json").out)
+    assert [row["controller"] for row in rows] == list(CONTROLLERS)
+    for name in CONTROLLERS:
+        listed = say("list", "settings", "gacc/complex-1", "--controller", name, "--json").out
+        found = {row["setting"]: row["value"] for row in json.loads(listed)}
+        assert found["controller.name"] == name
+        expected = vars(resolve("gacc/complex-1", overrides={"controller.name": name}).controller)
+        assert {k[11:]: v for k, v in found.items() if k[:11] == "controller."} == {
+            "name": name,
+            **expected,
+        }

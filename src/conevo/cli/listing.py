@@ -1,11 +1,11 @@
-"""``conevo list``: worlds, methods, presets, settings and runs."""
+"""``conevo list``: worlds, controllers, methods, presets, settings and runs."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -19,18 +19,25 @@ if TYPE_CHECKING:
 __all__ = ["listing"]
 
 Rows = list[dict[str, str]]
+WHAT = ("worlds", "controllers", "methods", "presets", "settings", "runs")
 
 
-@click.command("list", short_help="List worlds, methods, presets, settings or runs.")
-@click.argument("what", type=click.Choice(["worlds", "methods", "presets", "settings", "runs"]))
+@click.command("list", short_help="List worlds, controllers, methods, presets, settings or runs.")
+@click.argument("what", type=click.Choice(WHAT))
 @click.argument("subject", metavar="[WORLD/ENVIRONMENT | FOLDER]", required=False)
 @click.option("--method", metavar="NAME", help="Method of the settings or presets (default: cone).")
 @click.option("--preset", metavar="NAME", help="Preset of the settings (default: desk).")
+@click.option("--controller", metavar="NAME", help="Controller of the settings (default: srn).")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON array.")
 def listing(
-    what: str, subject: str | None, method: str | None, preset: str | None, as_json: bool
+    what: str,
+    subject: str | None,
+    method: str | None,
+    preset: str | None,
+    controller: str | None,
+    as_json: bool,
 ) -> None:
-    """List worlds with their environments, methods, presets, settings, or runs.
+    """List worlds with their environments, controllers, methods, presets, settings, or runs.
 
     settings WORLD/ENVIRONMENT: every setting of a run there, with its value under the preset, its
     default, unit, allowed values and meaning. presets [WORLD/ENVIRONMENT]: the size of a run there
@@ -40,21 +47,22 @@ def listing(
     """
     from conevo.cli.text import table
 
-    if subject is not None and what in ("worlds", "methods"):
+    if subject is not None and what in TABLES:
         raise UsageError(f"'conevo list {what}' takes no further argument, got {subject!r}")
     if method is not None and what not in ("presets", "settings"):
         raise UsageError(f"'conevo list {what}' takes no --method")
-    if preset is not None and what != "settings":
-        raise UsageError(f"'conevo list {what}' takes no --preset")
+    for option, given in (("--preset", preset), ("--controller", controller)):
+        if given is not None and what != "settings":
+            raise UsageError(f"'conevo list {what}' takes no {option}")
     if what in ("presets", "settings"):
         from conevo.cli.settings_text import preset_rows, print_settings, setting_rows
 
         if what == "settings":
-            print_settings(setting_rows(subject, method, preset), as_json)
+            print_settings(setting_rows(subject, method, preset, controller), as_json)
             return
         rows = preset_rows(subject, method)
     else:
-        rows = _runs(subject) if what == "runs" else _worlds() if what == "worlds" else _methods()
+        rows = TABLES[what]() if what in TABLES else _runs(subject)
     if as_json:
         click.echo(json.dumps(rows))
     elif rows:
@@ -77,13 +85,26 @@ def _worlds() -> Rows:
     ]
 
 
+def _controllers() -> Rows:
+    from conevo.controllers.registry import CONTROLLERS
+
+    return _entries("controller", CONTROLLERS.values())
+
+
 def _methods() -> Rows:
     from conevo.evolution.methods.registry import METHODS
 
+    return _entries("method", METHODS.values())
+
+
+def _entries(what: str, entries: Iterable[Any]) -> Rows:
+    """Return a row for each entry of a registry."""
     return [
-        {"method": e.name, "title": e.title, "what": e.summary, "source": e.source}
-        for e in METHODS.values()
+        {what: e.name, "title": e.title, "what": e.summary, "source": e.source} for e in entries
     ]
+
+
+TABLES = {"worlds": _worlds, "controllers": _controllers, "methods": _methods}
 
 
 def _runs(folder: str | None) -> Rows:

@@ -48,7 +48,9 @@ def preset_rows(task: str | None, method: str | None) -> list[dict[str, str]]:
     return rows
 
 
-def setting_rows(task: str | None, method: str | None, preset: str | None) -> list[dict[str, Any]]:
+def setting_rows(
+    task: str | None, method: str | None, preset: str | None, controller: str | None
+) -> list[dict[str, Any]]:
     """Return every setting of a run, with its value under a preset.
 
     Raises:
@@ -56,6 +58,7 @@ def setting_rows(task: str | None, method: str | None, preset: str | None) -> li
     """
     if task is None:
         raise UsageError(f"whose settings? For example: conevo list settings {TASK}")
+    chosen = {} if controller is None else {"controller.name": controller}
     return [
         {
             "setting": f"{section}.{setting.name}",
@@ -65,7 +68,7 @@ def setting_rows(task: str | None, method: str | None, preset: str | None) -> li
             "allowed": setting.allowed,
             "meaning": setting.meaning,
         }
-        for section, setting, value in settings_of(resolve(task, method, preset))
+        for section, setting, value in settings_of(resolve(task, method, preset, overrides=chosen))
     ]
 
 
