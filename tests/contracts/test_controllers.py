@@ -22,7 +22,8 @@ SETTINGS = {
     "srn": (
         {"n_hidden": 3, "max_hidden": 3, "recurrent": False},
         {"n_hidden": 16, "max_hidden": 32, "weight_scale": 1.5, "bias": True},  # two chunks
-    )
+    ),
+    "ctrnn": ({"n_hidden": 16, "max_hidden": 32, "weight_scale": 1.5, "slowest": 1.0},),
 }
 CASES = [
     pytest.param((path, name, settings), id=f"{Path(path).name}-{name}-{k}")

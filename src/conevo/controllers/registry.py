@@ -61,6 +61,13 @@ CONTROLLERS: dict[str, ControllerEntry] = {
             "Elman 1990; Nitschke 2009, sections 3.1, 4.1, 5.2, 6.2.7",
             "srn:Srn",
         ),
+        ControllerEntry(
+            "ctrnn",
+            "Continuous-time recurrent network",
+            "hidden neurons with time constants of their own",
+            "Beer 1995",
+            "ctrnn:Ctrnn",
+        ),
     )
 }
 

@@ -1,0 +1,214 @@
+"""A continuous-time recurrent network: hidden neurons with time constants of their own.
+
+Beer 1995, "On the dynamics of small continuous-time recurrent neural networks", eq. 1, with one
+Euler step per iteration::
+
+    y += (dt / tau) (-y + bias + w_in . inputs + w_rec . sigmoid(y))
+
+A genotype is one hidden neuron: its input weights, its recurrent weights, its bias, its time
+constant, then its output weights. Outputs are weighted sums of the activations sigmoid(y).
+
+Choice: recurrent connections lead from slots k < n_hidden only, as the context of the simple
+recurrent network does, so that all genotypes of a world have the same length.
+Choice: time constants lie between 1 and ``slowest`` iterations, in proportion to the gene.
+"""
+
+from typing import Annotated, ClassVar
+
+import numpy as np
+import warp as wp
+from annotated_types import Ge, Gt, Le
+
+from conevo.controllers.protocol import Bools, Floats, Genome, Mind
+from conevo.errors import UsageError
+from conevo.kernels.outputs import sigmoid, sigmoid_of
+from conevo.parameters import parameters
+
+__all__ = ["Ctrnn"]
+
+
+@wp.struct
+class Shape:
+    """Sizes of a network as the kernels need them."""
+
+    n_inputs: int
+    n_context: int
+    n_outputs: int
+    n_slots: int
+    weight_scale: float
+    slowest: float
+
+
+@wp.struct
+class Weights:
+    """Weights of a team's networks.
+
+    w_in [R, slots, inputs + context]; w_out [R, slots, outputs]; bias and rate [R, slots], the
+    neuron's bias and the share of the way that it goes in an iteration; filled [R, slots].
+    """
+
+    w_in: wp.array[float]
+    w_out: wp.array[float]
+    bias: wp.array[float]
+    rate: wp.array[float]
+    filled: wp.array[int]
+
+
+@wp.struct
+class Memory:
+    """Of a team's neurons: activations and states [R, slots], 0 in empty slots."""
+
+    hidden: wp.array[float]
+    state: wp.array[float]
+
+
+@wp.func
+def load(
+    weights: Weights,
+    shape: Shape,
+    i: int,
+    genes: wp.array2d[float],
+    rows: wp.array3d[int],
+    n: int,
+) -> None:
+    """Build robot ``i``'s network from neuron genotypes; see ``controllers.protocol.Mind``."""
+    seen = shape.n_inputs + shape.n_context
+    for k in range(shape.n_slots):
+        slot = i * shape.n_slots + k
+        row = rows[n, i, k]
+        weights.filled[slot] = int(row >= 0)
+        if row >= 0:
+            for j in range(seen):
+                weights.w_in[slot * seen + j] = shape.weight_scale * genes[row, j]
+            weights.bias[slot] = shape.weight_scale * genes[row, seen]
+            share = 0.5 * (genes[row, seen + 1] + 1.0)
+            weights.rate[slot] = 1.0 / (1.0 + share * (shape.slowest - 1.0))
+            for o in range(shape.n_outputs):
+                weight = shape.weight_scale * genes[row, seen + 2 + o]
+                weights.w_out[slot * shape.n_outputs + o] = weight
+
+
+@wp.func
+def clear(memory: Memory, shape: Shape, i: int) -> None:
+    """Let robot ``i`` remember nothing: states 0, and no activation yet."""
+    for k in range(shape.n_slots):
+        memory.hidden[i * shape.n_slots + k] = 0.0
+        memory.state[i * shape.n_slots + k] = 0.0
+
+
+@wp.func
+def think(
+    weights: Weights,
+    memory: Memory,
+    shape: Shape,
+    inputs: wp.array2d[float],
+    outputs: wp.array2d[float],
+    i: int,
+) -> None:
+    """Take one Euler step of robot ``i``'s neurons, then sum up its outputs."""
+    first = i * shape.n_slots
+    seen = shape.n_inputs + shape.n_context
+    k = int(0)
+    while k < shape.n_slots:
+        slot = first + k
+        if weights.filled[slot] != 0:
+            drive = weights.bias[slot]
+            j = int(0)
+            while j < shape.n_inputs:
+                drive += weights.w_in[slot * seen + j] * inputs[i, j]
+                j += 1
+            j = int(0)
+            while j < shape.n_context:
+                drive += weights.w_in[slot * seen + shape.n_inputs + j] * memory.hidden[first + j]
+                j += 1
+            memory.state[slot] = memory.state[slot] + weights.rate[slot] * (
+                drive - memory.state[slot]
+            )
+        k += 1
+    for o in range(shape.n_outputs):
+        outputs[i, o] = 0.0
+    # Only now: every neuron must see the activations of the previous iteration.
+    k = int(0)
+    while k < shape.n_slots:
+        slot = first + k
+        if weights.filled[slot] != 0:
+            memory.hidden[slot] = sigmoid(memory.state[slot])
+            for o in range(shape.n_outputs):
+                weight = weights.w_out[slot * shape.n_outputs + o]
+                outputs[i, o] = outputs[i, o] + weight * memory.hidden[slot]
+        k += 1
+
+
+@parameters("controller")
+class Ctrnn:
+    """Settings of a continuous-time recurrent network; see the module.
+
+    Raises:
+        UsageError: fewer slots than neurons at the start.
+    """
+
+    n_hidden: Annotated[int, Ge(1), Le(16)] = 10
+    """(neurons) hidden neurons at the start, and those that feed back."""
+    max_hidden: Annotated[int, Ge(1), Le(32)] = 20
+    """(neurons) hidden neurons that it can grow to."""
+    weight_scale: Annotated[float, Gt(0), Le(1000)] = 10.0
+    """connection weight, or bias, of gene 1."""
+    slowest: Annotated[float, Ge(1), Le(10_000)] = 20.0
+    """(iterations) the largest time constant."""
+
+    name: ClassVar[str] = "ctrnn"
+    max_outputs: ClassVar[int] = 64
+    n_memory: ClassVar[int] = 2
+
+    def __post_init__(self) -> None:
+        if self.max_hidden < self.n_hidden:
+            raise UsageError(
+                f"controller.max_hidden ({self.max_hidden}) must not be below n_hidden "
+                f"({self.n_hidden})"
+            )
+
+    def genome(self, n_inputs: int, n_outputs: int) -> Genome:
+        """Return what a network is built from: hidden neurons."""
+        return Genome(self.n_hidden, self.max_hidden, n_inputs + self.n_hidden + 2 + n_outputs)
+
+    def mind(self, n_inputs: int, n_outputs: int) -> Mind:
+        """Return the Warp side."""
+        shape = Shape()
+        shape.n_inputs, shape.n_context, shape.n_outputs = n_inputs, self.n_hidden, n_outputs
+        shape.n_slots, shape.weight_scale = self.max_hidden, self.weight_scale
+        shape.slowest = self.slowest
+        per_slot = {"w_in": n_inputs + self.n_hidden, "w_out": n_outputs, "bias": 1, "rate": 1}
+        per_slot |= {"filled": 1, "hidden": 1, "state": 1}
+        return Mind(
+            weights=Weights,
+            memory=Memory,
+            shape=shape,
+            shape_type=Shape,
+            sizes={name: self.max_hidden * size for name, size in per_slot.items()},
+            load=load,
+            clear=clear,
+            think=think,
+            probe="hidden",
+        )
+
+    def forward(
+        self, genes: Floats, active: Bools, memory: Floats, inputs: Floats, n_outputs: int
+    ) -> tuple[Floats, Floats]:
+        """Run robots' networks once; see ``controllers.protocol.Controller``."""
+        f, scale = np.float32, np.float32(self.weight_scale)
+        hidden, state = memory[:, :, 0], memory[:, :, 1]
+        seen = np.concatenate([inputs, hidden[:, : self.n_hidden]], axis=1)
+        n = seen.shape[1]
+        drive = scale * genes[:, :, n]
+        for j in range(n):
+            drive = drive + scale * genes[:, :, j] * seen[:, j, None]
+        share = f(0.5) * (genes[:, :, n + 1] + f(1))
+        rate = f(1) / (f(1) + share * (f(self.slowest) - f(1)))
+        state = np.where(active, state + rate * (drive - state), f(0))
+        hidden = np.where(active, sigmoid_of(state), f(0))
+        outputs = np.zeros((len(inputs), n_outputs), np.float32)
+        for k in range(active.shape[1]):
+            weights = scale * genes[:, k, n + 2 :]
+            summed = outputs + weights * hidden[:, k, None]
+            outputs = np.where(active[:, k, None], summed, outputs)
+        return outputs, np.stack([hidden, state], axis=2)
