@@ -23,6 +23,7 @@ SETTINGS = {
         {"n_hidden": 3, "max_hidden": 3, "recurrent": False},
         {"n_hidden": 16, "max_hidden": 32, "weight_scale": 1.5, "bias": True},  # two chunks
     ),
+    "gru": ({"n_hidden": 16, "max_hidden": 32, "weight_scale": 1.5},),
     "ctrnn": ({"n_hidden": 16, "max_hidden": 32, "weight_scale": 1.5, "slowest": 1.0},),
 }
 CASES = [

@@ -68,6 +68,13 @@ CONTROLLERS: dict[str, ControllerEntry] = {
             "Beer 1995",
             "ctrnn:Ctrnn",
         ),
+        ControllerEntry(
+            "gru",
+            "Gated recurrent unit network",
+            "hidden neurons that learn what to keep and what to forget",
+            "Cho et al. 2014, section 2.3",
+            "gru:Gru",
+        ),
     )
 }
 

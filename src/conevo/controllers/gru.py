@@ -1,0 +1,249 @@
+"""A gated recurrent unit network: hidden neurons that learn what to keep and what to forget.
+
+Cho et al. 2014, "Learning phrase representations using RNN encoder-decoder", section 2.3::
+
+    r = sigmoid(W_r x + U_r h + b_r)                 reset gate
+    z = sigmoid(W_z x + U_z h + b_z)                 update gate
+    c = tanh(W_c x + U_c (r * h) + b_c)              candidate
+    h = z h + (1 - z) c
+
+A genotype is one hidden neuron: weights of inputs, recurrent weights and bias of its reset gate, of
+its update gate and of its candidate, then its output weights. Outputs are weighted sums of h.
+
+Choice: recurrent connections lead from slots k < n_hidden only, as the context of the simple
+recurrent network does, so that all genotypes of a world have the same length.
+"""
+
+from typing import Annotated, ClassVar
+
+import numpy as np
+import warp as wp
+from annotated_types import Ge, Gt, Le
+
+from conevo.controllers.protocol import Bools, Floats, Genome, Mind
+from conevo.errors import UsageError
+from conevo.kernels.outputs import sigmoid, sigmoid_of
+from conevo.parameters import parameters
+
+__all__ = ["Gru"]
+
+RESET = wp.constant(0)
+UPDATE = wp.constant(1)
+CANDIDATE = wp.constant(2)
+
+
+@wp.struct
+class Shape:
+    """Sizes of a network as the kernels need them."""
+
+    n_inputs: int
+    n_context: int
+    n_outputs: int
+    n_slots: int
+    weight_scale: float
+
+
+@wp.struct
+class Weights:
+    """Weights of a team's networks.
+
+    w_in [R, slots, 3, inputs + context + 1], of reset gate, update gate and candidate, the bias
+    last; w_out [R, slots, outputs]; filled [R, slots].
+    """
+
+    w_in: wp.array[float]
+    w_out: wp.array[float]
+    filled: wp.array[int]
+
+
+@wp.struct
+class Memory:
+    """Of a team's neurons [R, slots], 0 in empty slots: activations, and three to compute them."""
+
+    hidden: wp.array[float]
+    reset: wp.array[float]
+    update: wp.array[float]
+    candidate: wp.array[float]
+
+
+@wp.func
+def load(
+    weights: Weights,
+    shape: Shape,
+    i: int,
+    genes: wp.array2d[float],
+    rows: wp.array3d[int],
+    n: int,
+) -> None:
+    """Build robot ``i``'s network from neuron genotypes; see ``controllers.protocol.Mind``."""
+    size = 3 * (shape.n_inputs + shape.n_context + 1)
+    for k in range(shape.n_slots):
+        slot = i * shape.n_slots + k
+        row = rows[n, i, k]
+        weights.filled[slot] = int(row >= 0)
+        if row >= 0:
+            for j in range(size):
+                weights.w_in[slot * size + j] = shape.weight_scale * genes[row, j]
+            for o in range(shape.n_outputs):
+                weight = shape.weight_scale * genes[row, size + o]
+                weights.w_out[slot * shape.n_outputs + o] = weight
+
+
+@wp.func
+def clear(memory: Memory, shape: Shape, i: int) -> None:
+    """Let robot ``i`` remember nothing."""
+    for k in range(shape.n_slots):
+        memory.hidden[i * shape.n_slots + k] = 0.0
+        memory.reset[i * shape.n_slots + k] = 0.0
+
+
+@wp.func
+def drive(
+    weights: Weights, shape: Shape, inputs: wp.array2d[float], i: int, slot: int, gate: int
+) -> float:
+    """Return bias and weighted inputs of one gate of a neuron."""
+    seen = shape.n_inputs + shape.n_context
+    at = (slot * 3 + gate) * (seen + 1)
+    total = weights.w_in[at + seen]
+    j = int(0)
+    while j < shape.n_inputs:
+        total += weights.w_in[at + j] * inputs[i, j]
+        j += 1
+    return total
+
+
+@wp.func
+def recurrent(shape: Shape, slot: int, gate: int) -> int:
+    """Return where the recurrent weights of a gate of a neuron begin."""
+    return (slot * 3 + gate) * (shape.n_inputs + shape.n_context + 1) + shape.n_inputs
+
+
+@wp.func
+def think(
+    weights: Weights,
+    memory: Memory,
+    shape: Shape,
+    inputs: wp.array2d[float],
+    outputs: wp.array2d[float],
+    i: int,
+) -> None:
+    """Run robot ``i``'s network once: all gates, then all candidates, then all activations."""
+    first = i * shape.n_slots
+    k = int(0)
+    while k < shape.n_slots:
+        slot = first + k
+        if weights.filled[slot] != 0:
+            reset = drive(weights, shape, inputs, i, slot, RESET)
+            update = drive(weights, shape, inputs, i, slot, UPDATE)
+            at = recurrent(shape, slot, RESET)
+            also = recurrent(shape, slot, UPDATE)
+            j = int(0)
+            while j < shape.n_context:
+                reset += weights.w_in[at + j] * memory.hidden[first + j]
+                update += weights.w_in[also + j] * memory.hidden[first + j]
+                j += 1
+            memory.reset[slot] = sigmoid(reset)
+            memory.update[slot] = sigmoid(update)
+        k += 1
+    k = int(0)
+    while k < shape.n_slots:
+        slot = first + k
+        if weights.filled[slot] != 0:
+            total = drive(weights, shape, inputs, i, slot, CANDIDATE)
+            at = recurrent(shape, slot, CANDIDATE)
+            j = int(0)
+            while j < shape.n_context:
+                kept = memory.reset[first + j] * memory.hidden[first + j]
+                total += weights.w_in[at + j] * kept
+                j += 1
+            memory.candidate[slot] = 2.0 * sigmoid(2.0 * total) - 1.0
+        k += 1
+    for o in range(shape.n_outputs):
+        outputs[i, o] = 0.0
+    k = int(0)
+    while k < shape.n_slots:
+        slot = first + k
+        if weights.filled[slot] != 0:
+            z = memory.update[slot]
+            memory.hidden[slot] = z * memory.hidden[slot] + (1.0 - z) * memory.candidate[slot]
+            for o in range(shape.n_outputs):
+                weight = weights.w_out[slot * shape.n_outputs + o]
+                outputs[i, o] = outputs[i, o] + weight * memory.hidden[slot]
+        k += 1
+
+
+@parameters("controller")
+class Gru:
+    """Settings of a gated recurrent unit network; see the module.
+
+    Raises:
+        UsageError: fewer slots than neurons at the start.
+    """
+
+    n_hidden: Annotated[int, Ge(1), Le(16)] = 10
+    """(neurons) hidden neurons at the start, and those that feed back."""
+    max_hidden: Annotated[int, Ge(1), Le(32)] = 20
+    """(neurons) hidden neurons that it can grow to."""
+    weight_scale: Annotated[float, Gt(0), Le(1000)] = 10.0
+    """connection weight, or bias, of gene 1."""
+
+    name: ClassVar[str] = "gru"
+    max_outputs: ClassVar[int] = 64
+    n_memory: ClassVar[int] = 1
+
+    def __post_init__(self) -> None:
+        if self.max_hidden < self.n_hidden:
+            raise UsageError(
+                f"controller.max_hidden ({self.max_hidden}) must not be below n_hidden "
+                f"({self.n_hidden})"
+            )
+
+    def genome(self, n_inputs: int, n_outputs: int) -> Genome:
+        """Return what a network is built from: hidden neurons."""
+        n_genes = 3 * (n_inputs + self.n_hidden + 1) + n_outputs
+        return Genome(self.n_hidden, self.max_hidden, n_genes)
+
+    def mind(self, n_inputs: int, n_outputs: int) -> Mind:
+        """Return the Warp side."""
+        shape = Shape()
+        shape.n_inputs, shape.n_context, shape.n_outputs = n_inputs, self.n_hidden, n_outputs
+        shape.n_slots, shape.weight_scale = self.max_hidden, self.weight_scale
+        per_slot = {"w_in": 3 * (n_inputs + self.n_hidden + 1), "w_out": n_outputs, "filled": 1}
+        per_slot |= dict.fromkeys(("hidden", "reset", "update", "candidate"), 1)
+        return Mind(
+            weights=Weights,
+            memory=Memory,
+            shape=shape,
+            shape_type=Shape,
+            sizes={name: self.max_hidden * size for name, size in per_slot.items()},
+            load=load,
+            clear=clear,
+            think=think,
+            probe="hidden",
+        )
+
+    def forward(
+        self, genes: Floats, active: Bools, memory: Floats, inputs: Floats, n_outputs: int
+    ) -> tuple[Floats, Floats]:
+        """Run robots' networks once; see ``controllers.protocol.Controller``."""
+        f, hidden = np.float32, memory[:, :, 0]
+        weights = f(self.weight_scale) * genes
+        context = hidden[:, : self.n_hidden]
+        seen = inputs.shape[1] + self.n_hidden
+
+        def summed(gate: int, context: Floats) -> Floats:
+            at = gate * (seen + 1)
+            total = weights[:, :, at + seen]
+            for j, values in enumerate(np.concatenate([inputs, context], axis=1).T):
+                total = total + weights[:, :, at + j] * values[:, None]
+            return total
+
+        reset, update = (np.where(active, sigmoid_of(summed(g, context)), f(0)) for g in (0, 1))
+        total = summed(2, reset[:, : self.n_hidden] * context)
+        candidate = f(2) * sigmoid_of(f(2) * total) - f(1)
+        hidden = np.where(active, update * hidden + (f(1) - update) * candidate, f(0))
+        outputs = np.zeros((len(inputs), n_outputs), np.float32)
+        for k in range(active.shape[1]):
+            more = outputs + weights[:, k, 3 * (seen + 1) :] * hidden[:, k, None]
+            outputs = np.where(active[:, k, None], more, outputs)
+        return outputs, hidden[:, :, None]
