@@ -30,25 +30,22 @@ from annotated_types import Ge, Gt, Le
 from conevo.evolution.methods.registry import MethodEntry
 from conevo.evolution.population import ranking
 from conevo.evolution.protocol import FloatArray, Layout, Progress, Scores, Trials
+from conevo.parameters import parameters
 from conevo.rng import stream
 
 __all__ = ["ENTRY", "TeamEs", "TeamEsConfig", "TeamEsState"]
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters("method")
 class TeamEsConfig:
-    """Parameters of the strategy.
-
-    Attributes:
-        genotypes: lambda, teams tried in a generation; half of them move the mean. Choice: 40,
-            above the tutorial's 4 + 3 ln(n) for the thousands of genes of a team, as fitness is
-            noisy.
-        step_size: sigma at the start, the standard deviation of a gene. Choice: 0.2, a tenth of
-            the range of a gene, with a mean of 0.
-    """
+    """Parameters of the strategy."""
 
     genotypes: Annotated[int, Ge(4), Le(1_000_000)] = 40
+    """Lambda, teams tried in a generation; half of them move the mean. Choice: 40, above the
+    tutorial's 4 + 3 ln(n) for the thousands of genes of a team, as fitness is noisy."""
     step_size: Annotated[float, Gt(0), Le(1)] = 0.2
+    """Sigma at the start, the standard deviation of a gene. Choice: 0.2, a tenth of the range of a
+    gene, with a mean of 0."""
 
 
 @dataclass(frozen=True)

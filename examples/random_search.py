@@ -20,20 +20,18 @@ from conevo.evolution.methods.registry import MethodEntry
 from conevo.evolution.population import elite_count, random_genes
 from conevo.evolution.protocol import Layout, Scores, Trials
 from conevo.evolution.variation import VariationConfig
+from conevo.parameters import parameters
 from conevo.rng import stream
 
 __all__ = ["ENTRY", "RandomSearch", "RandomSearchConfig"]
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters("method")
 class RandomSearchConfig(VariationConfig):
-    """Parameters of random search; of the elite portion only the first is kept.
-
-    Attributes:
-        genotypes: M, whole networks in the population; each costs one team evaluation.
-    """
+    """Parameters of random search; of the elite portion only the first is kept."""
 
     genotypes: Annotated[int, Ge(2)] = 10_000
+    """M, whole networks in the population; each costs one team evaluation."""
 
 
 @dataclass(frozen=True)

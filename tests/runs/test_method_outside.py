@@ -167,9 +167,12 @@ class Homeless:
     def tell(self, state: object, trials: object, scores: object) -> None: ...
 
 
-def test_an_object_that_no_run_can_keep_is_refused(mine: Path, tmp_path: Path) -> None:
-    made: dict[str, Any] = {"__name__": "__main__"}
-    exec(TEXT.partition("if __name__")[0], made)  # as in a session of Python
+def test_an_object_that_no_run_can_keep_is_refused(
+    mine: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    session = ModuleType("__main__")  # as in a session of Python
+    monkeypatch.setitem(sys.modules, "__main__", session)
+    exec(TEXT.partition("if __name__")[0], vars(session))
     other = TEXT.replace("class RandomSearch:", "class Other(object):\n    pass\n\n\n"
                          "@dataclass(frozen=True)\nclass RandomSearch(Other):")  # fmt: skip
     mine.with_name("other.py").write_text(
@@ -177,7 +180,7 @@ def test_an_object_that_no_run_can_keep_is_refused(mine: Path, tmp_path: Path) -
     )
     stray = imported(mine.with_name("other.py")).Other()
     for method, words in (
-        (made["RandomSearch"](), "is defined in __main__, which a run cannot keep a copy of: put"),
+        (session.RandomSearch(), "is defined in __main__, which a run cannot keep a copy of: put"),
         (Homeless(), r"method file .*test_method_outside\.py: it has no ENTRY"),
         (stray, "its ENTRY is of RandomSearch, not of method Other"),
         (3, "method int is neither a name nor a method, which has init, ask and tell"),

@@ -24,7 +24,8 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 PLACE = "on the command line"
 OPTIONS = (
     click.option(
-        "--method", metavar="NAME", help="cone (default), mesp, ccga, hetcne, homcne, cone-1..3."
+        "--method", metavar="NAME",
+        help="cone (default), mesp, ccga, hetcne, homcne, cone-1..3, or FILE.py:NAME.",
     ),
     click.option(
         "--preset", metavar="NAME", help="smoke (seconds), desk (minutes, default), night, thesis."
