@@ -36,24 +36,29 @@ from conevo.kernels.actions import begin_counting, count_action, heuristic_actio
 from conevo.kernels.outputs import highest
 from conevo.kernels.random import uniform
 from conevo.kernels.steps import steered_step
+from conevo.parameters import parameters
 from conevo.rng import stream
-from conevo.worlds.protocol import Scenarios, Simulation
+from conevo.worlds.protocol import Scenarios, Simulation, kernel_params
 from conevo.worlds.registry import WorldEntry
 
 
-@dataclass(frozen=True)
+@parameters("world")
 class BallParams:
     """Parameters of the world; lengths in sides of the square."""
 
     n_robots: Annotated[int, Ge(2), Le(64)] = 4
+    """(robots) robots in a team."""
     iterations: Annotated[int, Ge(2), Le(100_000)] = 200
+    """(iterations) length of an epoch."""
     step: Annotated[float, Gt(0), Le(0.1)] = 0.01
+    """(side) the largest step."""
     reach: Annotated[float, Gt(0), Le(0.5)] = 0.1
+    """(side) how near the ball a robot must be to push it."""
 
 
 @wp.struct
 class Params:
-    """What the kernels need of ``BallParams``."""
+    """What the kernels need of ``BallParams``, by its names."""
 
     step: float
     reach: float
@@ -224,16 +229,13 @@ class BallWorld:
 
     def simulation(self) -> Simulation:
         """Return the Warp side of this world."""
-        params = Params()
-        params.step = self.params.step
-        params.reach = self.params.reach
         phases = (reset, sense, act, commit, settle, resolve, outcome)
         return Simulation(
             state=Team,
             sizes={"ball": 2},
             scene=Scene,
             params_type=Params,
-            params=params,
+            params=kernel_params(Params, self.params),
             functions={f.key: f for f in phases},
             recorded=("x", "y", "ball", "action", "fitness"),
         )

@@ -30,23 +30,27 @@ from conevo.kernels.actions import begin_counting, count_action, heuristic_actio
 from conevo.kernels.outputs import highest
 from conevo.kernels.random import uniform
 from conevo.kernels.steps import steered_step
+from conevo.parameters import parameters
 from conevo.rng import stream
-from conevo.worlds.protocol import Scenarios, Simulation
+from conevo.worlds.protocol import Scenarios, Simulation, kernel_params
 from conevo.worlds.registry import WorldEntry
 
 
-@dataclass(frozen=True)
+@parameters("world")
 class LightParams:
     """Parameters of the world; lengths in sides of the square."""
 
     n_robots: Annotated[int, Ge(2), Le(64)] = 3
+    """(robots) robots in a team."""
     iterations: Annotated[int, Ge(2)] = 100
+    """(iterations) length of an epoch."""
     step: Annotated[float, Gt(0), Le(0.1)] = 0.01
+    """(side) the largest step."""
 
 
 @wp.struct
 class Params:
-    """What the kernels need of ``LightParams``."""
+    """What the kernels need of ``LightParams``, by its names."""
 
     step: float
 
@@ -173,13 +177,11 @@ class LightWorld:
 
     def simulation(self) -> Simulation:
         """Return the Warp side of this world."""
-        params = Params()
-        params.step = self.params.step
         return Simulation(
             state=Team,
             scene=Scene,
             params_type=Params,
-            params=params,
+            params=kernel_params(Params, self.params),
             functions={f.key: f for f in (reset, sense, act, commit, resolve, outcome)},
             recorded=("x", "y", "action", "fitness"),
         )

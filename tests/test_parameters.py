@@ -14,6 +14,7 @@ from annotated_types import Ge, Gt, Le
 
 import conevo
 from conevo.cli.main import main
+from conevo.controllers.srn import Srn
 from conevo.evolution.methods.cone import ConeConfig
 from conevo.parameters import checked, parameters
 from conevo.runs.settings import RunSettings
@@ -36,6 +37,8 @@ WRONG = [
     (OWN, "world.step", 0.5, "must be less than or equal to 0.1"),
     (ROVER, "method.sst", 1.5, "must be less than or equal to 1"),
     (ROVER, "method.evaluation", "some", "must be 'systematic' or 'shared'"),
+    (ROVER, "controller.n_hidden", 17, "must be less than or equal to 16"),
+    (ROVER, "controller.bias", "yes", "must be a valid boolean"),
     (ROVER, "run.generations", 0, "must be greater than or equal to 1"),
 ]
 
@@ -44,13 +47,15 @@ def of_python(world: str, section: str, key: str, value: Any) -> None:
     entrances: dict[str, Callable[..., Any]] = {
         "world": lambda **given: conevo.world(world, **given),
         "method": lambda **given: conevo.method("cone", **given),
+        "controller": lambda **given: conevo.controller("srn", **given),
         "run": RunSettings,
     }
     entrances[section](**{key: value})
 
 
 def of_class(world: str, section: str, key: str, value: Any) -> None:
-    part = {"world": resolve(world)[0].params_class, "method": ConeConfig, "run": RunSettings}
+    part = {"method": ConeConfig, "controller": Srn, "run": RunSettings}
+    part["world"] = resolve(world)[0].params_class
     part[section](**{key: value})
 
 
@@ -92,7 +97,7 @@ def refusals(
                 said = capsys.readouterr().err.removeprefix("conevo: error: ").removesuffix("\n")
             place = r" (on the command line|in [^:;(]*\.toml)(?=[:;])"
             found[entrance.__name__] = re.sub(place, "", said)
-        assert [path for path in tmp_path.iterdir() if path.suffix != ".toml"] == []
+        assert [path for path in tmp_path.iterdir() if path.suffix not in (".toml", ".py")] == []
         return found
 
     return ask
@@ -112,6 +117,7 @@ def test_a_wrong_value_is_refused_in_the_same_words_at_every_entrance(
         (ROVER, "world.n_robot", "world.n_robots"),
         (OWN, "world.stepp", "world.step"),
         (ROVER, "method.genotype", "method.genotypes"),
+        (ROVER, "controller.hidden", "controller.n_hidden"),
         (ROVER, "run.generation", "run.generations"),
     ],
 )
@@ -185,9 +191,25 @@ def test_a_plain_dataclass_stays_what_it_is() -> None:
     assert checked(Bounded, "world") is Bounded
 
 
-def test_parameters_of_a_plain_dataclass_are_checked_where_a_world_is_built() -> None:
-    entry, environment = resolve(OWN)
-    plain = entry.params_class.__mro__[1]
-    assert entry.build(environment, plain(step=0.05)).params == entry.params_class(step=0.05)
+@pytest.fixture
+def plain(tmp_path: Path) -> str:
+    """The example with parameters in a plain dataclass."""
+    text, old = LIGHT.read_text(), '@parameters("world")'
+    assert old in text
+    (tmp_path / "plain.py").write_text(text.replace(old, "@dataclass(frozen=True)"))
+    return f"{tmp_path / 'plain.py'}:dark-1"
+
+
+def test_a_plain_dataclass_of_a_world_is_checked_at_every_entrance(
+    plain: str, refusals: Callable[..., dict[str, str]]
+) -> None:
+    found = refusals(plain, "world.step", 0.5)
+    assert found == dict.fromkeys(found, "world.step = 0.5: must be less than or equal to 0.1")
+
+
+def test_parameters_of_a_plain_dataclass_are_checked_where_a_world_is_built(plain: str) -> None:
+    entry, environment = resolve(plain)
+    params = entry.params_class.__mro__[1]
+    assert entry.build(environment, params(step=0.05)).params == entry.params_class(step=0.05)
     with pytest.raises(conevo.UsageError, match=r"world\.step = 0\.5: must be less than"):
-        entry.build(environment, plain(step=0.5))
+        entry.build(environment, params(step=0.5))

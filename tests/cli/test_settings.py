@@ -62,7 +62,8 @@ def test_a_world_of_ones_own_has_its_settings_listed(say) -> None:
     light = Path(__file__).parents[2] / "examples" / "light.py"
     rows = json.loads(say("list", "settings", f"{light}:dark-1", "--json").out)
     step = next(row for row in rows if row["setting"] == "world.step")
-    assert (step["value"], step["allowed"], step["meaning"]) == (0.01, "> 0, <= 0.1", "")
+    assert (step["value"], step["allowed"]) == (0.01, "> 0, <= 0.1")
+    assert (step["unit"], step["meaning"]) == ("side", "the largest step")
 
 
 def test_presets_are_listed_with_what_they_are_for(say) -> None:

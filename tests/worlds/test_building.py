@@ -18,15 +18,10 @@ from conevo.cli.main import main
 from conevo.errors import EnvironmentFailure, UsageError
 from conevo.kernels import engine
 from conevo.worlds.rollout import Rollout
-from worlds.test_outside import EXAMPLE, TEXT, written
+from worlds.test_outside import EXAMPLE, line_with, written
 
 SCORE = "1.0 - wp.length(light(team, scene, i))"
 STATE = "    x: wp.array[float]\n"
-
-
-def line_with(text: str) -> int:
-    """Return the number of the line of the example that has a text."""
-    return next(k for k, line in enumerate(TEXT.splitlines(), 1) if text in line)
 
 
 MISTAKES = {
@@ -35,7 +30,7 @@ MISTAKES = {
     "type": (SCORE, "team.chosen[i]", "(in resolve: team.fitness[i] = team.chosen[i])"),
     "argument": ("light(team, scene, i))\n\n\n", "light(team, scene))\n\n\n", "(in resolve: "),
     "scenarios": ("(self.n_robots + 1, 2)", "(self.n_robot + 1, 2)", "AttributeError: "),
-    "simulation": ("params = Params()", "params = Prams()", "NameError: name 'Prams'"),
+    "simulation": ("kernel_params(Params,", "kernel_params(Prams,", "NameError: name 'Prams'"),
 }  # fmt: skip
 
 

@@ -13,7 +13,7 @@ from conevo.cli.main import main
 from conevo.errors import UsageError
 from conevo.worlds import checking
 from conevo.worlds.checks import findings
-from worlds.test_outside import TEXT, written
+from worlds.test_outside import TEXT, line_with, written
 
 # One line changed, and the topic and words of the one problem that must be found.
 DECLARED = {
@@ -21,7 +21,8 @@ DECLARED = {
     "arguments": (
         "def act(team: Team, scene: Scene, p: Params, i: int, t: int)",
         "def act(team: Team, scene: Scene, p: Params, i: int)",
-        "structure", "bad.py:105: phase act must be declared as act(team, scene, p, i, t)",
+        "structure",
+        f"bad.py:{line_with('def act(') - 1}: phase act must be declared as act(team, scene, p, i,",
     ),
     "types": (
         "def act(team: Team, scene: Scene,", "def act(scene: Scene, team: Team,",
@@ -59,13 +60,14 @@ DECLARED = {
               "unknown array 'lights' in Simulation.sizes"),
     "size": ("recorded=(", "sizes={'fitness': 2}, recorded=(", "structure",
              "Simulation.sizes['fitness'] must be 3 (robots)"),
-    "made of": ("params=params", "params=self.params", "structure", "must be made of"),
+    "made of": ("kernel_params(Params, self.params)", "self.params", "structure",
+                "must be made of"),
     "bounds": ("step: Annotated[float, Gt(0), Le(0.1)]", "step: float", "parameters",
                "LightParams.step has no bounds; declare them, as in Annotated[float"),
     "default": ("Le(0.1)] = 0.01", "Le(0.1)] = 0.2", "parameters",
                 "world.step = 0.2: must be less than or equal to 0.1"),
     "no default": ("Le(64)] = 3", "Le(64)]", "parameters", "LightParams.n_robots needs a default"),
-    "frozen": ("@dataclass(frozen=True)\nclass LightParams", "@dataclass\nclass LightParams",
+    "frozen": ('@parameters("world")\nclass LightParams', "@dataclass\nclass LightParams",
                "parameters", "LightParams must be frozen"),
     "key": ("stream(key,", "stream(1,", "scenarios", "places are the same for all keys"),
     "call": ("stream(key, self.name)", "np.random.default_rng()", "scenarios",
@@ -78,9 +80,11 @@ DECLARED = {
                 "scenarios", "must have a row for each of 3 scenarios, got shape [1, 4, 2]"),
     "infinite": ("np.float32) for key", "np.float32) * np.float32('inf') for key", "scenarios",
                  "places has values that are not finite"),
-    "missing": ("places=places, ", "", "world", "bad.py:172: TypeError: LightSc"),
+    "missing": ("places=places, ", "", "world",
+                f"bad.py:{line_with('places=places')}: TypeError: LightSc"),
     "name": ("1.0 - wp.length", "one - wp.length", "world",
-             "bad.py:128: Referencing undefined symbol: one (in resolve: team.fitness[i] = one -"),
+             f"bad.py:{line_with('1.0 - wp.length')}: Referencing undefined symbol: one (in "
+             "resolve: team.fitness[i] = one -"),
     "class": ('"LightWorld"', '"LightWord"', "world",
               "unknown class 'LightWord' in its ENTRY; did you mean 'LightWorld'?"),
 }  # fmt: skip
@@ -149,13 +153,13 @@ def test_a_mistake_in_what_is_declared_is_one_line(name: str, tmp_path: Path) ->
 def faulty(path: Path, name: str) -> Path:
     """Write the example with a kernel that has all mistakes and a parameter that chooses one."""
     number = [*PLAYED].index(name) + 1 if name else 0
-    state, given = "    y: wp.array[float]\n", "        params.step = self.params.step\n"
+    state, given = "    y: wp.array[float]\n", "kernel_params(Params, self.params)"
     begin = "    team.x[i] = scene.places[2 * i]\n"
     text = TEXT
     for old, new in (
         ("class LightParams:", f"{{}}\n    fault: Annotated[int, Ge(0), Le(99)] = {number}\n"),
         ("    step: float\n", "{}    fault: int\n    zero: float\n"),
-        (given, "{}        params.fault = self.params.fault\n"),
+        (given, "kernel_params(Params, self.params, zero=0.0)"),
         (state, "{}" + "".join(f"    {name}: wp.array[float]\n" for name in FIELDS)),
         (RESET, MOVE_LIGHT + "{}"),
         (begin, "{}    if i == 0:\n        team.kept[0] = 0.0\n        team.moved[0] = 0.0\n"),

@@ -26,6 +26,11 @@ EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "light.py"
 TEXT = EXAMPLE.read_text()
 
 
+def line_with(text: str) -> int:
+    """Return the number of the line of the example that has a text."""
+    return next(k for k, line in enumerate(TEXT.splitlines(), 1) if text in line)
+
+
 def written(path: Path, *changes: tuple[str, str]) -> Path:
     """Write the example with some words changed."""
     text = TEXT
@@ -212,10 +217,11 @@ def test_kernels_made_of_a_neighbour_change_with_it_and_imports_may_wait(tmp_pat
     changes = (
         (score, "scored(light(team, scene, i))"),
         ("from conevo.rng", "from scores import scored\nfrom conevo.rng"),
-        ("        params = Params()", "        import late\n\n        params = late.of(Params)"),
+        ("        return Simulation(", "        import late\n\n        return Simulation("),
+        ("kernel_params(Params, self.params)", "late.of(Params, self.params)"),
     )
     file = written(tmp_path / "light.py", *changes)
-    (tmp_path / "late.py").write_text("def of(kind):\n    return kind()\n")
+    (tmp_path / "late.py").write_text("from conevo.worlds.protocol import kernel_params as of\n")
     hashes = []
     for sign in ("1.0", "2.0", "1.0"):
         (tmp_path / "scores.py").write_text(
