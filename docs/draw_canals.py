@@ -9,7 +9,7 @@ from PIL import Image
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
-from conevo.worlds.canals import N_LAYOUTS, load
+from conevo.worlds.rover.canals import N_LAYOUTS, load
 
 PICTURE = Path(__file__).parent / "pictures" / "canals.png"
 

@@ -20,7 +20,7 @@ from matplotlib.patches import Circle, Rectangle
 
 import conevo
 from conevo.rng import fold
-from conevo.worlds.gacc_state import CARRIED, DELIVERED, DROPPED, HELPED, LYING, WAITING
+from conevo.worlds.gacc.state import CARRIED, DELIVERED, DROPPED, HELPED, LYING, WAITING
 from teams import champion, controlled
 
 PICTURE = Path(__file__).parent / "pictures" / "gacc.png"

@@ -12,12 +12,12 @@ from pathlib import Path
 from conevo import METHODS, WORLDS
 from conevo.runs.config import PRESETS, resolve
 from conevo.runs.settings import declared, preset_purpose
-from conevo.worlds import rocks
-from conevo.worlds.gacc import GaccParams, GaccWorld
-from conevo.worlds.gacc_plans import TYPES
-from conevo.worlds.prey import PreyParams, PreyWorld
-from conevo.worlds.pursuit import PursuitParams, PursuitWorld
-from conevo.worlds.rover import RoverParams
+from conevo.worlds.gacc.plans import TYPES
+from conevo.worlds.gacc.world import GaccParams, GaccWorld
+from conevo.worlds.pursuit.prey import PreyParams, PreyWorld
+from conevo.worlds.pursuit.world import PursuitParams, PursuitWorld
+from conevo.worlds.rover import rocks
+from conevo.worlds.rover.world import RoverParams
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = ("README.md", "docs/quickstart.md", "docs/worlds.md")
@@ -170,17 +170,17 @@ TABLES = {
     "presets": lambda: presets("rover/complex-1"),
     "presets pursuit": lambda: presets("pursuit/team-3", has_purpose=False),
     "presets gacc": lambda: presets("gacc/complex-1", has_purpose=False),
-    "rover card": lambda: card("conevo.worlds.rover"),
+    "rover card": lambda: card("conevo.worlds.rover.world"),
     "rover environments": rover_environments,
     "rover settings": rover_settings,
     "rover parameters": lambda: parameters(RoverParams),
-    "pursuit card": lambda: card("conevo.worlds.pursuit"),
+    "pursuit card": lambda: card("conevo.worlds.pursuit.world"),
     "pursuit environments": team_types,
     "pursuit parameters": lambda: parameters(PursuitParams),
-    "prey card": lambda: card("conevo.worlds.prey"),
+    "prey card": lambda: card("conevo.worlds.pursuit.prey"),
     "prey environments": shaping_experiments,
     "prey parameters": lambda: parameters(PreyParams),
-    "gacc card": lambda: card("conevo.worlds.gacc"),
+    "gacc card": lambda: card("conevo.worlds.gacc.world"),
     "gacc environments": construction_environments,
     "gacc parameters": lambda: parameters(GaccParams),
 }

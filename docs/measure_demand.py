@@ -19,8 +19,9 @@ import numpy as np
 import warp as wp
 
 import conevo
-from conevo.worlds import gacc_dynamics, rollout
-from conevo.worlds.gacc_state import Params, Scene, Team
+from conevo.worlds import rollout
+from conevo.worlds.gacc import dynamics as gacc_dynamics
+from conevo.worlds.gacc.state import Params, Scene, Team
 from teams import champion, controlled, error, keys_of, play, random_clones, random_networks, sample
 
 TASK = "gacc/complex-1"

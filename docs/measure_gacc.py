@@ -24,8 +24,8 @@ from annotated_types import Le
 import conevo
 import pages
 from conevo.runs.config import resolve
-from conevo.worlds.gacc import GaccParams, GaccWorld
-from conevo.worlds.gacc_state import DELIVERED, GRIPPED, HELPED, UNDETECTED, WAITING
+from conevo.worlds.gacc.state import DELIVERED, GRIPPED, HELPED, UNDETECTED, WAITING
+from conevo.worlds.gacc.world import GaccParams, GaccWorld
 from mixes import Mix, best, team_of, written
 from pages import Row
 from teams import (

@@ -18,7 +18,7 @@ import numpy as np
 
 import conevo
 import pages
-from conevo.worlds.pursuit import PursuitParams
+from conevo.worlds.pursuit.world import PursuitParams
 from pages import Row
 from teams import champion, controlled, error, keys_of, play, random_networks, ratio, sample
 

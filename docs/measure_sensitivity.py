@@ -21,7 +21,7 @@ from annotated_types import Le
 
 import conevo
 from conevo.worlds.protocol import Outcome
-from conevo.worlds.rover import RoverParams
+from conevo.worlds.rover.world import RoverParams
 from pages import Row, put, write
 from teams import (
     Numbers,

@@ -11,7 +11,7 @@ from functools import cache
 import numpy as np
 
 from conevo.rng import stream
-from conevo.worlds.gacc import GaccWorld
+from conevo.worlds.gacc.world import GaccWorld
 from teams import Teams, controlled, keys_of, play
 
 ROUNDS = ((200, 10), (110, 40), (10, 200))  # mixes and scenarios of each

@@ -189,7 +189,7 @@ def test_every_choice_in_the_code_is_on_the_page() -> None:
 
 def test_note_1_energy_lasts() -> None:
     def value(name: str) -> float:
-        (number,) = default(lookup("worlds/rover.py", f"RoverParams.{name}"))
+        (number,) = default(lookup("worlds/rover/world.py", f"RoverParams.{name}"))
         return float(number)
 
     costs = [value(f"{setting}_cost") for setting in ("low", "med", "hi")]

@@ -18,10 +18,10 @@ from conevo.controllers.srn import Srn
 from conevo.evolution.methods.cone import ConeConfig
 from conevo.parameters import checked, parameters
 from conevo.runs.settings import RunSettings
-from conevo.worlds.gacc import GaccParams
-from conevo.worlds.pursuit import PursuitParams
+from conevo.worlds.gacc.world import GaccParams
+from conevo.worlds.pursuit.world import PursuitParams
 from conevo.worlds.registry import resolve
-from conevo.worlds.rover import RoverParams
+from conevo.worlds.rover.world import RoverParams
 
 LIGHT = Path(__file__).resolve().parent.parent / "examples" / "light.py"
 ROVER, OWN = "rover/complex-1", f"{LIGHT}:dark-1"

@@ -32,7 +32,7 @@ from conevo.errors import UsageError
 from conevo.rng import fold, stream
 from conevo.runs.champions import Team
 from conevo.runs.shrinkage import shrinkage
-from conevo.worlds.pursuit import PursuitParams, PursuitWorld
+from conevo.worlds.pursuit.world import PursuitParams, PursuitWorld
 from conevo.worlds.rollout import Rollout
 from runs.tiny import evolve_tiny
 

@@ -20,10 +20,10 @@ from conevo.cli.main import main
 from conevo.errors import UsageError
 from conevo.runs.code import current_code
 from conevo.runs.run import Run
-from conevo.worlds import prey_sets
+from conevo.worlds.pursuit import prey_sets
 
 LIGHT = Path(__file__).parents[2] / "examples" / "light.py"
-SHIPPED = Path(prey_sets.__file__).parent / "data" / prey_sets.SHIPPED
+SHIPPED = Path(prey_sets.__file__).parent / prey_sets.SHIPPED
 OTHER = "0.9.0 (abc123abc123)"
 
 

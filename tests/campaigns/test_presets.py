@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from conevo.campaigns.plan_file import preset_names, read_preset
-from conevo.worlds.pursuit import PursuitWorld
+from conevo.worlds.pursuit.world import PursuitWorld
 
 PAGE = Path(__file__).resolve().parent.parent.parent / "docs" / "campaigns.md"
 N_NEURONS = 6

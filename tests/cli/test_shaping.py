@@ -12,7 +12,7 @@ import pytest
 
 import conevo
 from conevo.runs.shaping import Shaping, start_shaping
-from conevo.worlds import prey_sets
+from conevo.worlds.pursuit import prey_sets
 from runs.tiny import TINY, evolve_tiny, spawn, wait_for
 
 PURSUIT = {key: value for key, value in TINY.items() if key != "world.n_robots"}

@@ -70,12 +70,12 @@ def test_edited_kernels_are_never_stale_and_unchanged_ones_never_compiled_again(
     edits = [
         # a constant, a function called by a function, the body of a phase, an imported constant
         (
-            "worlds/rover_dynamics.py",
+            "worlds/rover/dynamics.py",
             "ROCK_CELLS = wp.constant(40)",
             "ROCK_CELLS = wp.constant(20)",
         ),
         ("kernels/random.py", "* 5.9604644775390625e-08", "* 4.0e-08"),
-        ("worlds/rover_dynamics.py", "team.energy[i] = p.energy\n", "team.energy[i] = 0.5\n"),
+        ("worlds/rover/dynamics.py", "team.energy[i] = p.energy\n", "team.energy[i] = 0.5\n"),
         ("kernels/geometry.py", "COVER_CELLS = wp.constant(100)", "COVER_CELLS = wp.constant(50)"),
     ]
     hashes = {first["hash"]}
@@ -97,12 +97,12 @@ def test_edits_that_matter_change_what_is_computed(tmp_path):
     source = tmp_path / "source"
     shutil.copytree(PACKAGE, source / "conevo", ignore=shutil.ignore_patterns("__pycache__"))
     edit(
-        source, "worlds/rover_dynamics.py", "team.energy[i] = p.energy\n", "team.energy[i] = 0.5\n"
+        source, "worlds/rover/dynamics.py", "team.energy[i] = p.energy\n", "team.energy[i] = 0.5\n"
     )
     cache = tmp_path / "cache"
     assert play(source, cache)["seen"]["energy"] < 0.5 * 6 * 30
     edit(
-        source, "worlds/rover_dynamics.py", "team.energy[i] = 0.5\n", "team.energy[i] = p.energy\n"
+        source, "worlds/rover/dynamics.py", "team.energy[i] = 0.5\n", "team.energy[i] = p.energy\n"
     )
     assert play(source, cache)["seen"]["energy"] > 900 * 6 * 30
 

@@ -10,9 +10,9 @@ from conevo.replay.recording import record_epoch
 from conevo.replay.stages import stage_of
 from conevo.replay.stages.words import enumerated
 from conevo.replay.trajectory import Trajectory
-from conevo.worlds import rocks
-from conevo.worlds.gacc_plans import plan
+from conevo.worlds.gacc.plans import plan
 from conevo.worlds.rollout import Rollout
+from conevo.worlds.rover import rocks
 from replay.epochs import TASKS, epoch
 from replay.eventful import played
 from replay.staging import changed, told, values

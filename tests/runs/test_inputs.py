@@ -13,11 +13,11 @@ from conevo.errors import UsageError
 from conevo.runs.config import resolve
 from conevo.runs.run import start
 from conevo.runs.shaping import Shaping, start_shaping
-from conevo.worlds import prey_sets
+from conevo.worlds.pursuit import prey_sets
 from runs.tiny import content, evolve_tiny
 
 LIGHT = Path(__file__).parents[2] / "examples" / "light.py"
-SHIPPED = Path(prey_sets.__file__).parent / "data" / prey_sets.SHIPPED
+SHIPPED = Path(prey_sets.__file__).parent / prey_sets.SHIPPED
 TINY: dict[str, Any] = {
     "run.generations": 2,
     "run.epochs": 1,

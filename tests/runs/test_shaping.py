@@ -22,7 +22,7 @@ from conevo.evolution.methods.registry import METHODS
 from conevo.rng import fold
 from conevo.runs.evolved_prey import PREY_TASKS
 from conevo.runs.shaping import Shaping, start_shaping, tasks_up_to
-from conevo.worlds import prey_sets
+from conevo.worlds.pursuit import prey_sets
 from runs.crashes import Crash, fail_at
 from runs.tiny import TINY, arrays, content, evolve_tiny, tiny_settings
 

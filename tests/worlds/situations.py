@@ -11,7 +11,7 @@ import numpy as np
 
 from conevo.controllers.registry import controller, genome_of
 from conevo.rng import stream
-from conevo.worlds.prey_sets import PreySet, save
+from conevo.worlds.pursuit.prey_sets import PreySet, save
 from conevo.worlds.registry import world
 from conevo.worlds.rollout import Rollout
 

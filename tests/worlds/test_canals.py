@@ -1,4 +1,4 @@
-"""The ten canal layouts keep the promises of conevo.worlds.canals."""
+"""The ten canal layouts keep the promises of conevo.worlds.rover.canals."""
 
 from itertools import pairwise
 
@@ -7,7 +7,7 @@ import pytest
 from numpy.lib.stride_tricks import sliding_window_view
 
 from conevo.errors import UsageError
-from conevo.worlds.canals import CELL, N_LAYOUTS, generate, load, sites
+from conevo.worlds.rover.canals import CELL, N_LAYOUTS, generate, load, sites
 
 ENVIRONMENTS = range(1, N_LAYOUTS + 1)
 every_layout = pytest.mark.parametrize("environment", ENVIRONMENTS)

@@ -10,8 +10,8 @@ from conevo.controllers.registry import controller
 from conevo.errors import UsageError
 from conevo.rng import fold, stream
 from conevo.runs.config import resolve
-from conevo.worlds.arena import draw_scenarios
-from conevo.worlds.prey_sets import PreySet, save
+from conevo.worlds.pursuit.arena import draw_scenarios
+from conevo.worlds.pursuit.prey_sets import PreySet, save
 from conevo.worlds.registry import world
 from conevo.worlds.rollout import Rollout
 from worlds.situations import (

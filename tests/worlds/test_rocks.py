@@ -3,8 +3,8 @@
 import pytest
 
 from conevo.errors import UsageError
-from conevo.worlds.canals import load
-from conevo.worlds.rocks import ENVIRONMENTS, VALUES, Mix, layout, mix
+from conevo.worlds.rover.canals import load
+from conevo.worlds.rover.rocks import ENVIRONMENTS, VALUES, Mix, layout, mix
 
 VALUE_SHARES = (0.1, 0.2, 0.3, 0.4)  # of A..D at equal counts
 

@@ -9,7 +9,7 @@ from conevo.controllers.registry import controller, genome_of
 from conevo.rng import fold, stream
 from conevo.worlds.registry import world
 from conevo.worlds.rollout import Rollout
-from conevo.worlds.rover import RoverParams
+from conevo.worlds.rover.world import RoverParams
 from oracles import rover_oracle, splitmix
 
 LOW, MED, HI, MOVE, NONE = 0, 1, 2, 3, -1

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from conevo.worlds.canals import load, sites
+from conevo.worlds.rover.canals import load, sites
 from oracles import rover_oracle as oracle
 from oracles.rover_oracle import HI, LOW, MED, MOVE, NONE, Params, activate, step_towards
 

@@ -32,7 +32,7 @@ from conevo.rng import fold, stream
 from conevo.runs.champions import Team
 from conevo.runs.lab import Lab
 from conevo.runs.run import Run
-from conevo.worlds.pursuit import PursuitWorld
+from conevo.worlds.pursuit.world import PursuitWorld
 
 __all__ = ["N_INSTANCES", "Observation", "lab_of", "observe", "setting_of", "watch"]
 

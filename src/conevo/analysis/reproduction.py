@@ -33,7 +33,7 @@ from conevo.analysis.captures import COLLECTIVES, find_captures
 from conevo.analysis.pursuit import Observation, Record
 from conevo.analysis.sensors import average
 from conevo.rng import fold, stream
-from conevo.worlds.arena import ArenaScenarios
+from conevo.worlds.pursuit.arena import ArenaScenarios
 from conevo.worlds.rollout import Rollout
 
 __all__ = ["place_together", "reproduce_collectives", "reproduce_individuals"]

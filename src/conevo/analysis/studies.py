@@ -38,7 +38,7 @@ from conevo.runs.run import Run
 from conevo.specialization.individual import NON_SPECIALIZED
 from conevo.specialization.team import Activity, measure
 from conevo.worlds.protocol import Outcome, Scenarios
-from conevo.worlds.pursuit import PursuitWorld
+from conevo.worlds.pursuit.world import PursuitWorld
 
 __all__ = ["study"]
 

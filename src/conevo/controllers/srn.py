@@ -140,7 +140,7 @@ def think(
             h[k] = shape.bias
         w = c * shape.n_inputs
         j = int(0)
-        while j < shape.n_sensors:  # not range: see worlds.rover_dynamics
+        while j < shape.n_sensors:  # not range: see worlds.rover.dynamics
             h += weights.w_in[w + j] * inputs[i, j]
             j += 1
         w += shape.n_sensors

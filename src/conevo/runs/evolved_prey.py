@@ -24,7 +24,7 @@ PREY_TASKS = tuple(f"prey-v1/shaping-{number}" for number in range(1, 7))
 
 def refuse_other_prey(stages: Sequence[RunConfig]) -> None:
     """Raise UsageError unless the prey are networks such as a prey file holds."""
-    from conevo.worlds.prey_sets import WEIGHT_SCALE
+    from conevo.worlds.pursuit.prey_sets import WEIGHT_SCALE
 
     right = {"name": "srn", "recurrent": False, "bias": False, "weight_scale": WEIGHT_SCALE}
     for stage in stages:
@@ -43,7 +43,7 @@ def save_prey(stages: Sequence[Run], path: Path) -> None:
     The file says what made it, but neither when nor on which machine, so that the same command
     writes the same bytes.
     """
-    from conevo.worlds.prey_sets import PreySet, save
+    from conevo.worlds.pursuit.prey_sets import PreySet, save
 
     one, two = (stages[k].champion for k in (2, 5))
     if one is None or two is None:

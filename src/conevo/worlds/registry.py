@@ -89,7 +89,7 @@ WORLDS: dict[str, WorldEntry] = {
             environments=tuple(
                 f"{kind}-{n}" for kind in ("simple", "complex", "extended") for n in range(1, 11)
             ),
-            module="conevo.worlds.rover",
+            module="conevo.worlds.rover.world",
             params_name="RoverParams",
             world_name="RoverWorld",
         ),
@@ -99,7 +99,7 @@ WORLDS: dict[str, WorldEntry] = {
             summary="2 to 6 Khepera predators immobilize one or two prey that are faster",
             source="Nitschke 2009, chapter 4",
             environments=tuple(f"team-{n}" for n in range(1, 11)),
-            module="conevo.worlds.pursuit",
+            module="conevo.worlds.pursuit.world",
             params_name="PursuitParams",
             world_name="PursuitWorld",
         ),
@@ -109,7 +109,7 @@ WORLDS: dict[str, WorldEntry] = {
             summary="one or two prey learn to run fast and straight without a collision",
             source="Nitschke 2009, section 4.3",
             environments=tuple(f"shaping-{n}" for n in range(1, 7)),
-            module="conevo.worlds.prey",
+            module="conevo.worlds.pursuit.prey",
             params_name="PreyParams",
             world_name="PreyWorld",
         ),
@@ -120,7 +120,7 @@ WORLDS: dict[str, WorldEntry] = {
             source="Nitschke 2009, chapter 6",
             environments=tuple(f"simple-{n}" for n in range(1, 11))
             + tuple(f"complex-{n}" for n in range(1, 10)),
-            module="conevo.worlds.gacc",
+            module="conevo.worlds.gacc.world",
             params_name="GaccParams",
             world_name="GaccWorld",
         ),

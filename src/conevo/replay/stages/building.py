@@ -11,7 +11,7 @@ from conevo.palette import BLUE, FAINT, GREEN, INK, ORANGE, VERMILION
 from conevo.replay.stage import Event, Kind
 from conevo.replay.stages.parts import Parts
 from conevo.replay.stages.words import enumerated
-from conevo.worlds.gacc_plans import TYPES
+from conevo.worlds.gacc.plans import TYPES
 
 __all__ = ["EVENT_KINDS", "Building"]
 

@@ -21,7 +21,7 @@ from conevo.replay.stage import (
 )
 from conevo.replay.stages.building import EVENT_KINDS, Building
 from conevo.replay.stages.parts import Parts, begun, columns, octants
-from conevo.worlds.gacc_plans import TYPES, plan
+from conevo.worlds.gacc.plans import TYPES, plan
 
 __all__ = ["stage"]
 

@@ -12,7 +12,7 @@ from conevo.replay.channel import Channel
 from conevo.replay.stage import Backdrop, BodyKind, Curve, Event, Kind, Ring, Stage, Things
 from conevo.replay.stages.parts import Parts, begun, octants
 from conevo.replay.stages.words import enumerated
-from conevo.worlds import rocks
+from conevo.worlds.rover import rocks
 
 __all__ = ["stage"]
 

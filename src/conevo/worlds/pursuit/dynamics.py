@@ -1,7 +1,7 @@
 """The dynamics of predators and prey: what a Khepera does in one iteration, as Warp functions.
 
-One set of rules serves two worlds: in ``worlds.pursuit`` the team are the predators, in
-``worlds.prey`` the prey. Bodies are numbered: first the team's robots, then the others (the prey,
+One set of rules serves two worlds: in ``pursuit.world`` the team are the predators, in
+``pursuit.prey`` the prey. Bodies are numbered: first the team's robots, then the others (the prey,
 or the heuristic predators), which robot ``i`` looks after in turn (``i + R``, ``i + 2 R``, ...).
 Every function writes only data of the robot it is called for and of the bodies it owns. The
 rules and the choices stand on the cards of the two worlds.
@@ -11,7 +11,7 @@ import warp as wp
 
 from conevo.kernels.actions import begin_counting, count_action
 from conevo.kernels.khepera import RADIUS, drive
-from conevo.worlds.pursuit_bodies import (
+from conevo.worlds.pursuit.bodies import (
     NONE,
     Params,
     Scene,

@@ -120,7 +120,7 @@ def load(path: str | Path | None = None) -> PreySet:
 
 def _read(path: str | Path | None) -> dict[str, npt.NDArray[Any]]:
     if path is None:
-        with resources.as_file(resources.files(__package__) / "data" / SHIPPED) as shipped:
+        with resources.as_file(resources.files(__package__) / SHIPPED) as shipped:
             return read_arrays(shipped)
     try:
         return read_arrays(Path(path), MOST_BYTES, "a prey set")

@@ -49,11 +49,11 @@ from annotated_types import Ge, Le
 
 from conevo.errors import UsageError, unknown_name
 from conevo.parameters import parameters
-from conevo.worlds import prey_sets
-from conevo.worlds.arena import ArenaParams, ArenaScenarios, draw_scenarios, simulate
 from conevo.worlds.measures import Measure
 from conevo.worlds.protocol import Simulation, names_of
-from conevo.worlds.pursuit_dynamics import ACTIONS, PURSUIT_FUNCTIONS
+from conevo.worlds.pursuit import prey_sets
+from conevo.worlds.pursuit.arena import ArenaParams, ArenaScenarios, draw_scenarios, simulate
+from conevo.worlds.pursuit.dynamics import ACTIONS, PURSUIT_FUNCTIONS
 
 __all__ = ["PursuitParams", "PursuitWorld"]
 

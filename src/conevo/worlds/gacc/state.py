@@ -1,6 +1,6 @@
 """State of the gathering and construction world, and where things are in it, as Warp functions.
 
-The rules and the choices stand on the card of ``worlds.gacc``.
+The rules and the choices stand on the card of ``worlds.gacc.world``.
 """
 
 import warp as wp

@@ -1,4 +1,4 @@
-"""What there is to build in each environment of ``worlds.gacc``: complex objects and their parts.
+"""What there is to build in each environment of gacc: complex objects and their parts.
 
 Nitschke 2009, tables 6.6 to 6.8, section 6.4.2. The objects of an environment are exactly the parts
 of its complex objects, ten each.

@@ -18,7 +18,7 @@ performance    ``path`` in cm, see below; ``collided``, share of the prey that d
 distance driven times 1 - sqrt(half the difference of its wheel commands). A prey whose own move is
 refused has collided: its fitness is 0 and its epoch is over; it stays as a body.
 
-The rules of motion, sensing and collisions are those of ``worlds.pursuit``; the predators are its
+The rules of motion, sensing and collisions are those of ``pursuit.world``; the predators are its
 heuristic predators. Experiments 1 to 6 in turn, each beginning with the populations of the one
 before, are ``conevo shape-prey``.
 
@@ -37,10 +37,10 @@ from annotated_types import Ge, Le
 
 from conevo.errors import UsageError
 from conevo.parameters import parameters
-from conevo.worlds.arena import ArenaParams, ArenaScenarios, draw_scenarios, simulate
 from conevo.worlds.measures import Measure
 from conevo.worlds.protocol import Simulation, names_of
-from conevo.worlds.pursuit_dynamics import ACTIONS, PREY_FUNCTIONS
+from conevo.worlds.pursuit.arena import ArenaParams, ArenaScenarios, draw_scenarios, simulate
+from conevo.worlds.pursuit.dynamics import ACTIONS, PREY_FUNCTIONS
 
 __all__ = ["PreyParams", "PreyWorld"]
 

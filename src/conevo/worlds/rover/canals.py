@@ -17,7 +17,7 @@ shorter, straighter strokes. Every layout keeps these promises (tests/worlds/tes
 * the free cells are connected (4 neighbours) and a margin of 8 cells along the border is free, so
   that no rover is walled in.
 
-``python -m conevo.worlds.canals`` draws all ten again and writes ``data/canals-v1.npz``.
+``python -m conevo.worlds.rover.canals`` draws all ten again and writes ``canals-v1.npz``.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ CELL = 1.0 / N_CELLS  # side of a cell, 0.005
 BoolArray = npt.NDArray[np.bool_]
 FloatArray = npt.NDArray[np.float64]
 
-_DATA = Path(__file__).with_name("data") / "canals-v1.npz"
+_DATA = Path(__file__).with_name("canals-v1.npz")
 _SEED = 2009
 _AREA = 5500  # canal cells aimed at
 _WIDTH = 6  # of the brush, in cells

@@ -1,7 +1,7 @@
 """The dynamics of the multi-rover world: what a rover does in one iteration, as Warp functions.
 
 State, reset, sense, act, commit, resolve, outcome; the rules and the choices stand on the card of
-``worlds.rover``. Every function is called for one robot and writes only that robot's data.
+``worlds.rover.world``. Every function is called for one robot and writes only that robot's data.
 
 Hot loops over a number known only at run time are written with ``while``: Warp keeps the iterator
 of such a ``range`` in memory (the whole kernel was 1.2 to 1.3 times as fast without, on the CPU).
@@ -15,7 +15,7 @@ from conevo.kernels.outputs import highest
 from conevo.kernels.random import uniform
 from conevo.kernels.sensing import closest_in_octants, is_marked, mark
 from conevo.kernels.steps import is_taken, random_step, steered_step
-from conevo.worlds import canals
+from conevo.worlds.rover import canals
 
 __all__ = [
     "FUNCTIONS",

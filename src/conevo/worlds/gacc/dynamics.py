@@ -1,7 +1,7 @@
-"""What a robot of ``worlds.gacc`` does in one iteration, and what becomes of objects.
+"""What a robot of ``worlds.gacc.world`` does in one iteration, and what becomes of objects.
 
-Reset, act, commit, resolve, outcome; rules and choices stand on the card of ``worlds.gacc``. Every
-function writes only data of the robot it is called for and of the object that only this robot
+Reset, act, commit, resolve, outcome; rules and choices stand on the card of ``worlds.gacc.world``.
+Every function writes only data of the robot it is called for and of the object that only this robot
 holds; but ``resolve`` is one referee, robot 0, since objects compete for places in a plan.
 """
 
@@ -11,8 +11,8 @@ from conevo.kernels.actions import PREFERENCE, begin_counting, count_action, heu
 from conevo.kernels.outputs import highest
 from conevo.kernels.random import uniform
 from conevo.kernels.steps import is_taken, random_step, steered_step
-from conevo.worlds.gacc_senses import sense
-from conevo.worlds.gacc_state import (
+from conevo.worlds.gacc.senses import sense
+from conevo.worlds.gacc.state import (
     CARRIED,
     DELIVERED,
     DROPPED,

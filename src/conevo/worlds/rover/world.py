@@ -22,7 +22,7 @@ effect. Refused moves (canal, edge, another rover) cost the same as others.
 
 Choices, all declared in ``RoverParams`` or here, with their sensitivity on the page *Fidelity*:
 
-- Rocks stand at the centres of a 200 x 200 lattice inside the canals (``worlds.canals``). Each
+- Rocks stand at the centres of a 200 x 200 lattice inside the canals (``rover.canals``). Each
   scenario draws which sites carry a rock, and of which type, the rovers' starts and the lander.
 - If more than two rovers succeed on one rock in one iteration, all that belong to a valid pair are
   credited; the team's value counts the rock once. So no order of rovers decides who is paid.
@@ -47,11 +47,11 @@ from annotated_types import Ge, Gt, Le
 from conevo.kernels.geometry import COVER_WORDS
 from conevo.parameters import parameters
 from conevo.rng import stream
-from conevo.worlds import canals, rocks
 from conevo.worlds.measures import Measure
 from conevo.worlds.places import draw_places
 from conevo.worlds.protocol import Scenarios, Simulation, kernel_params, names_of
-from conevo.worlds.rover_dynamics import FUNCTIONS, ROCK_CELLS, Params, Scene, Team
+from conevo.worlds.rover import canals, rocks
+from conevo.worlds.rover.dynamics import FUNCTIONS, ROCK_CELLS, Params, Scene, Team
 
 __all__ = ["RoverParams", "RoverScenarios", "RoverWorld"]
 

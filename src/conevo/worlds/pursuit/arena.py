@@ -1,6 +1,6 @@
 """The walled arena of predators and prey: its parameters, and scenarios drawn at random.
 
-Nitschke 2009, sections 4.1 to 4.3, table 4.1. Shared by ``worlds.pursuit`` and ``worlds.prey``.
+Nitschke 2009, sections 4.1 to 4.3, table 4.1. Shared by ``pursuit.world`` and ``pursuit.prey``.
 """
 
 import math
@@ -17,7 +17,7 @@ from conevo.kernels.khepera import RADIUS
 from conevo.parameters import parameters
 from conevo.rng import stream
 from conevo.worlds.protocol import Scenarios, Simulation, World, kernel_params
-from conevo.worlds.pursuit_bodies import N_OBSTACLES, Params, Scene, Team
+from conevo.worlds.pursuit.bodies import N_OBSTACLES, Params, Scene, Team
 
 __all__ = ["ArenaParams", "ArenaScenarios", "draw_scenarios", "simulate"]
 
@@ -173,7 +173,7 @@ def simulate(
         functions: its phases.
         bodies: the most that a scenario has.
         team_is_prey: whether the robots of the team are prey.
-        given: fields of ``pursuit_bodies.Params`` that its parameters do not have.
+        given: fields of ``bodies.Params`` that its parameters do not have.
     """
     robots = world.n_robots
     p = kernel_params(Params, world.params, world, team_is_prey=team_is_prey, **given)

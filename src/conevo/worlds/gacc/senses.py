@@ -1,4 +1,4 @@
-"""What a robot of ``worlds.gacc`` senses: objects and obstacles, robots, home area, demand.
+"""What a robot of ``worlds.gacc.world`` senses: objects and obstacles, robots, home area, demand.
 
 Nitschke 2009, sections 6.2.1 to 6.2.4, eqs 6.2 to 6.7. Eight octants each for the first three.
 """
@@ -10,7 +10,7 @@ import warp as wp
 from conevo.kernels.geometry import octant
 from conevo.kernels.random import uniform
 from conevo.kernels.sensing import closest_in_octants, mark
-from conevo.worlds.gacc_state import (
+from conevo.worlds.gacc.state import (
     MOVE,
     UNDETECTED,
     Params,

@@ -1,6 +1,6 @@
 """Predators and prey as bodies: their state, what they see, and the controllers they can have.
 
-Nitschke 2009, sections 4.1, 4.3, 4.6.6. What happens to them is ``worlds.pursuit_dynamics``.
+Nitschke 2009, sections 4.1, 4.3, 4.6.6. What happens to them is ``worlds.pursuit.dynamics``.
 """
 
 import warp as wp

@@ -93,9 +93,9 @@ from annotated_types import Ge, Gt, Le
 from conevo.errors import UsageError
 from conevo.parameters import parameters
 from conevo.rng import stream
-from conevo.worlds.gacc_dynamics import FUNCTIONS
-from conevo.worlds.gacc_plans import TYPES, Plan, plan
-from conevo.worlds.gacc_state import Params, Scene, Team
+from conevo.worlds.gacc.dynamics import FUNCTIONS
+from conevo.worlds.gacc.plans import TYPES, Plan, plan
+from conevo.worlds.gacc.state import Params, Scene, Team
 from conevo.worlds.measures import Measure
 from conevo.worlds.places import draw_places
 from conevo.worlds.protocol import Scenarios, Simulation, kernel_params, names_of

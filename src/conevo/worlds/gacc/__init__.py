@@ -1,0 +1,1 @@
+"""Gathering and collective construction: rules, plans and sensors."""

@@ -1,0 +1,1 @@
+"""The multi-rover world: rules, canals and rocks."""
