@@ -262,7 +262,7 @@ def main() -> None:
     draw(rows, PAGE.with_suffix(".png"))
     print(tables(rows))
     rollout = conevo.Rollout(conevo.world("pursuit/team-3"), n_threads=1)
-    print(f"kernel {rollout.kernel_hash}")
+    print(f"kernel {rollout.fingerprint}")
 
 
 if __name__ == "__main__":

@@ -58,7 +58,7 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=4)
     seeds = range(1, parser.parse_args().seeds + 1)
     world = conevo.world(TASK, iterations=SETTINGS["world.iterations"])
-    hashes = [conevo.Rollout(world).kernel_hash]
+    hashes = [conevo.Rollout(world).fingerprint]
     teams = [controlled(world, name, h) for h, name in enumerate(world.heuristics)]
     teams.append(random_networks(world, N_RANDOM, 1, "demand"))
     teams.append(random_clones(world, N_RANDOM, 1, "demand"))
@@ -67,7 +67,7 @@ def main() -> None:
         teams += [champion(run, f"HomCNE, seed {k}") for k, run in zip(seeds, runs, strict=True)]
         before = [delivered(world, some) for some in teams]
         read(share)
-        hashes.append(conevo.Rollout(world).kernel_hash)
+        hashes.append(conevo.Rollout(world).fingerprint)
         assert hashes[0] != hashes[1]
         after = [delivered(world, some) for some in teams]
         others = [evolved(Path(folder) / f"share-{seed}", seed) for seed in seeds]

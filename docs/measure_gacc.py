@@ -234,7 +234,7 @@ def main() -> None:
     pages.put(text, PAGE, "bars")
     pages.put(settings_table(found, kinds), PAGE, "settings")
     print(text, settings_table(found, kinds), sep="\n")
-    print(f"kernel {conevo.Rollout(world_of(CASES[0][0]), n_threads=1).kernel_hash}")
+    print(f"kernel {conevo.Rollout(world_of(CASES[0][0]), n_threads=1).fingerprint}")
 
 
 if __name__ == "__main__":

@@ -372,7 +372,7 @@ def main() -> None:
     pages.put(tables(rows), PAGE)
     print(tables(rows))
     rollout = conevo.Rollout(conevo.world("pursuit/team-3"), n_threads=1)
-    print(f"kernel {rollout.kernel_hash}")
+    print(f"kernel {rollout.fingerprint}")
 
 
 if __name__ == "__main__":

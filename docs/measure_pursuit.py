@@ -116,7 +116,7 @@ def main() -> None:
     pages.put(tables(rows), PAGE)
     print(tables(rows))
     rollout = conevo.Rollout(conevo.world(ENVIRONMENT), n_threads=1)
-    print(f"kernel {rollout.kernel_hash}")
+    print(f"kernel {rollout.fingerprint}")
 
 
 if __name__ == "__main__":

@@ -284,7 +284,7 @@ def main() -> None:
     put(tables(rows), PAGE)
     print(tables(rows))
     world = conevo.world(ENVIRONMENT)
-    print(f"kernel {conevo.Rollout(world, n_threads=1).kernel_hash}")
+    print(f"kernel {conevo.Rollout(world, n_threads=1).fingerprint}")
 
 
 if __name__ == "__main__":

@@ -83,7 +83,7 @@ def test_actions_are_counted_over_all_scenarios(task, runs, found) -> None:
     run = runs[task]
     lab = Lab.equip(run.config, 1, "cpu")
     keys = [fold(run.config.run.seed, "test", k) for k in range(N)]
-    outcome = lab.rollout.evaluate(*run.champion.as_trial(), lab.world.scenarios(keys))
+    outcome = lab.simulator.evaluate(*run.champion.as_trial(), lab.world.scenarios(keys))
     expected = outcome.counts[0].sum(axis=0)
     rows = found[task]["actions"]
     assert [row["count"] for row in rows] == expected.ravel().tolist()
@@ -120,7 +120,7 @@ def test_lesioned_teams_play_the_same_fresh_scenarios(task, runs, found) -> None
     for team in ("whole", *castes):
         stands_in = replacement(lab.world, team)
         modes = [[stands_in if caste == team else -1 for caste in labels]]
-        played = lab.rollout.evaluate(*run.champion.as_trial(), scenarios, np.int32(modes))
+        played = lab.simulator.evaluate(*run.champion.as_trial(), scenarios, np.int32(modes))
         for name, result in played.performance.items():
             assert rows[team, name] == result[0].tolist()
 
@@ -139,7 +139,7 @@ def test_clones_are_of_the_fittest_and_not_of_movers(task, runs, found) -> None:
         own = [row for row in robots if row["caste"] == team]
         fittest = [max(own, key=lambda row: row["fitness"])["robot"]] * len(robots) if own else ...
         one = dataclasses.replace(whole, genes=whole.genes[fittest], active=whole.active[fittest])
-        played = lab.rollout.evaluate(*one.as_trial(), scenarios)
+        played = lab.simulator.evaluate(*one.as_trial(), scenarios)
         for name, result in played.performance.items():
             assert rows[team, name] == result[0].tolist()
 

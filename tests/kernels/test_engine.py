@@ -31,7 +31,7 @@ teams[:, :, :10] = np.arange(60).reshape(1, 6, 10)
 rollout = Rollout(task, n_threads=1)
 seen = rollout.record(pool, teams[0], task.scenarios([1]))
 sums = {name: float(np.float64(values).sum()) for name, values in seen.items()}
-print(json.dumps({"hash": rollout.kernel_hash, "seen": sums}))
+print(json.dumps({"hash": rollout.fingerprint, "seen": sums}))
 """
 
 
@@ -147,11 +147,11 @@ def test_a_missing_cuda_device_is_one_clear_line():
 
 
 def test_kernel_hash_is_the_same_for_all_environments_and_sizes_of_a_world():
-    one = Rollout(world("rover/complex-1")).kernel_hash
+    one = Rollout(world("rover/complex-1")).fingerprint
     small = world("rover/simple-10", n_robots=3)
-    assert Rollout(small, controller(world=small, n_hidden=4)).kernel_hash == one
-    two = Rollout(world("pursuit/team-1")).kernel_hash
-    assert Rollout(world("pursuit/team-10", prey="random", arena_cm=1000.0)).kernel_hash == two
+    assert Rollout(small, controller(world=small, n_hidden=4)).fingerprint == one
+    two = Rollout(world("pursuit/team-1")).fingerprint
+    assert Rollout(world("pursuit/team-10", prey="random", arena_cm=1000.0)).fingerprint == two
     assert one != two
     assert len(one) == 16
     assert int(one, 16) > 0

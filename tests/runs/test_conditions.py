@@ -32,7 +32,7 @@ def test_settings_and_environment_are_those_asked_for(run: conevo.Run) -> None:
     config = replace(run.config, environment="complex-2", world_params=params)
     lab = Lab.equip(config, 1, "cpu")
     assert run.champion is not None
-    expected = play(lab.rollout, lab.world, run.champion, n_scenarios=4, seed=1)
+    expected = play(lab.simulator, lab.world, run.champion, n_scenarios=4, seed=1)
     assert both["changed"] == expected
     assert both["own"] == run.test(4, threads=1)
     assert both["conditions"]["task"] == "rover-v1/complex-2"

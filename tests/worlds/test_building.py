@@ -91,7 +91,7 @@ def build(path: Path) -> str:
     """Build a world's kernel and return its hash."""
     rollout = Rollout(conevo.world(f"{path}:dark-1"))
     rollout.build()
-    return rollout.kernel_hash
+    return rollout.fingerprint
 
 
 def test_threads_build_different_worlds_one_after_the_other(tmp_path: Path) -> None:

@@ -100,7 +100,7 @@ def test_its_kernels_are_known_by_their_text_too(tmp_path: Path) -> None:
     hashes, fresh = [], ("first version", "not loaded before")
     for change in (("", ""), ("1.0 - wp.length", "2.0 - wp.length"), ("three robots", "3 robots")):
         file = written(tmp_path / "light.py", change, fresh)
-        hashes.append(conevo.Rollout(conevo.world(f"{file}:dark-1")).kernel_hash)
+        hashes.append(conevo.Rollout(conevo.world(f"{file}:dark-1")).fingerprint)
     assert hashes[0] == hashes[2] != hashes[1]
 
 
@@ -228,7 +228,7 @@ def test_kernels_made_of_a_neighbour_change_with_it_and_imports_may_wait(tmp_pat
             "import warp as wp\n\n\n@wp.func\ndef scored(way: wp.vec2f) -> float:\n"
             f"    return {sign} - wp.length(way)\n"
         )
-        hashes.append(conevo.Rollout(conevo.world(f"{file}:dark-1")).kernel_hash)
+        hashes.append(conevo.Rollout(conevo.world(f"{file}:dark-1")).fingerprint)
     assert hashes[0] == hashes[2] != hashes[1]
 
 

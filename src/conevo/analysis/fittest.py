@@ -20,10 +20,10 @@ def equip(run: Run, threads: int | None = None) -> tuple[Team, Lab]:
     if team is None:
         raise run.without_team()
     lab = Lab.equip(run.config, threads, about["device"])
-    if lab.rollout.kernel_hash != about["kernel_hash"]:
+    if lab.simulator.fingerprint != about["kernel_hash"]:
         raise UsageError(
             f"{run.path} was made with other kernels ({about['kernel_hash']}, here "
-            f"{lab.rollout.kernel_hash}): its team would not behave as it did"
+            f"{lab.simulator.fingerprint}): its team would not behave as it did"
         )
     lab.refuse_other_team(team, run.path)
     return team, lab

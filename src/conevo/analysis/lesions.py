@@ -14,8 +14,7 @@ import numpy.typing as npt
 
 from conevo.runs.champions import Team
 from conevo.specialization.individual import NON_SPECIALIZED
-from conevo.worlds.protocol import Scenarios, World
-from conevo.worlds.rollout import Rollout
+from conevo.worlds.protocol import Scenarios, Simulator, World
 
 __all__ = ["WHOLE", "Compared", "clone", "lesion", "replacement"]
 
@@ -36,7 +35,7 @@ class Compared:
 
 
 def lesion(
-    rollout: Rollout,
+    simulator: Simulator,
     team: Team,
     labels: Sequence[str],
     castes: Sequence[str],
@@ -45,7 +44,7 @@ def lesion(
     """Play a team, and it with all robots of each caste replaced by a heuristic controller.
 
     Args:
-        rollout: of the team's world.
+        simulator: of the team's world.
         team: R controllers.
         labels: [R] caste of each robot.
         castes: those to replace, one at a time.
@@ -53,14 +52,14 @@ def lesion(
     """
     modes = np.full((1 + len(castes), len(labels)), -1, dtype=np.int32)
     for k, caste in enumerate(castes, start=1):
-        modes[k, np.asarray(labels) == caste] = replacement(rollout.world, caste)
+        modes[k, np.asarray(labels) == caste] = replacement(simulator.world, caste)
     genes, teams = team.as_trial()
-    outcome = rollout.evaluate(genes, np.repeat(teams, len(modes), axis=0), scenarios, modes)
+    outcome = simulator.evaluate(genes, np.repeat(teams, len(modes), axis=0), scenarios, modes)
     return Compared((WHOLE, *castes), outcome.performance)
 
 
 def clone(
-    rollout: Rollout,
+    simulator: Simulator,
     team: Team,
     labels: Sequence[str],
     fitness: npt.ArrayLike,
@@ -72,7 +71,7 @@ def clone(
     Choice: as many clones as the team has robots ("cloned 20 times" of thirty robots, 6.5.5).
 
     Args:
-        rollout: of the team's world.
+        simulator: of the team's world.
         team: R controllers.
         labels: [R] caste of each robot.
         fitness: [R] of each robot; ties go to the first; non-finite values rank last.
@@ -87,7 +86,7 @@ def clone(
         own = np.flatnonzero(np.asarray(labels) == caste)
         fittest = own[credit[own].argmax()]
         cloned.append(np.repeat(teams[:, [fittest]], len(labels), axis=1))
-    outcome = rollout.evaluate(genes, np.concatenate(cloned), scenarios)
+    outcome = simulator.evaluate(genes, np.concatenate(cloned), scenarios)
     return Compared((WHOLE, *castes), outcome.performance)
 
 

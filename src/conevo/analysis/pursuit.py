@@ -184,10 +184,10 @@ def watch(
     world = lab.world
     assert isinstance(world, PursuitWorld)
     genes, (rows,) = team.as_trial()
-    records = tuple(lab.rollout.record(genes, rows, world.scenarios([key])) for key in keys)
+    records = tuple(lab.simulator.record(genes, rows, world.scenarios([key])) for key in keys)
     return Observation(
         world=world,
-        controller=lab.rollout.controller,
+        controller=lab.simulator.controller,
         team=team,
         seed=seed,
         keys=keys,

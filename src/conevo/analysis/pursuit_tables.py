@@ -103,7 +103,7 @@ def lesion_table(
         lesioned = [behaviour for behaviour in BEHAVIOURS if behaviour in labels]
         team, lab = lab_of(run, threads)
         keys = [fold(seen.seed, "lesion", k) for k in range(scenarios)]
-        found = lesion(lab.rollout, team, labels, lesioned, lab.world.scenarios(keys))
+        found = lesion(lab.simulator, team, labels, lesioned, lab.world.scenarios(keys))
         means = found.performance["capture_time"].astype(np.float64).mean(axis=1).tolist()
         left = dict(zip(found.teams, means, strict=True))
         whole = left[WHOLE]

@@ -92,7 +92,7 @@ def study(run: Run, scenarios: int = 20, *, threads: int | None = None) -> dict[
     team, lab = equip(run, threads)
     seed = run.config.run.seed
     fresh = lab.world.scenarios([fold(seed, "test", k) for k in range(scenarios)])
-    outcome = lab.rollout.evaluate(*team.as_trial(), fresh)
+    outcome = lab.simulator.evaluate(*team.as_trial(), fresh)
     seen = None
     if isinstance(lab.world, PursuitWorld):
         seen = watch(team, lab, scenarios, seed, threads=threads)
@@ -101,9 +101,9 @@ def study(run: Run, scenarios: int = 20, *, threads: int | None = None) -> dict[
     if seen is not None:
         altered = [caste for caste in altered if caste != NON_SPECIALIZED]
     others = lab.world.scenarios([fold(seed, "lesion", k) for k in range(scenarios)])
-    lesioned = lesion(lab.rollout, team, portrait.labels, altered, others)
+    lesioned = lesion(lab.simulator, team, portrait.labels, altered, others)
     cloned = clone(
-        lab.rollout,
+        lab.simulator,
         team,
         portrait.labels,
         portrait.fitness,

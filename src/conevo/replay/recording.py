@@ -19,8 +19,7 @@ from conevo.rng import fold
 from conevo.runs.evaluation import describe
 from conevo.runs.run import Run
 from conevo.worlds.measures import Measure, measures_of
-from conevo.worlds.protocol import World
-from conevo.worlds.rollout import Rollout
+from conevo.worlds.protocol import Simulator, World
 
 __all__ = ["record", "record_epoch"]
 
@@ -62,7 +61,7 @@ def record(
         _refuse_other(run, lab.world, like)
         scenario, epoch = like.about["scenario"], like.about["epoch"]
     genes, rows = team.as_trial()
-    about, channels = record_epoch(lab.rollout, genes, rows[0], scenario)
+    about, channels = record_epoch(lab.simulator, genes, rows[0], scenario)
     config = run.config
     return Trajectory(
         about
@@ -95,7 +94,7 @@ def _refuse_other(run: Run, world: World, like: Trajectory) -> None:
 
 
 def record_epoch(
-    rollout: Rollout,
+    simulator: Simulator,
     genes: npt.NDArray[np.float32],
     team: npt.NDArray[np.int32],
     scenario: int,
@@ -104,7 +103,7 @@ def record_epoch(
     """Record any team in one scenario.
 
     Args:
-        rollout: of the world.
+        simulator: of the world.
         genes: pool of genotypes [K, G].
         team: pool rows [R, U], -1 for an empty slot.
         scenario: its key.
@@ -113,11 +112,11 @@ def record_epoch(
     Returns:
         What is known of it, of no run; and the channels.
     """
-    world = rollout.world
+    world = simulator.world
     scenes = world.scenarios([scenario])
     modes = np.full(world.n_robots, -1, np.int32) if heuristic is None else heuristic
-    seen = rollout.record(genes, team, scenes, modes)
-    outcome = rollout.evaluate(genes, team[None], scenes, modes[None])
+    seen = simulator.record(genes, team, scenes, modes)
+    outcome = simulator.evaluate(genes, team[None], scenes, modes[None])
     portrait = describe(outcome, world.castes)
     inputs, outputs, hidden = (seen.pop(name) for name in ("inputs", "outputs", "hidden"))
     measured = seen.pop("performance")
@@ -134,14 +133,14 @@ def record_epoch(
     channels["outputs"] = Channel.of(_sigmoid(outputs) * has_network[:, None], bits=8)
     for name in vars(scenes):
         if name not in _UNSEEN:
-            is_shared = rollout.is_shared(name)
+            is_shared = simulator.is_shared(name)
             values = getattr(scenes, name)
             channels[f"scene/{name}"] = Channel.of(values if is_shared else values[0])
     names = ("", *world.heuristics)
     about: About = {
         "format": FORMAT,
         "conevo": version("conevo"),
-        "kernel_hash": rollout.kernel_hash,
+        "kernel_hash": simulator.fingerprint,
         "world": world.name,
         "environment": world.environment,
         "task": f"{world.name}/{world.environment}",
@@ -155,7 +154,7 @@ def record_epoch(
         "iterations": world.params.iterations,
         "n_robots": world.n_robots,
         "params": _params(world),
-        "controller": _controller(rollout.controller),
+        "controller": _controller(simulator.controller),
         "inputs": list(world.inputs),
         "outputs": list(world.outputs),
         "actions": list(world.actions),

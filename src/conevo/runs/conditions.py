@@ -54,7 +54,7 @@ def test_under(
     if champion is None:
         raise RuntimeError("a tested run has a champion")
     changed = test_team(
-        lab.rollout,
+        lab.simulator,
         lab.world,
         _resized(champion, lab.world.n_robots),
         n_scenarios=own["scenarios"],

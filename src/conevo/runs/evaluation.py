@@ -11,8 +11,7 @@ import numpy.typing as npt
 from conevo.evolution.protocol import Scores, Trials
 from conevo.rng import fold
 from conevo.specialization import individual
-from conevo.worlds.protocol import Outcome, World
-from conevo.worlds.rollout import Rollout
+from conevo.worlds.protocol import Outcome, Simulator, World
 
 __all__ = ["Evaluation", "Portrait", "describe", "make_evaluator", "score"]
 
@@ -46,7 +45,7 @@ Evaluate = Callable[[Trials], Evaluation]
 
 
 def make_evaluator(
-    rollout: Rollout, world: World, *, seed: int, epochs: int, fittest_epochs: int, credit: str
+    simulator: Simulator, world: World, *, seed: int, epochs: int, fittest_epochs: int, credit: str
 ) -> Evaluate:
     """Return the function that plays trials in a world.
 
@@ -66,7 +65,7 @@ def make_evaluator(
         genes = np.asarray(trials.genes, dtype=np.float32)
         teams = np.asarray(trials.teams, dtype=np.int32)
         scenarios = world.scenarios(keys(trials))
-        outcome = rollout.evaluate(genes, teams, scenarios, rounds=trials.rounds)
+        outcome = simulator.evaluate(genes, teams, scenarios, rounds=trials.rounds)
         return Evaluation(score(outcome, credit), outcome)
 
     return evaluate

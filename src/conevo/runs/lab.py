@@ -17,8 +17,8 @@ from conevo.runs.champions import Team
 from conevo.runs.config import RunConfig
 from conevo.runs.evaluation import Evaluate, make_evaluator
 from conevo.runs.loop import check_budget, price
-from conevo.worlds.protocol import World
-from conevo.worlds.rollout import Rollout
+from conevo.worlds.protocol import Simulator, World
+from conevo.worlds.simulators import simulator
 
 __all__ = ["Lab", "Price", "check_memory", "layout_of", "price_of", "refuse_other_state"]
 
@@ -111,7 +111,7 @@ class Lab:
     config: RunConfig
     world: World
     method: Method
-    rollout: Rollout
+    simulator: Simulator
     evaluate: Evaluate
 
     @staticmethod
@@ -123,14 +123,14 @@ class Lab:
             EnvironmentFailure: there is no such device, or no place for compiled kernels.
         """
         world = config.build_world()
-        rollout = Rollout(world, config.controller, threads, device).build()
+        made = simulator(world, config.controller, threads, device)
         return Lab(
             config=config,
             world=world,
             method=config.build_method(),
-            rollout=rollout,
+            simulator=made,
             evaluate=make_evaluator(
-                rollout,
+                made,
                 world,
                 seed=config.run.seed,
                 epochs=config.run.epochs,

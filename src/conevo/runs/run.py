@@ -113,7 +113,7 @@ def start(
         "preset": config.preset,
         "changed": list(config.changed),
         "command": command,
-        "kernel_hash": lab.rollout.kernel_hash,
+        "kernel_hash": lab.simulator.fingerprint,
         "created": provenance.now(),
         **provenance.describe_machine(device),
         **provenance.describe(lab.world, lab.method),
@@ -449,7 +449,7 @@ class Run:
 
         lab.refuse_other_team(team, self.path)
         return test_team(
-            lab.rollout,
+            lab.simulator,
             lab.world,
             team,
             n_scenarios=scenarios or self.config.run.n_tests,
@@ -484,10 +484,10 @@ class Run:
                 raise EnvironmentFailure(
                     f"{self.path} was started on {device} and continues only there: {error}"
                 ) from error
-        if lab.rollout.kernel_hash != about["kernel_hash"]:
+        if lab.simulator.fingerprint != about["kernel_hash"]:
             raise UsageError(
                 f"{self.path} was made with other kernels ({about['kernel_hash']}, here "
-                f"{lab.rollout.kernel_hash}): install conevo {about['conevo']} and warp-lang "
+                f"{lab.simulator.fingerprint}): install conevo {about['conevo']} and warp-lang "
                 f"{about['warp']}, or start another run with --config {self.path}/config.toml"
             )
         return lab

@@ -64,7 +64,7 @@ def evolve_on(
     session = {
         "started": provenance.now(),
         "from_generation": generation,
-        "threads": lab.rollout.n_threads,
+        "threads": lab.simulator.n_threads,
         **provenance.describe_machine(about["device"]),
     }
     store.write_provenance(about | {"sessions": [*about["sessions"], session]})
@@ -111,7 +111,7 @@ def finish(store: Store, lab: Lab, stopped_by: str) -> None:
     """Choose the champion among the finalists, test it, and seal the run."""
     settings, records = lab.config.run, store.read_generations()
     champion, validation = validate(
-        lab.rollout,
+        lab.simulator,
         lab.world,
         _best_so_far(store),
         n_scenarios=settings.n_validations,
@@ -123,7 +123,8 @@ def finish(store: Store, lab: Lab, stopped_by: str) -> None:
     tested = {"champion": champion, "generation_0": store.load_team(0) or champion}
     scenarios = {"n_scenarios": settings.n_tests, "seed": settings.seed}
     result = {
-        name: test_team(lab.rollout, lab.world, team, **scenarios) for name, team in tested.items()
+        name: test_team(lab.simulator, lab.world, team, **scenarios)
+        for name, team in tested.items()
     }
     store.write_test(result | {"validation": validation})
     store.thin_teams(sampled_generations(len(records)))

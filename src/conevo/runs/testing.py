@@ -16,8 +16,7 @@ from conevo.errors import UsageError
 from conevo.rng import fold
 from conevo.runs.champions import Finalists, Team
 from conevo.runs.evaluation import describe
-from conevo.worlds.protocol import World
-from conevo.worlds.rollout import Rollout
+from conevo.worlds.protocol import Simulator, World
 
 __all__ = ["refuse_numbers", "spread", "test_team", "validate"]
 
@@ -37,7 +36,7 @@ def refuse_numbers(scenarios: int | None, seed: int | None) -> None:
 
 
 def validate(
-    rollout: Rollout,
+    simulator: Simulator,
     world: World,
     finalists: Sequence[Team],
     *,
@@ -56,7 +55,7 @@ def validate(
     selection.
 
     Args:
-        rollout: the simulator.
+        simulator: of the world.
         world: the task.
         finalists: the fittest teams of the run, the fittest first.
         n_scenarios: validation scenarios, the same for all.
@@ -70,7 +69,7 @@ def validate(
         "validation" as ``spread`` gives them.
     """
     scenarios = world.scenarios([fold(seed, "validation", k) for k in range(n_scenarios)])
-    outcome = rollout.evaluate(*Finalists.of(finalists).as_trials(), scenarios)
+    outcome = simulator.evaluate(*Finalists.of(finalists).as_trials(), scenarios)
     fitness = outcome.fitness.astype(np.float64).mean(axis=2)
     robots = len(finalists[0].fitness) if credit == "team" else 1  # whose sum each is credited with
     rows = [
@@ -94,7 +93,7 @@ def validate(
 
 
 def test_team(
-    rollout: Rollout, world: World, team: Team, *, n_scenarios: int, seed: int
+    simulator: Simulator, world: World, team: Team, *, n_scenarios: int, seed: int
 ) -> dict[str, Any]:
     """Re-execute a team in scenarios that no generation has met.
 
@@ -103,7 +102,7 @@ def test_team(
         mean fitness; S and caste of each robot over all scenarios; the caste table.
     """
     scenarios = world.scenarios([fold(seed, "test", k) for k in range(n_scenarios)])
-    outcome = rollout.evaluate(*team.as_trial(), scenarios)
+    outcome = simulator.evaluate(*team.as_trial(), scenarios)
     portrait = describe(outcome, world.castes)
     fitness = outcome.fitness[0].astype(np.float64).mean(axis=1)
     return {

@@ -9,10 +9,19 @@ from typing import Any, ClassVar, Protocol
 import numpy as np
 import numpy.typing as npt
 
+from conevo.controllers.protocol import Controller
 from conevo.errors import UsageError, unknown_name
 from conevo.worlds.measures import Measure
 
-__all__ = ["Outcome", "Scenarios", "Simulation", "World", "kernel_params", "names_of"]
+__all__ = [
+    "Outcome",
+    "Scenarios",
+    "Simulation",
+    "Simulator",
+    "World",
+    "kernel_params",
+    "names_of",
+]
 
 
 def names_of(groups: Sequence[str], n: int) -> tuple[str, ...]:
@@ -117,6 +126,68 @@ def _value_of(name: str, sources: Sequence[Any], given: Mapping[str, Any]) -> An
     raise AttributeError(f"{kinds} has no field or property of this name")
 
 
+class Simulator(Protocol):
+    """What plays teams in a world. ``worlds.rollout.Rollout`` is that of worlds written in Warp.
+
+    Results depend on the arguments alone: not on threads, batches or what was played before.
+    """
+
+    @property
+    def world(self) -> World:
+        """The world and environment that is played."""
+
+    @property
+    def controller(self) -> Controller:
+        """The controller of its robots."""
+
+    @property
+    def fingerprint(self) -> str:
+        """A text that changes with anything that decides a result: a run continues with its own."""
+
+    @property
+    def n_threads(self) -> int:
+        """CPU threads in use."""
+
+    def evaluate(
+        self,
+        genes: npt.NDArray[np.float32],
+        teams: npt.NDArray[np.int32],
+        scenarios: Any,
+        heuristic: npt.NDArray[np.int32] | None = None,
+        rounds: int = 1,
+    ) -> Outcome:
+        """Play every team in every scenario of its round.
+
+        Args:
+            genes: pool of genotypes [K, G], float32, in [-1, 1].
+            teams: pool rows of the parts [N, R, U] (team, robot, slot), -1 for an empty slot.
+            scenarios: E scenarios of the world for each round, one round after another.
+            heuristic: [N, R], index of a heuristic controller of the world, -1 for the robot's own.
+            rounds: the teams come in so many parts of equal length, each with its own scenarios.
+
+        Raises:
+            ValueError: shapes or rows that do not fit the world.
+        """
+
+    def record(
+        self,
+        genes: npt.NDArray[np.float32],
+        team: npt.NDArray[np.int32],
+        scenarios: Any,
+        heuristic: npt.NDArray[np.int32] | None = None,
+    ) -> dict[str, npt.NDArray[Any]]:
+        """Play one team [R, U] in one scenario and return what happened in every iteration.
+
+        Returns:
+            What is recorded of the world, each [T, its size], ``x``, ``y``, ``action`` [T, R] and
+            ``fitness`` [T, R] among it; ``inputs`` [T, R, S], ``outputs`` [T, R, O], ``hidden``
+            [T, R, U]; ``performance`` [T, measures]. The last row equals what ``evaluate`` gives.
+        """
+
+    def is_shared(self, name: str) -> bool:
+        """Return whether all scenarios have a field of theirs in common."""
+
+
 class World(Protocol):
     """One environment of a task, with its parameters.
 
@@ -138,6 +209,9 @@ class World(Protocol):
 
     A world may have a property ``optimum``: the largest possible value of its main task performance
     measure, of which reports then give the share. It has none if smaller is better.
+
+    A world that is not written in Warp has, in place of ``simulation``, a method
+    ``simulator(controller, n_threads)`` that returns a ``Simulator`` of its own.
     """
 
     name: ClassVar[str]

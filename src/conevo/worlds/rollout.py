@@ -230,7 +230,7 @@ class Rollout:
         return self
 
     @property
-    def kernel_hash(self) -> str:
+    def fingerprint(self) -> str:
         """Sixteen hex digits that change with anything the kernels are made of."""
         return engine.kernel_hash(self._kernel, self._loading)
 
