@@ -79,6 +79,25 @@ def test_budgets_join_near_numbers_of_evaluations_and_keep_others_apart(tmp_path
     }
 
 
+def test_runs_of_one_planned_budget_belong_together_whatever_they_spent(tmp_path) -> None:
+    one = "rover/complex-1"
+    of = [
+        *cells([one], ["homcne"], budget=61, planned=100),
+        *cells([one], ["cone"], budget=82, planned=100),
+        *cells([one], ["mesp"], budget=82, planned=200),
+    ]
+    with tables_of(tmp_path, of, seeds=1) as tables:
+        found = {value.method: value.budget for value in tables.values()}
+    assert found == {
+        "homcne": "smoke, about 100 team evaluations of 500 team-steps",
+        "cone": "smoke, about 100 team evaluations of 500 team-steps",
+        "mesp": "smoke, about 200 team evaluations of 500 team-steps",
+    }
+    edit(tmp_path, "SELECT * REPLACE ('generations' AS stopped_by) FROM old")
+    with Tables(tmp_path / "campaign" / "tables") as tables:  # the budget did not end them
+        assert len({one.budget for one in tables.values()}) == 2
+
+
 def test_longer_evaluations_are_another_budget(tmp_path) -> None:
     write_campaign(tmp_path / "campaign", cells(["rover/complex-1"], ["ccga", "cone"]), seeds=1)
     edit(

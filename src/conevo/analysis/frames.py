@@ -28,6 +28,7 @@ SCHEMA: dict[str, dict[str, str]] = {
         "seed": "BIGINT",
         "variant": "VARCHAR",
         "generations": "INTEGER",
+        "planned_evaluations": "BIGINT",
         "evaluations": "BIGINT",
         "team_steps": "BIGINT",
         "seconds": "DOUBLE",
@@ -111,10 +112,11 @@ SCHEMA: dict[str, dict[str, str]] = {
 }
 """Columns of each table and their DuckDB types, as written to and read from NAME.parquet.
 
-``runs``: exchanges is the number of pairs of sub-populations that recombined between populations,
-in the mean of the generations, exchange_share that of the pairs that could have; both are NULL for
-methods that never do. ``measures``: the world's, as it declares them; of a measure that is not
-listed larger is better.
+``runs``: planned_evaluations is the budget of team evaluations that a run was given, NULL without
+one; evaluations is what it spent; exchanges is the number of pairs of sub-populations that
+recombined between populations, in the mean of the generations, exchange_share that of the pairs
+that could have; both are NULL for methods that never do. ``measures``: the world's, as it declares
+them; of a measure that is not listed larger is better.
 """
 
 
@@ -156,7 +158,9 @@ class Tables:
     ``budgets`` (run, budget) tells which runs may be compared: those of one world, one preset, and
     about equal numbers of team evaluations and of team-steps per evaluation; stages of shapings
     apart. Choice: "about equal" is within 20 %, as methods do not divide a budget evenly and CONE
-    spends some on type C. A run that ended at its target counts with those it saved evaluations to.
+    spends some on type C. A run that ended because the next generation would have exceeded its
+    budget counts with that budget, whatever it spent of it, and so does one that ended at its
+    target before. Without a budget, the latter counts with those it saved evaluations to.
 
     Use as a context, or ``close`` it.
     """
@@ -178,8 +182,8 @@ class Tables:
             self._open(table, columns)
         self._connection.execute("CREATE TABLE budgets (run VARCHAR, budget VARCHAR)")
         rows = self.query(
-            "SELECT run, world, preset, contains(run, '/stage-'), stopped_by, evaluations,"
-            " team_steps FROM runs ORDER BY ALL"
+            "SELECT run, world, preset, contains(run, '/stage-'), stopped_by, planned_evaluations,"
+            " evaluations, team_steps FROM runs ORDER BY ALL"
         )[1]
         named = sorted(_budgets(rows).items())
         self._connection.executemany("INSERT INTO budgets VALUES (?, ?)", named or [("", "")])
@@ -307,11 +311,14 @@ def _budgets(rows: list[tuple[Any, ...]]) -> dict[str, str]:
     """Return the budget of each run in words.
 
     Args:
-        rows: run, world, preset, whether a stage of a shaping, stopped_by, evaluations, team_steps.
+        rows: run, world, preset, whether a stage of a shaping, stopped_by, planned evaluations,
+            evaluations, team_steps.
     """
     scales = defaultdict(list)
-    for run, world, preset, is_stage, stopped_by, evaluations, steps in rows:
-        one = (stopped_by == "target", evaluations, steps / max(evaluations, 1), run)
+    for run, world, preset, is_stage, stopped_by, planned, evaluations, steps in rows:
+        counted = (stopped_by in ("budget", "target") and planned) or evaluations
+        is_saver = stopped_by == "target" and not planned
+        one = (is_saver, counted, steps / max(evaluations, 1), run)
         scales[world, preset, is_stage].append(one)
     budgets = {}
     for (_, preset, is_stage), runs in scales.items():

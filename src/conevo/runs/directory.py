@@ -14,7 +14,7 @@ import hashlib
 import json
 import os
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -183,20 +183,29 @@ class Directory:
         files: dict[str, str] = read_json(self.path / SEAL, Seal)["files"]
         return files
 
-    def check_seal(self) -> list[str]:
-        """Return the names of files that are not as they were when the directory was sealed."""
-        sealed = self.read_seal()
-        found = self._digests()
-        return sorted(name for name in sealed if found.get(name) != sealed[name])
+    def check_seal(self, names: Collection[str] | None = None) -> list[str]:
+        """Return the names of files that are not as they were when the directory was sealed.
 
-    def _digests(self) -> dict[str, str]:
-        files = sorted(p for p in self.path.rglob("*") if p.is_file() and p.suffix != ".tmp")
+        Args:
+            names: those that are looked at, all by default.
+        """
+        sealed = self.read_seal()
+        asked = sealed if names is None else sealed.keys() & names
+        found = self._digests(asked)
+        return sorted(name for name in asked if found.get(name) != sealed[name])
+
+    def _digests(self, names: Collection[str] | None = None) -> dict[str, str]:
+        """Return the digests of the files of these names that there are; by default of all."""
+        if names is None:
+            names = [
+                p.relative_to(self.path).as_posix()
+                for p in self.path.rglob("*")
+                if p.suffix != ".tmp" and p.name not in (SEAL, LOCK)
+            ]
         return {
-            p.relative_to(self.path).as_posix(): hashlib.blake2b(
-                read_bytes(p), digest_size=16
-            ).hexdigest()
-            for p in files
-            if p.name not in (SEAL, LOCK)
+            name: hashlib.blake2b(read_bytes(self.path / name), digest_size=16).hexdigest()
+            for name in sorted(names)
+            if (self.path / name).is_file()
         }
 
 

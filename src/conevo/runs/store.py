@@ -160,6 +160,17 @@ class Store(Directory):
         """Replace the provenance."""
         replace_file(self.path / PROVENANCE, as_json(provenance))
 
+    def refuse_changed(self) -> None:
+        """Refuse a finished run whose records are not those that it was sealed with.
+
+        Raises:
+            DamagedFile: its settings, generations or testing phase were changed.
+        """
+        if changed := self.check_seal((CONFIG, PROVENANCE, GENERATIONS, TEST)):
+            raise DamagedFile(
+                f"{self.path} was changed since it was finished: {', '.join(changed)}"
+            )
+
     # --- another length ---------------------------------------------------------------------------
 
     def extend(self, config: RunConfig, former: Record, at: str) -> None:
