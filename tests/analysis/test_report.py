@@ -17,6 +17,7 @@ from analysis.finished_runs import Cell, cells, mean_of, write_campaign
 from conevo.analysis.frames import Tables
 from conevo.analysis.report import sections_of, write_report
 from conevo.analysis.sections.champions import champions
+from conevo.analysis.sections.interventions import lesions
 from conevo.analysis.sections.overview import read_campaign
 from conevo.analysis.sections.scope import scopes
 from conevo.errors import UsageError
@@ -182,6 +183,19 @@ def test_losses_are_those_of_the_same_run(report, campaign) -> None:
     assert float(hom["lost"]) == pytest.approx(np.mean([expected[r] for r in mine]), rel=1e-9)
     left = 100 * sum(value[r] for r in mine) / sum(whole[r] for r in mine)
     assert float(hom["percent"]) == pytest.approx(left, rel=1e-9)
+
+
+def test_intervals_of_losses_end_where_losses_do(tmp_path) -> None:
+    with Tables(write_campaign(tmp_path / "c", cells(["rover/complex-1"]), 3) / "tables") as tables:
+        tables.query(
+            "UPDATE scores SET value = CASE WHEN team = 'whole' THEN 1 WHEN contains(run, '-s1')"
+            " THEN 0.5 ELSE 0 END WHERE study = 'lesion'"
+        )
+        figure, table = lesions(scopes(tables)[0]).exhibits
+    ends = [row["interval"] for row in table.rows if row["n"] > 1 and row["interval"][0]]
+    assert max(high for _, high in ends) == 100.0
+    assert min(low for low, _ in ends) >= -100.0
+    assert all("which ends at ±100 %, where losses do" in one.note for one in (figure, table))
 
 
 def test_every_exhibit_has_its_numbers_and_every_table_its_latex(report) -> None:
