@@ -120,6 +120,8 @@ them; of a measure that is not listed larger is better.
 """
 
 
+QUERY = '"SELECT method, count(*) FROM runs GROUP BY ALL"'
+QUERIES = ("SELECT", "EXPLAIN", "MULTI")  # as DuckDB names them: VALUES is a SELECT, PIVOT MULTI
 NEAR = 0.2  # budgets that differ by no more are one
 
 
@@ -191,19 +193,21 @@ class Tables:
         self._connection.execute("SET lock_configuration = true")
 
     def query(self, sql: str) -> tuple[list[str], list[tuple[Any, ...]]]:
-        """Return the column names and the rows that one SQL statement gives.
+        """Return the column names and the rows that one SQL query gives.
 
         Raises:
-            UsageError: no statement, or DuckDB's reason for refusing it.
+            UsageError: no query, or DuckDB's reason for refusing it.
         """
         import duckdb
 
         try:
+            statements = self._connection.extract_statements(sql)
+            if not statements:
+                raise UsageError(f"no SQL statement, as in {QUERY}")
+            for one in statements:
+                if one.type.name not in QUERIES:
+                    raise UsageError(f"{one.type.name} is not a query; ask as in {QUERY}")
             result = self._connection.execute(sql)
-            if result is None or not result.description:
-                raise UsageError(
-                    'no SQL statement, as in "SELECT method, count(*) FROM runs GROUP BY ALL"'
-                )
             return [str(column[0]) for column in result.description], result.fetchall()
         except duckdb.Error as error:
             raise _refused(error) from error
