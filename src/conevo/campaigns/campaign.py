@@ -41,7 +41,7 @@ from conevo.campaigns.work import planned_runs
 from conevo.errors import UsageError
 from conevo.reading import read_json
 from conevo.runs.directory import Directory, appearing
-from conevo.runs.durable import replace_file
+from conevo.runs.durable import is_there, replace_file
 from conevo.runs.time_limit import TimeLimit
 from conevo.worlds.registry import resolve as resolve_world
 
@@ -67,7 +67,7 @@ def check(plan: Plan, path: Path) -> list[PlannedRun]:
         UsageError: a run that cannot be, or ``path`` holds a campaign that this does not extend.
     """
     runs = plan.write_out()
-    if Places(path).plan.is_file():
+    if is_there(Places(path).plan):
         check_plan(Campaign(path), {run.label: run for run in runs})
     return runs
 
@@ -91,7 +91,7 @@ def create(plan: Plan, path: Path, accept_other_code: bool = False) -> Campaign:
     plan = plan.mapped(lambda value: located(value, Path.cwd()))
     runs = check(plan, path)
     _build_worlds(runs)
-    if not Places(path).plan.is_file():
+    if not is_there(Places(path).plan):
         with appearing(path) as draft:
             places, texts = Places(draft), texts_of(plan, runs, draft)
             replace_file(places.plan, texts["plan"].encode())

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 
 import click
 
-from conevo.errors import EnvironmentFailure, UsageError, unknown_name
+from conevo.errors import EnvironmentFailure, UsageError, unknown_name, without_team
 from conevo.runs.directory import CAMPAIGN, kind_of
+from conevo.runs.durable import is_there
 from conevo.runs.run import RUNS, Run
 from conevo.runs.shaping import Shaping
 
@@ -60,7 +61,7 @@ def find_run(text: str) -> Run:
         return found
     stages = [stage for stage in found.stages if stage.champion is not None]
     if not stages:
-        raise UsageError(f"{found.path} has no finished generation yet")
+        raise without_team(found.path, found.generations())
     return stages[-1]
 
 
@@ -95,18 +96,22 @@ def find_shaping(text: str) -> Shaping:
 
 def directories(folder: Path) -> list[Path]:
     """Return the directories in ``folder`` that hold a run or a shaping, by name."""
+    return _holding(folder, "run", "shaping")
+
+
+def campaigns_in(folder: Path) -> list[Path]:
+    """Return the directories in ``folder`` that hold a campaign, by name."""
+    return _holding(folder, "campaign")
+
+
+def _holding(folder: Path, *kinds: str) -> list[Path]:
     if not folder.is_dir():
         return []
     return sorted(
         path
         for path in folder.iterdir()
-        if not path.name.startswith(".") and kind_of(path) in ("run", "shaping")
+        if not path.name.startswith(".") and kind_of(path) in kinds
     )
-
-
-def campaigns_in(folder: Path) -> list[Path]:
-    """Return the directories in ``folder`` that hold a campaign, by name."""
-    return sorted(file.parent for file in folder.glob(f"[!.]*/{CAMPAIGN}"))
 
 
 def campaign_at(text: str) -> Campaign | None:
@@ -114,7 +119,7 @@ def campaign_at(text: str) -> Campaign | None:
     from conevo.campaigns.campaign import CAMPAIGNS, Campaign
 
     for path in (Path(text), CAMPAIGNS / text):
-        if (path / CAMPAIGN).is_file():
+        if is_there(path / CAMPAIGN):
             return Campaign(path)
     return None
 

@@ -23,7 +23,7 @@ from conevo.errors import EnvironmentFailure, UsageError
 from conevo.reading import read_bytes, read_json, read_text
 from conevo.runs import locks
 from conevo.runs.drafts import draft_of, remove_abandoned, remove_torn
-from conevo.runs.durable import replace_file, sync_directory, writing
+from conevo.runs.durable import is_there, replace_file, sync_directory, writing
 
 __all__ = [
     "CAMPAIGN",
@@ -42,8 +42,11 @@ KINDS = {CONFIG: "run", SHAPING: "shaping", CAMPAIGN: "campaign"}
 
 
 def kind_of(path: Path) -> str:
-    """Return what a directory holds: "run", "shaping", "campaign" or nothing ("")."""
-    return next((kind for name, kind in KINDS.items() if (path / name).is_file()), "")
+    """Return what a directory holds: "run", "shaping", "campaign" or nothing ("").
+
+    The name of its file decides: whether it can be read is said where it is read.
+    """
+    return next((kind for name, kind in KINDS.items() if is_there(path / name)), "")
 
 
 @contextmanager
@@ -78,7 +81,7 @@ def _appear(draft: Path, path: Path) -> None:
 
 def refuse_existing(path: Path) -> None:
     """Say what is at ``path`` and what can be done with it, if anything is."""
-    if not (path.is_symlink() or path.exists()) or (path.is_dir() and not any(path.iterdir())):
+    if not is_there(path) or (path.is_dir() and not any(path.iterdir())):
         return
     kind = kind_of(path)
     if not kind:
@@ -110,7 +113,7 @@ class Directory:
 
     def __init__(self, path: Path, kind: str) -> None:
         name = next(name for name in KINDS if KINDS[name] == kind)
-        if not (path / name).is_file():
+        if not is_there(path / name):
             raise UsageError(f"{path} is not a {kind} (it has no {name})")
         self.path = path
 

@@ -8,7 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from conevo.errors import EnvironmentFailure, UsageError
+from conevo.errors import EnvironmentFailure, UsageError, without_team
 from conevo.runs import provenance
 from conevo.runs.code import last_code, refuse_other_code
 from conevo.runs.directory import refuse_existing
@@ -387,11 +387,6 @@ class Run:
             self.outline, self.config = self._store.read_outline(), self._store.read_config()
             yield
 
-    def without_team(self) -> UsageError:
-        """Return the error for a run that has no champion."""
-        lost = "lost its champion.npz" if self.generations() else "no finished generation yet"
-        return UsageError(f"{self.path} has {lost}, so there is no team")
-
     def test(
         self,
         scenarios: int | None = None,
@@ -417,7 +412,7 @@ class Run:
         refuse_numbers(scenarios, seed)
         champion = team or self.champion
         if champion is None:
-            raise self.without_team()
+            raise without_team(self.path, self.generations())
         return self._test(self._equip(threads), champion, scenarios, seed)
 
     def test_under(

@@ -24,11 +24,11 @@ from typing import TYPE_CHECKING, Any
 
 import tomli_w
 
-from conevo.errors import UsageError
+from conevo.errors import UsageError, without_team
 from conevo.reading import check, read_bytes, read_toml
 from conevo.runs.code import last_code, refuse_other_code, sessions_of
 from conevo.runs.directory import CONFIG, SHAPING, Directory, appearing, refuse_existing
-from conevo.runs.durable import replace_file
+from conevo.runs.durable import is_there, replace_file
 from conevo.runs.evolved_prey import PREY, PREY_TASKS, save_prey
 from conevo.runs.outline import Outline, identify, outline_of
 from conevo.runs.run import RUNS, Record, Run, Watch, start
@@ -173,7 +173,7 @@ class Shaping:
         """
         begun: list[Run] = []
         for number, run_id in enumerate(self.run_ids, start=1):
-            if not (self._stage_path(number) / CONFIG).is_file():
+            if not is_there(self._stage_path(number) / CONFIG):
                 break
             run = Run(self._stage_path(number))
             if run.provenance["run_id"] != run_id:
@@ -232,7 +232,7 @@ class Shaping:
         while of and (champion := stages[of - 1].champion) is None:
             of -= 1
         if champion is None:
-            raise UsageError(f"{self.path} has no finished generation yet, so no team to test")
+            raise without_team(self.path, self.generations())
         return [
             self.place(stage)
             | {"team_of": of}
