@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import json
 import re
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -194,13 +197,106 @@ def test_an_index_outside_an_array_is_found_with_its_line(
     assert out.endswith("1 problem\n")
 
 
+CALLED = """
+@wp.func
+def beyond(team: Team, i: int) -> int:
+    if i > 5:
+        return i
+    return i + 70
+
+
+@wp.func
+def both(team: Team, i: int):
+    return beyond(team, i), i
+
+
+@wp.func
+def reset("""
+MISPLACED = {
+    "after a call": (
+        "team.x[i] = team.y[\n        beyond(team, i)\n    ]",
+        "in `team.x[i] = team.y[ beyond(team, i) ]`",
+    ),
+    "after two": ("u, v = both(team, i)\n    team.x[v] = team.y[u]", "in `team.x[v] = team.y[u]`"),
+    "loop": (
+        "k = int(0)\n    while team.x[k] < 7.0:\n        k += 1\n        if k < 2:\n"
+        "            continue",
+        "in `while team.x[k] < 7.0:`",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", MISPLACED)
+def test_the_line_is_the_one_that_reads_not_the_one_that_ran_before(
+    name: str, tmp_path: Path
+) -> None:
+    lines, words = MISPLACED[name]
+    a = "    a = team.chosen[i]\n"
+    file = written(
+        tmp_path / "bad.py", ("\n@wp.func\ndef reset(", CALLED), (a, f"{a}    {lines}\n")
+    )
+    at = 1 + file.read_text().splitlines().index(
+        f"    {lines}".splitlines()[name != "after a call"]
+    )
+    found = [one.text for one in checking.check(str(file)) if one.status == "problem"]
+    assert found == [f"{file}:{at}: {words} an index lies outside its array"]
+
+
 def test_a_check_that_does_not_go_on_is_ended(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(checking, "MOST_SECONDS", 0.1)
-    code, out = run(capsys, str(written(tmp_path / "light.py")), "--json")
+    monkeypatch.setattr(checking, "STEP_SECONDS", 2)
+    monkeypatch.setattr(checking, "AGAIN_SECONDS", 2)
+    endless = "k = int(0)\n    while True:\n        k = 1 - k\n    a = team.chosen[i]"
+    file = written(tmp_path / "light.py", ("a = team.chosen[i]", endless))
+    code, out = run(capsys, str(file), "--json")
     assert code == 2
-    assert json.loads(out)[-1]["text"] == "the check did not end: a loop may run forever"
+    assert re.fullmatch(
+        rf"{file}:11[7-9]: in `.*` the check did not end: a loop may run forever",
+        json.loads(out)[-1]["text"],
+    )
+
+
+def test_only_what_is_running_must_go_on_soon() -> None:
+    """Kernels that are compiled after a finding take the time they take."""
+    code = (
+        "import time; print('[\"ok\"]', flush=True); time.sleep(1);"
+        "print('[\"running\"]', flush=True); time.sleep(60)"
+    )
+    child = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE)
+    assert child.stdout is not None
+    began = time.monotonic()
+    with open(child.stdout.fileno(), closefd=False) as lines:
+        assert [*checking._heard(child, lines, 0.5)] == [["ok"], ["running"]]
+    assert 1.4 < time.monotonic() - began < 30
+    child.stdout.close()
+
+
+@pytest.mark.parametrize(("line", "words"), [
+    ("import os; os._exit(7)", "the process that checked it ended with exit status 7"),
+    ("import os; os._exit(0)", "the process that checked it ended with exit status 0"),
+    ("raise SystemExit(3)", "bad.py:172: SystemExit: 3"),
+])  # fmt: skip
+def test_a_world_that_ends_the_process_is_not_sound(
+    line: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shape = "        shape = (self"
+    file = written(tmp_path / "bad.py", (shape, f"        {line}\n{shape}"))
+    code, out = run(capsys, str(file))
+    assert (code, out.splitlines()[-1]) == (2, "1 problem")
+    assert words in out.splitlines()[-2]
+
+
+def test_a_machine_that_fails_says_nothing_of_the_world(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("WARP_CACHE_PATH", "/proc/none")
+    with pytest.raises(SystemExit) as caught:
+        main(["check", "rover/complex-1"])
+    out, err = capsys.readouterr()
+    assert caught.value.code == 3
+    assert "problem" not in out
+    assert re.fullmatch(r"conevo: error: compiled kernels cannot be kept in /proc/none/.*\n", err)
 
 
 def test_a_sound_world_has_no_problem_and_a_wrong_name_is_one_line(

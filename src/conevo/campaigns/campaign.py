@@ -24,6 +24,7 @@ import dataclasses
 import time
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from pathlib import Path
 
 from conevo.campaigns.admission import admit_code
@@ -108,10 +109,15 @@ def create(plan: Plan, path: Path, accept_other_code: bool = False) -> Campaign:
 
 
 def _build_worlds(runs: Iterable[PlannedRun]) -> None:
-    """Build the kernels of worlds in files of their own, whose authors may have made mistakes."""
-    for address in sorted({run.world for run in runs if ".py:" in run.world}):
-        from conevo.worlds.rollout import Rollout
+    """Build the kernels of all worlds, once for all runs, and before any of them begins.
 
+    Raises:
+        UsageError: a world in a file of its own, whose author made a mistake.
+        EnvironmentFailure: there is no place for compiled kernels.
+    """
+    from conevo.worlds.rollout import Rollout
+
+    for address in sorted({run.world for run in runs}):
         entry, environment = resolve_world(address)
         Rollout(entry.build(environment, entry.params_class())).build()
 
@@ -259,12 +265,16 @@ class Campaign:
 
         Raises:
             UsageError: a coordinator is at work already, or other code has begun the campaign.
+            EnvironmentFailure: there is no place for compiled kernels, or for the campaign's files.
             Stopped: by ``stop``, or the time is over; the campaign can be carried on.
         """
         limit = time_limit if isinstance(time_limit, TimeLimit) else TimeLimit(time_limit)
         with self.locked():
             self.settle()
             self.admit_code()
+            left = [run for label, run in self.planned.items() if not self.is_finished(label)]
+            with suppress(UsageError):  # of a world: its runs record that
+                _build_worlds(left)
             self.places.stop.unlink(missing_ok=True)
             self._reconcile()
             try:

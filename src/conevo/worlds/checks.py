@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import TypeAdapter, ValidationError
 
-from conevo.errors import ConevoError
+from conevo.errors import ConevoError, EnvironmentFailure
 from conevo.rng import fold, stream
 from conevo.worlds.contract import faults, scenario_faults
 from conevo.worlds.outside import line_of
@@ -34,9 +34,12 @@ KEYS = [fold(1, "check", k) for k in range(3)]
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that was looked at: "ok", a "note" to think about, or a "problem"."""
+    """One thing that was looked at: "ok", a "note" to think about, or a "problem".
 
-    status: Literal["ok", "note", "problem"]
+    One that is "running" says nothing of the world: what begins now takes seconds, in a good one.
+    """
+
+    status: Literal["ok", "note", "problem", "running"]
     topic: str
     text: str
 
@@ -46,13 +49,18 @@ def findings(path: str) -> Iterator[Finding]:
 
     Args:
         path: "FILE.py:ENVIRONMENT" or "rover/complex-1".
+
+    Raises:
+        EnvironmentFailure: the machine failed, and nothing is known of the world.
     """
     try:
         entry, environment = resolve(path)
         yield from _all(entry, environment)
+    except EnvironmentFailure:
+        raise
     except ConevoError as error:
         yield Finding("problem", "world", str(error))
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         line = line_of(error)
         if not line:
             raise
@@ -115,6 +123,7 @@ def _of_parameters(params_class: Any) -> Iterator[str]:
 def _drawn(entry: WorldEntry, environment: str) -> Iterator[Finding]:
     """Check how scenarios are drawn."""
     a_world = entry.build(environment, entry.params_class())
+    yield Finding("running", "scenarios", "")
     fine = "the same for the same key, different for different keys"
     yield from _topic("scenarios", _of_scenarios(a_world), fine)
 
@@ -161,7 +170,8 @@ def _stepped(entry: WorldEntry, environment: str) -> Iterator[Finding]:
     a_world = _shorter(entry, environment)
     trial = Trial(a_world, *mixed_teams(a_world), a_world.scenarios(KEYS[:2]))
     about = f"{trial.n_worlds} epochs of {a_world.params.iterations} iterations"
-    trial.run()
+    for _ in trial.run():
+        yield Finding("running", "memory", "")
     yield Finding("ok", "memory", f"{about}: all array indices are in bounds")
     for topic, problems, fine in trial.seen():
         yield from _topic(topic, iter(problems), fine)

@@ -14,6 +14,7 @@ import warp as wp
 
 from conevo.errors import EnvironmentFailure
 from conevo.kernels import engine
+from conevo.kernels.devices import refuse_unknown_device
 from conevo.kernels.engine import barrier
 from conevo.kernels.network import WIDE, Shape, load, out_vector, think, wide_vector
 from conevo.worlds.contract import PHASES, refuse_faults, sizes_of
@@ -152,7 +153,13 @@ def _settling_kernel(
 
 
 def check_device(device: str) -> None:
-    """Raise EnvironmentFailure for a device that this machine does not have."""
+    """Refuse a device that this machine does not have.
+
+    Raises:
+        UsageError: it is not the name of a device.
+        EnvironmentFailure: there is none of this name here.
+    """
+    refuse_unknown_device(device)
     engine.start()
     allowed = ["cpu", *(d.alias for d in wp.get_cuda_devices())]
     if device not in (*allowed, *(["cuda"] if len(allowed) > 1 else [])):
@@ -178,7 +185,7 @@ class Rollout:
         lanes: lanes of a CPU block (for tests of the CUDA form; needs Warp's CPU blocks).
 
     Raises:
-        UsageError: the world lacks what the engine needs of it.
+        UsageError: the world lacks what the engine needs of it, or no device is named so.
         EnvironmentFailure: the device does not exist.
     """
 

@@ -60,8 +60,8 @@ class Trial:
         self._switched = np.zeros((self.n_worlds, world.n_robots), int)
         self._action = np.full((self.n_worlds, world.n_robots), -1, np.int32)
 
-    def run(self) -> None:
-        """Run the epochs, which ends the process where an array has no such index."""
+    def run(self) -> Iterator[None]:
+        """Run the epochs, which ends the process where an array has no such index; yields often."""
         plain, iterations = self.plain, self.world.params.iterations
         robots = stream(1, "check", "order")
         others = {"reverse": Stepper(*self._task), "random": Stepper(*self._task)}
@@ -74,6 +74,7 @@ class Trial:
             if step == "act" and t in (0, 1, iterations // 2):
                 self._look_at_sensors(t)
             before = {name: values.copy() for name, values in plain.arrays().items()}
+            yield
             plain.step(step, plain.natural, t)
             for kind, stepper in list(others.items()):
                 order = plain.natural
@@ -81,6 +82,7 @@ class Trial:
                     order = order[:, ::-1]
                 elif kind == "random":
                     order = robots.permuted(order, axis=1)
+                yield
                 stepper.step(step, order, t)
                 if found := _differences(plain.arrays(), stepper.arrays()):
                     del others[kind]
