@@ -80,7 +80,7 @@ def run_text(run: Run, n_rows: int) -> str:
         parts += [*exchange_text(records), *measures_text(about)]
         parts += ["", generations_table(spaced(records, n_rows))]
     if run.test_result:
-        parts += ["", test_text(run.test_result)]
+        parts += ["", *_former_test(run), test_text(run.test_result)]
     if origin := run.provenance.get("origin"):
         what = "Bred from the champion" if origin.get("of") else "Started from the populations"
         parts += ["", f"{what} of {origin['path']}, generation {origin['generation']}"]
@@ -273,6 +273,16 @@ def _former_ends(run: Run) -> list[str]:
         + f", run {former['run_id']}"
         for former in run.provenance.get("extended", [])
     ]
+
+
+def _former_test(run: Run) -> list[str]:
+    """Return which length the testing phase is of, unless it is the one that the run has now."""
+    about = run.provenance
+    ends = [former for former in about.get("extended", []) if former["finished"]]
+    if not ends or "finished" in about:
+        return []
+    length = generations(ends[-1]["generations"])
+    return [f"Of the former length, {length}; the new one is tested when it is finished:"]
 
 
 def _state(run: Run) -> str:

@@ -17,7 +17,7 @@ from conevo.campaigns.ledger import Entry
 from conevo.errors import ConevoError, UsageError
 from conevo.replay.live.files import Stamp, is_locked, readable, stamp
 from conevo.replay.live.panels import Panel, panels_of
-from conevo.replay.live.runs import Standing, Subject
+from conevo.replay.live.runs import Standing, Subject, span
 from conevo.runs.directory import LOCK, kind_of
 
 __all__ = ["Experiment", "Group", "Names", "Runs", "children"]
@@ -200,7 +200,7 @@ class Experiment(Group):
             path = folder / Path(label).name
             about = {
                 name: getattr(run, name) for name in ("method", "preset", "seed", "variant")
-            } | {"task": shown_as(run.world)}
+            } | {"task": span([shown_as(task) for task in run.tasks])}
             name = f"{self._prefix}/{label}" if self._prefix else label
             self._by_label[label] = known.get(label) or Subject(
                 self._names.of(path, name), path, about
