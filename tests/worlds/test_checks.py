@@ -69,7 +69,7 @@ DECLARED = {
                 "scenarios", "must have a row for each of 3 scenarios, got shape [1, 4, 2]"),
     "infinite": ("np.float32) for key", "np.float32) * np.float32('inf') for key", "scenarios",
                  "places has values that are not finite"),
-    "missing": ("places=places, ", "", "world", "bad.py:174: TypeError: LightSc"),
+    "missing": ("places=places, ", "", "world", "bad.py:174: in scenarios: TypeError: LightSc"),
     "name": ("1.0 - wp.length", "one - wp.length", "world",
              "bad.py:127: Referencing undefined symbol: one (in resolve: team.fitness[i] = one -"),
     "class": ('"LightWorld"', '"LightWord"', "world",
@@ -275,7 +275,7 @@ def test_only_what_is_running_must_go_on_soon() -> None:
 @pytest.mark.parametrize(("line", "words"), [
     ("import os; os._exit(7)", "the process that checked it ended with exit status 7"),
     ("import os; os._exit(0)", "the process that checked it ended with exit status 0"),
-    ("raise SystemExit(3)", "bad.py:172: SystemExit: 3"),
+    ("raise SystemExit(3)", "bad.py:172: in scenarios: SystemExit: 3"),
 ])  # fmt: skip
 def test_a_world_that_ends_the_process_is_not_sound(
     line: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]

@@ -32,6 +32,7 @@ from conevo.runs.durable import replace_file
 from conevo.runs.run import Run, start
 from conevo.runs.shaping import Shaping, start_shaping
 from conevo.runs.time_limit import TimeLimit
+from conevo.worlds.outside import line_of
 
 __all__ = ["carry_out", "core_seconds", "main", "planned_runs"]
 
@@ -124,7 +125,11 @@ def _describe(error: Exception) -> dict[str, str]:
         origin = "machine" if isinstance(error, EnvironmentFailure) else "request"
         return {"origin": origin, "message": str(error), "traceback": ""}
     trace = traceback.format_exc()
-    return {"origin": "program", "message": repr(error), "traceback": trace}
+    if line := line_of(error):
+        return {"origin": "request", "message": line, "traceback": trace}
+    last = traceback.extract_tb(error.__traceback__)[-1]
+    message = f"{error!r} in {last.name} ({last.filename}:{last.lineno})"
+    return {"origin": "program", "message": message, "traceback": trace}
 
 
 def _evolve(

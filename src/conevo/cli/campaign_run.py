@@ -16,7 +16,7 @@ from conevo.campaigns.devices import parse_devices
 from conevo.campaigns.estimate import remaining_seconds
 from conevo.campaigns.executors import Ending, Executor, make_executor
 from conevo.campaigns.ledger import Entry
-from conevo.cli.campaign_text import counts, grid
+from conevo.cli.campaign_text import counts, grid, print_failed
 from conevo.cli.carry import drop_output, style_of
 from conevo.cli.text import duration
 from conevo.errors import EnvironmentFailure, UsageError
@@ -176,9 +176,9 @@ class View:
         """Say what there is now and what can be done with it."""
         path = self.campaign.path
         click.echo(f"{counts(entries)}")
-        for entry in [entry for entry in entries.values() if entry.state == "failed"]:
-            click.echo(f"  failed {entry.label}: {entry.reason}")
-        if any(entry.state == "failed" for entry in entries.values()):
+        failed = [entry for entry in entries.values() if entry.state == "failed"]
+        print_failed(self.campaign, failed)
+        if failed:
             click.echo(f"retry them:       conevo campaign retry {path}")
         click.echo(f"write a report:   conevo report {path}")
         click.echo(

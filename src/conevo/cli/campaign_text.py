@@ -6,6 +6,7 @@ import json
 import time
 from collections import Counter
 from collections.abc import Iterable, Mapping
+from pathlib import Path
 from typing import Any
 
 import click
@@ -28,6 +29,7 @@ __all__ = [
     "experiments",
     "grid",
     "print_lists",
+    "print_failed",
     "print_plan",
     "print_status",
 ]
@@ -112,9 +114,22 @@ def print_status(campaign: Campaign, with_runs: bool, as_json: bool) -> bool:
     else:
         head, cells = grid(campaign.planned.values(), entries)
         click.echo(table(head, cells))
+    print_failed(campaign, failed)
+    return bool(failed)
+
+
+def print_failed(campaign: Campaign, failed: Iterable[Entry]) -> None:
+    """Print why runs failed, and what a correction of their world's file takes."""
+    files = set()
     for entry in failed:
         click.echo(f"failed {entry.label}: {entry.reason}")
-    return bool(failed)
+        file, _, environment = campaign.planned[entry.label].world.rpartition(":")
+        files |= {Path(file).name} if environment else set()
+    for file in sorted(files):
+        click.echo(
+            f"the campaign keeps its copy of {file}: once yours is corrected, start another "
+            f"campaign with --out DIR"
+        )
 
 
 def _whose(campaign: Campaign, entries: Mapping[str, Entry]) -> str:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from conevo.errors import EnvironmentFailure, UsageError
+from conevo.errors import ConevoError, EnvironmentFailure, UsageError
 
 if TYPE_CHECKING:
     from conevo.runs.run import Run
@@ -98,6 +98,7 @@ def carry_on(
     from conevo.cli.stages import print_shaping_end
     from conevo.cli.summary import print_end
     from conevo.runs.run import Run
+    from conevo.worlds.outside import line_of
 
     def remark(text: str) -> None:
         click.echo(f"conevo: note: {text}", err=True)
@@ -139,6 +140,13 @@ def carry_on(
         sys.exit(130)
     except EnvironmentFailure as error:
         raise EnvironmentFailure(f"{error}; once fixed: {advice}") from error
+    except Exception as error:
+        if isinstance(error, ConevoError) or not (line := line_of(error)):
+            raise
+        raise UsageError(
+            f"{line}; {found.path} keeps its copy of the world's file as it is: correct yours, and "
+            f"start another run"
+        ) from error
     if found.status != "finished":
         click.echo(f"time limit reached after {_done(found)}; continue with: {advice}", err=True)
     if isinstance(found, Run):

@@ -12,12 +12,12 @@ import numpy as np
 import numpy.typing as npt
 import warp as wp
 
-from conevo.errors import EnvironmentFailure
+from conevo.errors import EnvironmentFailure, UsageError
 from conevo.kernels import engine
 from conevo.kernels.devices import refuse_unknown_device
 from conevo.kernels.engine import barrier
 from conevo.kernels.network import WIDE, Shape, load, out_vector, think, wide_vector
-from conevo.worlds.contract import PHASES, refuse_faults, sizes_of
+from conevo.worlds.contract import PHASES, refuse_faults, scenario_faults, sizes_of
 from conevo.worlds.measures import measures_of
 from conevo.worlds.protocol import Outcome, Scenarios, Simulation, World
 
@@ -252,7 +252,9 @@ class Rollout:
 
         Raises:
             ValueError: shapes or rows that do not fit this world.
+            UsageError: scenarios whose arrays are not those of the world's scene.
         """
+        self._refuse_faulty(scenarios)
         genes, teams, heuristic = self._checked(genes, teams, heuristic)
         n_teams, e, r = len(teams), len(scenarios), self.world.n_robots
         n_castes = len(self.world.castes)
@@ -299,6 +301,7 @@ class Rollout:
             left; ``sums`` [T, R, outputs], weighted sums of the output units; ``performance``
             [T, measures], each as if the epoch ended there.
         """
+        self._refuse_faulty(scenarios)
         if len(scenarios) != 1:
             raise ValueError(f"record takes one scenario, got {len(scenarios)}")
         genes, teams, modes = self._checked(
@@ -322,6 +325,12 @@ class Rollout:
         return {name: np.stack(values) for name, values in steps.items()} | {
             name: values[: sizes[name]].copy() for name, values in final.items()
         }
+
+    def _refuse_faulty(self, scenarios: Scenarios) -> None:
+        """Raise UsageError for scenarios that are not those of the world's scene."""
+        n = len(getattr(scenarios, "seed", ()))
+        for fault in scenario_faults(self._simulation.scene, scenarios, n):
+            raise UsageError(f"world {self.world.name}: scenarios: {fault}")
 
     def _checked(
         self,
