@@ -24,7 +24,7 @@ from conevo.cli.text import (
     table,
 )
 from conevo.evolution.methods.registry import METHODS
-from conevo.runs.code import changes_text, sessions_of
+from conevo.runs.code import changes_text, last_code, sessions_of
 from conevo.runs.outline import Outline
 from conevo.runs.run import Run
 from conevo.runs.shrinkage import shrinkage
@@ -81,9 +81,12 @@ def run_text(run: Run, n_rows: int) -> str:
         parts += ["", generations_table(spaced(records, n_rows))]
     if run.test_result:
         parts += ["", *_former_test(run), test_text(run.test_result)]
-    if origin := run.provenance.get("origin"):
+    if origin := about.get("origin"):
         what = "Bred from the champion" if origin.get("of") else "Started from the populations"
-        parts += ["", f"{what} of {origin['path']}, generation {origin['generation']}"]
+        here = last_code(about)
+        made = origin.get("code", here)
+        other = f" (made by {made}, this run by {here})" if made != here else ""
+        parts += ["", f"{what} of {origin['path']}, generation {origin['generation']}{other}"]
     if lines := _former_ends(run):
         parts += ["", *lines]
     if run.status == "interrupted":

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from conevo.errors import UsageError
 from conevo.runs.champions import Team
+from conevo.runs.code import last_code
 from conevo.runs.store import Store
 from conevo.worlds.protocol import World
 
@@ -47,7 +48,8 @@ def ancestor_of(
             f"{path} was changed since it was finished ({', '.join(changed)}): "
             f"no run can begin with its populations"
         )
-    about = {"path": str(path), "run_id": store.read_provenance()["run_id"]}
+    made = store.read_provenance()
+    about = {"path": str(path), "run_id": made["run_id"], "code": last_code(made)}
     if of_champion:
         team, digest = store.load_final_champion()
         about |= {"generation": team.generation, "checkpoint": digest, "of": "champion"}

@@ -19,6 +19,7 @@ __all__ = [
     "code_spans",
     "current_code",
     "last_code",
+    "other_code",
     "refuse_other_code",
     "sessions_of",
     "version",
@@ -99,12 +100,19 @@ def sessions_of(provenance: Record, before: int = 0) -> list[Record]:
 
 def refuse_other_code(path: Path, code: str) -> None:
     """Raise UsageError unless ``code``, of the run or shaping at ``path``, is this conevo's."""
-    if code != current_code():
+    if problem := other_code(path, code):
         raise UsageError(
-            f"{path} was made by conevo {code}, and this is {current_code()}, which may give other "
-            f"results: use that version, or continue with 'conevo resume {path} "
+            f"{problem}: use that version, or continue with 'conevo resume {path} "
             f"--accept-other-code'"
         )
+
+
+def other_code(path: Path, code: str) -> str:
+    """Return that ``code``, of the run at ``path``, is not this conevo's; nothing if it is."""
+    here = current_code()
+    if code == here:
+        return ""
+    return f"{path} was made by conevo {code}, and this is {here}, which may give other results"
 
 
 def code_spans(sessions: Sequence[Record]) -> list[Span]:
