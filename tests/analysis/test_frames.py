@@ -168,7 +168,7 @@ def test_a_query_only_asks_and_says_no_in_one_line(tmp_path, monkeypatch, sql, s
         tables_of(tmp_path, cells(["rover/complex-1"], ["cone"]), seeds=1) as tables,
         pytest.raises(UsageError, match=says) as refused,
     ):
-        tables.query(sql)
+        tables.ask(sql)
     assert "\n" not in str(refused.value)
     assert not (tmp_path / "stolen.csv").exists()
 
@@ -188,7 +188,7 @@ def test_a_query_only_asks_and_says_no_in_one_line(tmp_path, monkeypatch, sql, s
 )
 def test_everything_that_only_asks_is_a_query(tmp_path, sql) -> None:
     with tables_of(tmp_path, cells(["rover/complex-1"], ["cone"]), seeds=1) as tables:
-        columns, rows = tables.query(sql)
+        columns, rows = tables.ask(sql)
     assert {len(row) for row in rows} == {len(columns)}
 
 
@@ -205,6 +205,6 @@ def test_what_is_no_query_reaches_no_file_either(tmp_path, monkeypatch, sql, say
         tables_of(tmp_path, cells(["rover/complex-1"], ["cone"]), seeds=1) as tables,
         pytest.raises(UsageError, match=says) as refused,
     ):
-        tables.arrays(sql)
+        tables.query(sql)
     assert "\n" not in str(refused.value)
     assert not (tmp_path / "stolen.csv").exists()

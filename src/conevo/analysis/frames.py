@@ -192,22 +192,35 @@ class Tables:
         self._connection.execute("SET enable_external_access = false")
         self._connection.execute("SET lock_configuration = true")
 
-    def query(self, sql: str) -> tuple[list[str], list[tuple[Any, ...]]]:
-        """Return the column names and the rows that one SQL query gives.
+    def ask(self, sql: str) -> tuple[list[str], list[tuple[Any, ...]]]:
+        """Return what ``query`` does of a text that must only ask: anybody's.
 
         Raises:
-            UsageError: no query, or DuckDB's reason for refusing it.
+            UsageError: a statement that is not a query, or as ``query``.
         """
         import duckdb
 
         try:
             statements = self._connection.extract_statements(sql)
-            if not statements:
-                raise UsageError(f"no SQL statement, as in {QUERY}")
-            for one in statements:
-                if one.type.name not in QUERIES:
-                    raise UsageError(f"{one.type.name} is not a query; ask as in {QUERY}")
+        except duckdb.Error as error:
+            raise _refused(error) from error
+        for one in statements:
+            if one.type.name not in QUERIES:
+                raise UsageError(f"{one.type.name} is not a query; ask as in {QUERY}")
+        return self.query(sql)
+
+    def query(self, sql: str) -> tuple[list[str], list[tuple[Any, ...]]]:
+        """Return the column names and the rows that one SQL statement gives.
+
+        Raises:
+            UsageError: no statement, or DuckDB's reason for refusing it.
+        """
+        import duckdb
+
+        try:
             result = self._connection.execute(sql)
+            if result is None or not result.description:
+                raise UsageError(f"no SQL statement, as in {QUERY}")
             return [str(column[0]) for column in result.description], result.fetchall()
         except duckdb.Error as error:
             raise _refused(error) from error
