@@ -138,7 +138,7 @@ def test_scenarios_without_a_finite_value_are_counted_in_words(campaign, tmp_pat
 
 def test_what_failed_is_listed_and_escaped(report) -> None:
     text = (report / "index.html").read_text()
-    assert "36 of 37 planned runs are finished, 1 failed, 0 have not ended." in text
+    assert "Runs finished: 36 of 37 planned; failed: 1; not ended: 0." in text
     assert "the disk is &lt;full&gt; &amp; lost" in text
     assert rows_of(report / "numbers/failures.csv")[0]["message"] == "the disk is <full> & lost"
     assert r"the disk is $<$full$>$ \& lost" in (report / "tables/failures.tex").read_text()
@@ -312,13 +312,16 @@ def test_a_world_where_nothing_was_achieved_has_no_losses(tmp_path) -> None:
     of = cells(["rover/complex-1"], ["mesp", "cone"])
     root = write_campaign(tmp_path / "c", of, 2, 3, mean=lambda cell: -1e6)
     text = write_report(root, tmp_path / "out").read_text()
-    assert len(re.findall(r"\d+ teams are left out: neither they nor the unchanged", text)) == 2
+    assert (
+        len(re.findall(r"Teams left out, as neither they nor the unchanged ones scored: \d+", text))
+        == 2
+    )
 
 
 def test_a_campaign_without_a_finished_run_says_so(tmp_path) -> None:
     root = empty(tmp_path)
     text = write_report(root, tmp_path / "out").read_text()
-    assert "0 of 4 planned runs are finished, 0 failed, 4 have not ended." in text
+    assert "Runs finished: 0 of 4 planned; failed: 0; not ended: 4." in text
 
 
 def test_the_best_method_is_found_best(report) -> None:

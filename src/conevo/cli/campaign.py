@@ -11,6 +11,7 @@ import click
 
 from conevo.cli.carry import accept_option, time_limit_option
 from conevo.errors import UsageError
+from conevo.terms import counted
 
 if TYPE_CHECKING:
     from conevo.campaigns.plan import Plan
@@ -194,7 +195,7 @@ def slurm(
         options=options,
         device=device,
     )
-    click.echo(f"{len(left)} runs; submit them with: sbatch {script}")
+    click.echo(f"{counted(len(left), 'run')}; submit with: sbatch {script}")
     if device != "cpu" and not any(option.startswith(("--gres", "--gpus")) for option in options):
         click.echo("conevo: note: the tasks ask SLURM for no GPU; add --gres gpu:1", err=True)
 

@@ -21,6 +21,7 @@ from conevo.cli.carry import drop_output, style_of
 from conevo.cli.text import duration
 from conevo.errors import EnvironmentFailure, UsageError
 from conevo.runs.time_limit import TimeLimit
+from conevo.terms import counted
 
 __all__ = ["Execution", "carry_on", "ready"]
 
@@ -58,7 +59,7 @@ def ready(
     devices = parse_devices(device)
     made = make_executor(executor, cores, address, store, devices)
     if threads > made.cores:
-        raise UsageError(f"--threads {threads}: there are only {made.cores} cores to use")
+        raise UsageError(f"--threads {threads}: only {counted(made.cores, 'core')} to use")
     if executor == "serial":
         threads = made.cores  # of the only run at work
     return Execution(made, threads, devices, style_of(as_json, quiet, False), limit)
@@ -107,7 +108,7 @@ class View:
         if self.execution.style == "plain":
             found = self.campaign
             click.echo(f"{found.plan.title or found.plan.name}\n{found.path}")
-            click.echo(f"{len(found.planned)} runs, {counts(found.standings())}")
+            click.echo(f"{counted(len(found.planned), 'run')}, {counts(found.standings())}")
         if self.execution.style != "live":
             return nullcontext()
         from rich.live import Live

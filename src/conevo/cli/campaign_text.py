@@ -22,6 +22,7 @@ from conevo.campaigns.progress import last_written, progress_of
 from conevo.cli.find import campaigns_in
 from conevo.cli.text import duration, table
 from conevo.errors import ConevoError
+from conevo.terms import counted
 
 __all__ = [
     "campaigns_here",
@@ -159,11 +160,11 @@ def _progress(campaign: Campaign, entry: Entry) -> tuple[str, str]:
         return "", ""
     done = f"{found.generations}"
     if entry.state == "finished":
-        return f"{done} generations", ""
+        return counted(found.generations, "generation"), ""
     if found.budget:
         done = f"{found.evaluations:,} of {found.budget:,} evaluations"
     elif found.of:
-        done = f"{done} of {found.of} generations"
+        done = f"{done} of {counted(found.of, 'generation')}"
     return done, _ago(found.written)
 
 

@@ -7,6 +7,8 @@ from dataclasses import asdict
 
 import click
 
+from conevo.terms import counted
+
 __all__ = ["check"]
 
 
@@ -34,5 +36,5 @@ def check(world: str, as_json: bool) -> int:
     if as_json:
         click.echo(json.dumps([asdict(finding) for finding in found]))
     else:
-        click.echo(f"{problems or 'no'} problem{'s' * (problems != 1)}")
+        click.echo(f"{counted(problems, 'problem') if problems else 'no problems'}")
     return 2 if problems else 0

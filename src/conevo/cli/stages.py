@@ -12,7 +12,7 @@ from conevo.cli.text import castes, count, duration, number, progress, spread, t
 from conevo.runs.code import changes_text
 from conevo.runs.run import Run
 from conevo.runs.shaping import Shaping
-from conevo.terms import S_SCALE
+from conevo.terms import S_SCALE, counted
 
 __all__ = ["print_shaping_end", "shaping_text", "span", "stage_summary", "stages_test_text"]
 
@@ -55,7 +55,8 @@ def shaping_text(shaping: Shaping, n_rows: int = 0) -> str:
     parts = [
         title(shaping.outlines[-1]).replace(shaping.outlines[-1].task, span(shaping)),
         f"{shaping.path}: {state}",
-        f"{len(stages)} of {len(shaping.outlines)} stages begun, {len(records)} generations, "
+        f"{len(stages)} of {counted(len(shaping.outlines), 'stage')} begun, "
+        f"{counted(len(records), 'generation')}, "
         f"{duration(seconds)}",
         *changes_text(shaping.sessions),
     ]
@@ -94,8 +95,9 @@ def stages_test_text(results: list[dict[str, Any]]) -> str:
     last = results[0]
     return (
         f"The fittest team of stage {last['team_of']} (generation {last['generation']}), "
-        f"{last['scenarios']} fresh scenarios of each stage (mean +- standard deviation; "
-        f"S: {S_SCALE})\n" + table(["stage", "task", *measures, "S", "castes"], rows)
+        f"{counted(last['scenarios'], 'fresh scenario')} of each stage "
+        f"(mean +- standard deviation; S: {S_SCALE})\n"
+        + table(["stage", "task", *measures, "S", "castes"], rows)
     )
 
 

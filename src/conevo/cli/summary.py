@@ -28,7 +28,7 @@ from conevo.runs.code import changes_text, last_code, sessions_of
 from conevo.runs.outline import Outline
 from conevo.runs.run import Run
 from conevo.runs.shrinkage import shrinkage
-from conevo.terms import S_SCALE
+from conevo.terms import S_SCALE, counted
 from conevo.worlds.measures import Measure
 
 __all__ = [
@@ -160,7 +160,7 @@ def test_text(result: dict[str, Any]) -> str:
         )
     head = ["", "generation", *measures, "S"]
     lines = [
-        f"Testing phase, {n} fresh scenarios (mean +- standard deviation; S: {S_SCALE})",
+        f"Testing phase, {counted(n, 'fresh scenario')} (mean +- standard deviation; S: {S_SCALE})",
         table(head, rows),
     ]
     lines += [
@@ -197,10 +197,11 @@ def conditions_text(run: Run, both: dict[str, Any]) -> str:
     settings = "".join(f", {key}={value}" for key, value in conditions["settings"].items())
     return "\n".join(
         [
-            f"Champion of {run.path} (generation {both['own']['generation']}), {n} fresh scenarios "
-            f"(mean +- standard deviation)",
+            f"Champion of {run.path} (generation {both['own']['generation']}), "
+            f"{counted(n, 'fresh scenario')} (mean +- standard deviation)",
             f"own conditions: {run.config.task}",
-            f"changed conditions: {conditions['task']}, {conditions['robots']} robots{settings}",
+            f"changed conditions: {conditions['task']}, "
+            f"{counted(conditions['robots'], 'robot')}{settings}",
             table(["conditions", "robots", *measures, "S"], rows),
             f"castes, own: {castes(both['own']['castes'])}",
             f"castes, changed: {castes(both['changed']['castes'])}",
@@ -223,7 +224,8 @@ def shrinkage_text(result: dict[str, Any]) -> str:
     ]
     return (
         f"The fittest team (generation {about['chosen']}) is the best of "
-        f"{len(about['finalists'])} finalists in {about['scenarios']} validation scenarios\n"
+        f"{counted(len(about['finalists']), 'finalist')} in "
+        f"{counted(about['scenarios'], 'validation scenario')}\n"
         + table(["", "selection", "validation", "test", "test / selection"], rows)
     )
 
@@ -301,6 +303,6 @@ def _state(run: Run) -> str:
     done = progress(len(records), planned, evaluations, budget)
     if records:
         seconds = sum(record["seconds"] for record in records)
-        done += "" if "evaluations" in done else f", {count(evaluations)} team evaluations"
+        done += "" if "evaluations" in done else f", {counted(evaluations, 'team evaluation')}"
         done += f", {count(records[-1]['team_steps'])} team-steps, {duration(seconds)}"
     return f"{run.path}: {state}\n{done}"

@@ -157,7 +157,11 @@ def _spans(sessions: Sequence[Record], thing: Callable[[Record], str]) -> list[S
 
 def _text(spans: Sequence[Span]) -> str:
     return ", ".join(
-        f"{one} from {first}" if last is None else f"{one} generations {first}-{last}"
+        f"{one} from {first}"
+        if last is None
+        else f"{one} generation {first}"
+        if first == last
+        else f"{one} generations {first}-{last}"
         for one, first, last in spans
     )
 

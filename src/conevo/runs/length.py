@@ -20,6 +20,7 @@ from conevo.runs.loop import has_reached
 from conevo.runs.outline import LENGTH
 from conevo.runs.provenance import now
 from conevo.runs.store import Store
+from conevo.terms import counted
 from conevo.worlds.measures import measures_of
 
 __all__ = ["give_length", "length_of", "refuse_parts"]
@@ -95,7 +96,7 @@ def _check(path: Path, config: RunConfig, about: Record, records: Sequence[Recor
         raise UsageError(f"{path} has other settings: it cannot be continued as this run")
     if settings.generations < len(records):
         raise UsageError(
-            f"{path} has done {len(records)} generations: "
+            f"{path} has done {counted(len(records), 'generation')}: "
             f"run.generations = {settings.generations} is fewer"
         )
     if not records:
@@ -131,7 +132,8 @@ def _check_later(
     n, ended = len(records), f"(it was stopped by: {about.get('stopped_by')})"
     if settings.generations <= n:
         raise UsageError(
-            f"{path} has finished {n} generations {ended}: continue it with --generations above {n}"
+            f"{path} has finished {counted(n, 'generation')} {ended}: "
+            f"continue it with --generations above {n}"
         )
     budget = settings.budget_evaluations
     if about.get("stopped_by") == "budget" and 0 < budget <= former.budget_evaluations:

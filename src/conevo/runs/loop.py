@@ -14,6 +14,7 @@ from conevo.errors import UsageError
 from conevo.evolution.protocol import Method, Scores, State
 from conevo.runs.config import RunSettings
 from conevo.runs.evaluation import FITTEST, Evaluate, Portrait, describe
+from conevo.terms import counted
 from conevo.worlds.measures import Measure
 
 __all__ = ["check_budget", "evolve_generations", "has_reached", "price"]
@@ -89,7 +90,7 @@ def check_budget(method: Method, state: State, budget: int) -> None:
     if budget and (first := price(method, state)) > budget:
         raise UsageError(
             f"run.budget_evaluations = {budget} does not pay for one generation: "
-            f"the first takes {first} team evaluations"
+            f"the first takes {counted(first, 'team evaluation')}"
         )
 
 

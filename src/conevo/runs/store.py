@@ -48,6 +48,7 @@ from conevo.runs import checkpoint
 from conevo.runs.directory import CONFIG, Directory, appearing, as_json
 from conevo.runs.durable import append_line, replace_file, writing
 from conevo.runs.outline import LENGTH, Outline, digest_of, read_outline
+from conevo.terms import counted
 
 if TYPE_CHECKING:
     from conevo.evolution.protocol import State
@@ -273,7 +274,7 @@ class Store(Directory):
         records = self._parse_log(kept)  # before anything is cut
         if len(records) != count:
             raise UsageError(
-                f"{path} has {len(records)} generations, the checkpoint is at {count}: "
+                f"{path} has {counted(len(records), 'generation')}, the checkpoint is at {count}: "
                 f"the run cannot be resumed"
             )
         if content != kept:

@@ -49,6 +49,7 @@ from annotated_types import Ge, Gt, Le
 
 from conevo.controllers import ControllerSpec
 from conevo.errors import UsageError, unknown_name
+from conevo.terms import counted
 from conevo.worlds import prey_sets
 from conevo.worlds.arena import ArenaParams, ArenaScenarios, draw_scenarios, simulate
 from conevo.worlds.measures import Measure
@@ -130,7 +131,7 @@ class PursuitWorld:
         if self.params.capture_predators > self.n_robots:
             raise UsageError(
                 f"world.capture_predators ({self.params.capture_predators}) must not be above the "
-                f"{self.n_robots} predators of {self.environment}"
+                f"{counted(self.n_robots, 'predator')} of {self.environment}"
             )
 
     @property

@@ -84,7 +84,7 @@ def _section(scope: Scope, study: str, title: str, what: str, note: str) -> Sect
     cells, lost = _teams(scope, study)
     text = []
     if lost:
-        text.append(f"{lost} teams are left out: neither they nor the unchanged ones scored.")
+        text.append(f"Teams left out, as neither they nor the unchanged ones scored: {lost}.")
     if not cells:
         return Section(title, text or ["None of these runs has an intervention study."])
     rows = _rows(scope, cells)
