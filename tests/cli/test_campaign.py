@@ -267,7 +267,7 @@ def test_a_job_array_has_the_runs_that_are_not_finished(conevo, tmp_path):
     tiny_campaign(tmp_path / "campaigns")
     code, out, _ = conevo("campaign", "slurm", "tiny", "--threads", "3", "--at-once", "2")
     assert code == 0
-    assert "4 runs; submit them with: sbatch " in out
+    assert "4 runs; submit with: sbatch " in out
     script = (tmp_path / "campaigns" / "tiny" / "slurm.sh").read_text()
     assert "--cpus-per-task=3" in script
     assert "--array=0-3%2" in script
