@@ -174,6 +174,39 @@ def test_a_mistake_in_what_is_played_is_one_line(name: str, tmp_path: Path) -> N
     assert len(found) <= 2
 
 
+NOTED = {
+    "heuristic": (
+        '("idler",)', '("idler", "runner")', "heuristics",
+        "'runner' does exactly what a network with equal outputs does: does act have a case for "
+        "heuristic 1?",
+    ),
+    "environments": (
+        '("dark-1",)', '("dark-1", "dark-2")', "environments",
+        "dark-2 is the same as dark-1: in its parameters, and in a scenario of one key",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", NOTED)
+def test_what_is_declared_and_never_used_is_noted(name: str, tmp_path: Path) -> None:
+    old, new, topic, words = NOTED[name]
+    file = written(tmp_path / "odd.py", (old, new))
+    found = [one for one in findings(f"{file}:dark-1") if one.status in ("note", "problem")]
+    assert [(one.status, one.topic, one.text) for one in found] == [("note", topic, words)]
+
+
+def test_another_environment_whose_scenarios_are_wrong_is_a_problem(tmp_path: Path) -> None:
+    fails = "        if self.environment == 'dark-2':\n            places = places[:0]\n"
+    made = "        return LightScenarios("
+    file = written(
+        tmp_path / "bad.py", ('("dark-1",)', '("dark-1", "dark-2")'), (made, fails + made)
+    )
+    assert problems(file) == [
+        ("environments", "dark-2: LightScenarios.places must have a row for each of 1 scenarios, "
+                         "got shape [0, 4, 2]"),
+    ]  # fmt: skip
+
+
 def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str]:
     with pytest.raises(SystemExit) as caught:
         main(["check", *arguments])

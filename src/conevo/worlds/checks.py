@@ -125,7 +125,10 @@ def _drawn(entry: WorldEntry, environment: str) -> Iterator[Finding]:
     a_world = entry.build(environment, entry.params_class())
     yield Finding("running", "scenarios", "")
     fine = "the same for the same key, different for different keys"
-    yield from _topic("scenarios", _of_scenarios(a_world), fine)
+    found = list(_topic("scenarios", _of_scenarios(a_world), fine))
+    yield from found
+    if all(finding.status == "ok" for finding in found):
+        yield from _of_environments(entry)
 
 
 def _of_scenarios(a_world: World) -> Iterator[str]:
@@ -149,6 +152,27 @@ def _of_scenarios(a_world: World) -> Iterator[str]:
     if len(rows) < len(KEYS) or (places and len(drawn) == 1):
         names = ", ".join(places or own)
         yield f"{names} are the same for all keys: draw them from stream(key, NAME)"
+
+
+def _of_environments(entry: WorldEntry) -> Iterator[Finding]:
+    """Note environments that nothing tells apart: neither parameters nor a scenario."""
+    known: dict[tuple[object, ...], str] = {}
+    for name in entry.environments:
+        a_world = entry.build(name, entry.params_class())
+        simulation, drawn = a_world.simulation(), a_world.scenarios(KEYS[:1])
+        if wrong := list(scenario_faults(simulation.scene, drawn, 1)):
+            yield Finding("problem", "environments", f"{name}: {wrong[0]}")
+            continue
+        made = (
+            *(getattr(drawn, field).tobytes() for field in simulation.scene.vars),
+            repr(simulation.params.numpy_value()),
+            a_world.controller,
+            a_world.n_robots,
+            tuple(simulation.functions.values()),
+        )
+        if (other := known.setdefault(made, name)) != name:
+            text = f"{name} is the same as {other}: in its parameters, and in a scenario of one key"
+            yield Finding("note", "environments", text)
 
 
 def random_teams(a_world: World, n: int) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.int32]]:
@@ -175,6 +199,8 @@ def _stepped(entry: WorldEntry, environment: str) -> Iterator[Finding]:
     yield Finding("ok", "memory", f"{about}: all array indices are in bounds")
     for topic, problems, fine in trial.seen():
         yield from _topic(topic, iter(problems), fine)
+    for text in trial.unplayed_heuristics():
+        yield Finding("note", "heuristics", text)
 
 
 def mixed_teams(

@@ -257,6 +257,26 @@ class Trial:
                 yield f"{name!r} does exactly what {other} does"
             played[row.tobytes()] = repr(name)
 
+    def unplayed_heuristics(self) -> Iterator[str]:
+        """Yield a line for each that ends as a network without neurons, as if act did not know it.
+
+        One that is meant to do what such a network does ends so, too.
+        """
+        world, genes, teams, scenarios, heuristic = self._task
+        nobody = np.full_like(teams[:1], -1), scenarios, np.full_like(heuristic[:1], -1)
+        idle = Stepper(world, genes, *nobody)
+        for step, t in idle.epoch(world.params.iterations):
+            idle.step(step, idle.natural, t)
+        ended, all_ended = idle.arrays(), self.plain.arrays()
+        for k, name in enumerate(world.heuristics):
+            team = self._n_teams - len(world.heuristics) + k
+            rows = slice(team * len(scenarios), (team + 1) * len(scenarios))
+            if all(ended[one].tobytes() == all_ended[one][rows].tobytes() for one in RESULTS):
+                yield (
+                    f"{name!r} does exactly what a network with equal outputs does: does act have "
+                    f"a case for heuristic {k}?"
+                )
+
 
 def _only(order: Order, i: int) -> Order:
     """Return an order in which robot ``i`` alone is visited."""
