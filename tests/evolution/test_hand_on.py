@@ -106,7 +106,8 @@ def test_populations_that_do_not_fit_are_refused(name: str) -> None:
 
 def test_neurons_are_no_networks() -> None:
     mesp, ccga = build("mesp"), build("ccga")
-    with pytest.raises(UsageError, match="genotypes that are neurons do not mix with whole networks"):
+    words = "genotypes that are neurons do not mix with whole networks"
+    with pytest.raises(UsageError, match=words):
         hand_on(ccga, LAYOUT, 3, mesp.init(LAYOUT, 3))
 
 
