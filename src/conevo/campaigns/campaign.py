@@ -44,6 +44,7 @@ from conevo.reading import read_json
 from conevo.runs.directory import Directory, appearing
 from conevo.runs.durable import is_there, replace_file
 from conevo.runs.time_limit import TimeLimit
+from conevo.terms import quoted
 from conevo.worlds.registry import resolve as resolve_world
 
 __all__ = ["ATTEMPTS", "CAMPAIGNS", "Campaign", "Stopped", "check", "create"]
@@ -223,7 +224,7 @@ class Campaign:
         """
         if not self.is_running:
             raise UsageError(
-                f"{self.path} is not running; see 'conevo campaign status {self.path}'"
+                f"{self.path} is not running; see 'conevo campaign status {quoted(self.path)}'"
             )
         replace_file(self.places.stop, b"")
 

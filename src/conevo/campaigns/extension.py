@@ -21,6 +21,7 @@ from conevo.runs.config import RunConfig
 from conevo.runs.directory import as_json
 from conevo.runs.durable import replace_file, writing
 from conevo.runs.inputs import INPUTS
+from conevo.terms import quoted
 
 if TYPE_CHECKING:
     from conevo.campaigns.campaign import Campaign
@@ -56,7 +57,8 @@ def check_plan(campaign: Campaign, runs: Mapping[str, PlannedRun]) -> None:
         campaign: that is there.
         runs: of the new plan, by label.
     """
-    advice = f"continue it with 'conevo campaign start {campaign.path}', or choose another --out"
+    start = f"conevo campaign start {quoted(campaign.path)}"
+    advice = f"continue it with '{start}', or choose another --out"
     cells: dict[str, str] = {}
     for label, planned in campaign.planned.items():
         if label not in runs:

@@ -21,7 +21,7 @@ from conevo.cli.carry import drop_output, style_of
 from conevo.cli.text import duration
 from conevo.errors import EnvironmentFailure, UsageError
 from conevo.runs.time_limit import TimeLimit
-from conevo.terms import counted
+from conevo.terms import counted, quoted
 
 __all__ = ["Execution", "carry_on", "ready"]
 
@@ -68,7 +68,7 @@ def ready(
 def carry_on(campaign: Campaign, execution: Execution) -> int:
     """Finish what is missing, then say what can be done next; returns the exit code."""
     view = View(campaign, execution)
-    advice = f"conevo campaign start {campaign.path}"
+    advice = f"conevo campaign start {quoted(campaign.path)}"
     try:
         with view.showing():
             entries = campaign.carry_on(
@@ -84,6 +84,8 @@ def carry_on(campaign: Campaign, execution: Execution) -> int:
         word = str(error) if isinstance(error, Stopped) else "interrupted"
         done = counts(campaign.standings())
         click.echo(f"{word} with {done}; continue with: {advice}", err=True)
+        if isinstance(error, Stopped) and execution.style == "quiet":
+            click.echo(str(campaign.path))
         sys.exit(0 if isinstance(error, Stopped) else 130)
     except EnvironmentFailure as error:
         raise EnvironmentFailure(f"{error}; once fixed: {advice}") from error
@@ -180,9 +182,9 @@ class View:
         failed = [entry for entry in entries.values() if entry.state == "failed"]
         print_failed(self.campaign, failed)
         if failed:
-            click.echo(f"retry them:       conevo campaign retry {path}")
-        click.echo(f"write a report:   conevo report {path}")
+            click.echo(f"retry them:       conevo campaign retry {quoted(path)}")
+        click.echo(f"write a report:   conevo report {quoted(path)}")
         click.echo(
-            f"query its tables: conevo query {path} "
+            f"query its tables: conevo query {quoted(path)} "
             '"SELECT task, method, count(*) FROM runs GROUP BY ALL"'
         )

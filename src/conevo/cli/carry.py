@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from conevo.errors import ConevoError, EnvironmentFailure, UsageError
+from conevo.terms import quoted
 
 if TYPE_CHECKING:
     from conevo.runs.run import Run
@@ -123,11 +124,12 @@ def carry_on(
     elif not isinstance(found, Run):
         raise UsageError(
             f"{found.path} is a shaping, whose stages keep their length; start a run from the "
-            f"populations of its last stage: conevo run WORLD/ENVIRONMENT --from {found.path}"
+            f"populations of its last stage: conevo run WORLD/ENVIRONMENT "
+            f"--from {quoted(found.path)}"
         )
     if not accept_other_code:
         found.refuse_other_code()
-    advice = f"conevo resume {found.path}"
+    advice = f"conevo resume {quoted(found.path)}"
     try:
         if isinstance(found, Run):
             carry(found)

@@ -14,6 +14,7 @@ from conevo.runs.directory import CAMPAIGN, kind_of
 from conevo.runs.durable import is_there
 from conevo.runs.run import RUNS, Run
 from conevo.runs.shaping import Shaping
+from conevo.terms import quoted
 
 if TYPE_CHECKING:
     from conevo.campaigns.campaign import Campaign
@@ -77,7 +78,7 @@ def find_last(text: str) -> Run:
     if found.status != "finished":
         raise UsageError(
             f"{found.path} is not finished, so no run can begin with its populations; "
-            f"finish it with 'conevo resume {found.path}'"
+            f"finish it with 'conevo resume {quoted(found.path)}'"
         )
     return found.stages[-1]
 
@@ -197,6 +198,7 @@ def open_directory(path: Path) -> Run | Shaping:
     """
     if kind_of(path) == "campaign":
         raise UsageError(
-            f"{path} is a campaign; see its runs with 'conevo campaign status {path} --runs'"
+            f"{path} is a campaign; see its runs with "
+            f"'conevo campaign status {quoted(path)} --runs'"
         )
     return Shaping(path) if kind_of(path) == "shaping" else Run(path)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shlex
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -28,7 +27,7 @@ from conevo.runs.code import changes_text, last_code, sessions_of
 from conevo.runs.outline import Outline
 from conevo.runs.run import Run
 from conevo.runs.shrinkage import shrinkage
-from conevo.terms import S_SCALE, counted
+from conevo.terms import S_SCALE, counted, quoted
 from conevo.worlds.measures import Measure
 
 __all__ = [
@@ -90,7 +89,7 @@ def run_text(run: Run, n_rows: int) -> str:
     if lines := _former_ends(run):
         parts += ["", *lines]
     if run.status == "interrupted":
-        parts += ["", f"Continue it with: conevo resume {run.path}"]
+        parts += ["", f"Continue it with: conevo resume {quoted(run.path)}"]
     return "\n".join(parts)
 
 
@@ -236,19 +235,19 @@ def next_commands(run: Run) -> list[str]:
     other = "mesp" if config.method.startswith("cone") else "cone"
     tables = config.tables()
     changes = [
-        f" --set {section}.{key}={tables[section][key]}"
+        f" --set {quoted(f'{section}.{key}={tables[section][key]}')}"
         for section, _, key in (name.partition(".") for name in config.changed)
         if section in ("run", "world") and key in tables[section]
     ]
     seed = config.run.seed
-    world = shlex.quote(config.address)
+    world, path = quoted(config.address), quoted(run.path)
     repeat = f"conevo run {world} --method {other} --preset {config.preset} --seed {seed}"
-    again = f"conevo run --config {run.path}/config.toml --seed {seed + 1}"
+    again = f"conevo run --config {path}/config.toml --seed {seed + 1}"
     commands = {
-        f"conevo show {run.path}": "its generations",
-        f"conevo replay {run.path}": "see its team in the browser",
-        f"conevo test {run.path} --scenarios 100": "test its team in more scenarios",
-        f"conevo resume {run.path} --{_twice_as_long(run)}": "evolve it longer",
+        f"conevo show {path}": "its generations",
+        f"conevo replay {path}": "see its team in the browser",
+        f"conevo test {path} --scenarios 100": "test its team in more scenarios",
+        f"conevo resume {path} --{_twice_as_long(run)}": "evolve it longer",
     }
     if "origin" not in run.provenance:  # which neither the file nor the options have
         commands[again] = "the same with another seed"

@@ -8,6 +8,7 @@ from conevo.errors import UsageError
 from conevo.runs.champions import Team
 from conevo.runs.code import last_code
 from conevo.runs.store import Store
+from conevo.terms import quoted
 from conevo.worlds.protocol import World
 
 if TYPE_CHECKING:
@@ -41,7 +42,7 @@ def ancestor_of(
     if not store.is_finished:
         raise UsageError(
             f"{path} is not finished, so no run can begin with its populations; "
-            f"finish it with 'conevo resume {path}'"
+            f"finish it with 'conevo resume {quoted(path)}'"
         )
     if changed := store.check_seal():
         raise UsageError(

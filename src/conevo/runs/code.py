@@ -11,6 +11,7 @@ from typing import Any
 
 import conevo
 from conevo.errors import UsageError
+from conevo.terms import quoted
 
 __all__ = [
     "DECIDING",
@@ -102,7 +103,7 @@ def refuse_other_code(path: Path, code: str) -> None:
     """Raise UsageError unless ``code``, of the run or shaping at ``path``, is this conevo's."""
     if problem := other_code(path, code):
         raise UsageError(
-            f"{problem}: use that version, or continue with 'conevo resume {path} "
+            f"{problem}: use that version, or continue with 'conevo resume {quoted(path)} "
             f"--accept-other-code'"
         )
 

@@ -24,6 +24,7 @@ from conevo.reading import read_bytes, read_json, read_text
 from conevo.runs import locks
 from conevo.runs.drafts import draft_of, remove_abandoned, remove_torn
 from conevo.runs.durable import is_there, replace_file, sync_directory, writing
+from conevo.terms import quoted
 
 __all__ = [
     "CAMPAIGN",
@@ -75,12 +76,17 @@ def _appear(draft: Path, path: Path) -> None:
     try:
         draft.rename(path)
     except OSError:
-        refuse_existing(path)
+        refuse_existing(path, is_new=True)
         raise
 
 
-def refuse_existing(path: Path) -> None:
-    """Say what is at ``path`` and what can be done with it, if anything is."""
+def refuse_existing(path: Path, *, is_new: bool = False) -> None:
+    """Say what is at ``path`` and what can be done with it, if anything is.
+
+    Args:
+        path: a directory's.
+        is_new: whether nothing was there a moment ago, so that another process makes it now.
+    """
     if not is_there(path) or (path.is_dir() and not any(path.iterdir())):
         return
     kind = kind_of(path)
@@ -89,14 +95,22 @@ def refuse_existing(path: Path) -> None:
             f"{path} already exists and is not a run; choose another directory with --out"
         )
     directory = Directory(path, kind)
+    if is_new:
+        raise UsageError(
+            f"another conevo has just begun a {kind} at {path}; leave it to that one, or choose "
+            f"another directory with --out"
+        )
     if kind == "campaign":
-        raise UsageError(f"{path} already holds a campaign; see 'conevo campaign status {path}'")
+        raise UsageError(
+            f"{path} already holds a campaign; see 'conevo campaign status {quoted(path)}'"
+        )
     if directory.is_finished:
-        advice = f"finished: see it with 'conevo show {path}', or choose another --seed or --out"
+        show = f"conevo show {quoted(path)}"
+        advice = f"finished: see it with '{show}', or choose another --seed or --out"
     elif directory.is_in_use:
-        advice = f"in use by {directory.user}; watch it with 'conevo show {path}'"
+        advice = f"in use by {directory.user}; watch it with 'conevo show {quoted(path)}'"
     else:
-        advice = f"unfinished: continue it with 'conevo resume {path}'"
+        advice = f"unfinished: continue it with 'conevo resume {quoted(path)}'"
     raise UsageError(f"{path} already holds a {kind}, {advice}")
 
 

@@ -33,6 +33,7 @@ from conevo.runs.evolved_prey import PREY, PREY_TASKS, save_prey
 from conevo.runs.outline import Outline, identify, outline_of
 from conevo.runs.run import RUNS, Record, Run, Watch, start
 from conevo.runs.time_limit import TimeLimit
+from conevo.terms import quoted
 
 if TYPE_CHECKING:
     from conevo.evolution.protocol import State
@@ -105,6 +106,7 @@ def start_shaping(
     state: State | None = None
     for stage in configs:
         state = Lab.equip(stage, threads, device).first_state(state)
+    refuse_existing(path, is_new=True)
     with appearing(path) as draft:
         about = {
             "format": FORMAT,
@@ -254,7 +256,8 @@ class Shaping:
     def refuse_finished(self) -> None:
         """Raise UsageError if there is nothing left to do."""
         if self._directory.is_finished:
-            raise UsageError(f"{self.path} is finished; see it with 'conevo show {self.path}'")
+            show = f"conevo show {quoted(self.path)}"
+            raise UsageError(f"{self.path} is finished; see it with '{show}'")
 
     def refuse_other_code(self) -> None:
         """Raise UsageError if another conevo made the stages so far."""
