@@ -298,4 +298,4 @@ def test_status_shows_runs_that_slurm_tasks_or_a_resume_carry_out(conevo, tmp_pa
     assert (found["running"], found["runs"][0]["state"]) == (False, "running")
     assert (found["runs"][0]["generations"], found["runs"][0]["generations_planned"]) == (1, 2)
     assert found["runs"][1]["written"] is None
-    assert "not running, 4 pending" in conevo("campaign", "status", "tiny")[1]
+    assert "not running, 3 pending, 1 interrupted\n" in conevo("campaign", "status", "tiny")[1]

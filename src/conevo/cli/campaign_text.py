@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import time
 from collections import Counter
@@ -86,11 +87,17 @@ def print_plan(runs: Iterable[PlannedRun], as_json: bool) -> None:
 
 def print_status(campaign: Campaign, with_runs: bool, as_json: bool) -> bool:
     """Print how a campaign stands; returns whether runs have failed."""
-    entries = campaign.standings()
+    standings = campaign.standings()
+    entries = {
+        label: dataclasses.replace(entry, state="interrupted")
+        if entry.state == "pending" and last_written(campaign.places, label) is not None
+        else entry
+        for label, entry in standings.items()
+    }  # as the live page has it: a run with a generation does not wait for its first
     failed = [entry for entry in entries.values() if entry.state == "failed"]
     left = None
     if campaign.is_running:
-        left = remaining_seconds(campaign, entries, usable_cores(), time.time())
+        left = remaining_seconds(campaign, standings, usable_cores(), time.time())
     if as_json:
         rows = [
             {"run": e.label, "state": e.state, "attempts": e.attempts, "reason": e.reason}
@@ -144,7 +151,7 @@ def _whose(campaign: Campaign, entries: Mapping[str, Entry]) -> str:
 
 def _sign_of_life(campaign: Campaign, entries: Mapping[str, Entry]) -> str:
     """Return when a run that is not finished was last written, whoever writes it and where."""
-    labels = [e.label for e in entries.values() if e.state in ("pending", "running")]
+    labels = [e.label for e in entries.values() if e.state in ("pending", "interrupted", "running")]
     at = max(filter(None, (last_written(campaign.places, label) for label in labels)), default=None)
     return "" if at is None else f"last generation written {_ago(at)}"
 
@@ -183,7 +190,7 @@ def _how_far(campaign: Campaign, entry: Entry) -> dict[str, Any]:
 def counts(entries: Mapping[str, Entry]) -> str:
     """Return how many runs are in each state: "12 finished, 2 running, 76 pending"."""
     found = Counter(entry.state for entry in entries.values())
-    order = ("finished", *(state for state in STATES if state != "finished"))
+    order = ("finished", *(state for state in STATES if state != "finished"), "interrupted")
     return ", ".join(f"{found[state]} {state}" for state in order if found[state])
 
 
