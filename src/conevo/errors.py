@@ -3,9 +3,19 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable
+import re
+from collections.abc import Iterable, Sequence
 
-__all__ = ["ConevoError", "EnvironmentFailure", "UsageError", "shown", "unknown_name"]
+__all__ = [
+    "ConevoError",
+    "EnvironmentFailure",
+    "UsageError",
+    "shown",
+    "unknown_name",
+    "without_team",
+]
+
+NUMBERED = re.compile(r"(.*\D)(\d{1,9})", re.ASCII)  # as in "complex-10"
 
 
 class ConevoError(Exception):
@@ -43,8 +53,27 @@ def unknown_name(kind: str, name: str, allowed: Iterable[str], where: str = "") 
         where: where it was found ("in config.toml"), empty if obvious.
     """
     names = sorted(allowed)
-    near = difflib.get_close_matches(name[:200], names, n=1, cutoff=0.5)
+    near = _by_number(name, names) or difflib.get_close_matches(name[:200], names, n=1, cutoff=0.5)
     hint = f"; did you mean {near[0]!r}?" if near else ""
     place = f" {where}" if where else ""
     listed = ", ".join(names) if len(names) <= 40 else ", ".join(names[:40]) + ", ..."
     return UsageError(f"unknown {kind} {shown(name, 200)}{place}{hint} (known: {listed or 'none'})")
+
+
+def _by_number(name: str, names: Iterable[str]) -> list[str]:
+    """Return the name with the nearest number, if it is the number alone that is not known."""
+    if not (wanted := NUMBERED.fullmatch(name)):
+        return []
+    alike = [one for one in map(NUMBERED.fullmatch, names) if one and one[1] == wanted[1]]
+    return [one[0] for one in sorted(alike, key=lambda one: abs(int(one[2]) - int(wanted[2])))[:1]]
+
+
+def without_team(path: object, generations: Sequence[object]) -> UsageError:
+    """Return the error for a run or shaping that has no champion.
+
+    Args:
+        path: its directory.
+        generations: the records of those that it has finished.
+    """
+    lost = "lost its champion.npz" if generations else "no finished generation yet"
+    return UsageError(f"{path} has {lost}, so there is no team")

@@ -188,7 +188,15 @@ def _words(error: BaseException) -> str:
 
 
 def line_of(error: BaseException) -> str:
-    """Return "FILE:LINE: TYPE: MESSAGE" of an error that comes from such a file, or nothing."""
+    """Return "FILE:LINE: in CALL: TYPE: MESSAGE" of an error in such a file, "" of any other.
+
+    CALL is what conevo called in the file, such as ``scenarios``; the line may be further within.
+    """
     modules = [module for name, module in list(sys.modules.items()) if is_outside(name)]
-    place = _place(error, (Path(str(module.__file__)) for module in modules))
-    return f"{place[0]}:{place[1]}: {_words(error)}" if place else ""
+    files = [Path(str(module.__file__)) for module in modules]
+    if (place := _place(error, files)) is None:
+        return ""
+    own = {str(file) for file in files}
+    calls = [s.name for s in traceback.extract_tb(error.__traceback__) if s.filename in own]
+    call = f"in {calls[0]}: " if calls and calls[0] != "<module>" else ""
+    return f"{place[0]}:{place[1]}: {call}{_words(error)}"

@@ -1,8 +1,10 @@
-"""Terms of the thesis, worded as they are printed everywhere."""
+"""Terms of the thesis, numbers of things and paths in commands, worded as they are everywhere."""
 
 from __future__ import annotations
 
-__all__ = ["NON_SPECIALIZED", "S_MEANS", "S_SCALE"]
+import shlex
+
+__all__ = ["NON_SPECIALIZED", "S_MEANS", "S_SCALE", "counted", "quoted"]
 
 NON_SPECIALIZED = "non-specialized"
 """The caste of robots that are specialized to nothing."""
@@ -11,3 +13,13 @@ S_SCALE = "0 = always the same action, 1 = switches all the time"
 """Which way S goes: the thesis calls it the degree of specialization, and 0 is a specialist."""
 
 S_MEANS = f"degree of specialization S ({S_SCALE})"
+
+
+def counted(number: int, noun: str) -> str:
+    """Return so many things in words: "1 run", "1,200 runs"."""
+    return f"{number:,} {noun}{'' if number == 1 else 's'}"
+
+
+def quoted(path: object) -> str:
+    """Return a path as a shell takes it, for commands that are printed to be copied."""
+    return shlex.quote(str(path))

@@ -62,6 +62,7 @@ class Cell(NamedTuple):
     preset: str = "smoke"
     budget: int = 1000
     stage: int = 0
+    planned: int | None = None  # budget; that above is what a run spends
 
 
 def cells(
@@ -177,6 +178,7 @@ def _run(
             "seed": [seed],
             "variant": [cell.variant],
             "generations": [generations],
+            "planned_evaluations": [np.nan if cell.planned is None else cell.planned],
             "evaluations": [cell.budget],
             "team_steps": [cell.budget * 500],
             "seconds": [12.5],

@@ -13,6 +13,8 @@ from analysis.finished_runs import cells, write_campaign
 from conevo.analysis.comparison import Cell, Treatment, group_values
 from conevo.analysis.courses import caste_courses, courses, read_histories
 from conevo.analysis.frames import SCHEMA, Tables
+from conevo.analysis.sections.castes import castes
+from conevo.analysis.sections.scope import scopes
 
 CONE = Cell("complex-1", Treatment("cone", ""))
 
@@ -75,3 +77,17 @@ def test_shares_of_castes_add_up_over_runs(tables) -> None:
     shares = found[CONE]
     assert shares["low"].tolist() == [1.0, 0.25, (0.0 + 1.0) / 2, 0.5]
     assert (shares["low"] + shares["hi"]).tolist() == [1.0] * 4
+
+
+def test_nothing_is_said_of_castes_before_the_first_generation_has_ended(tables) -> None:
+    x, found = caste_courses(histories_of(tables), n=8)
+    assert x.tolist() == [5, 10, 15, 20, 25, 30, 35, 40]
+    assert np.isnan([found[CONE]["low"][0], found[CONE]["hi"][0]]).all()
+    assert found[CONE]["low"][1] == 1.0
+
+
+def test_castes_are_drawn_from_zero_on_an_axis_that_begins_empty(tables, tmp_path) -> None:
+    (scope,) = scopes(tables)
+    figure, _ = castes(scope, read_histories(tables, scope.group)).exhibits
+    assert min(row["evaluations"] for row in figure.rows) >= 10  # the first generation's end
+    assert all(np.isfinite(row["share"]) for row in figure.rows)

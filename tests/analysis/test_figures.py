@@ -316,6 +316,14 @@ def test_text_is_broken_and_shortened_to_fit() -> None:
     assert drawable("价 ab\n\x07c") == "? ab ?c"
 
 
+def test_text_is_not_broken_inside_a_number() -> None:
+    text = "rover/complex-10, gst=0.125 of 61,000,-2.5 or 1e-05"
+    wide = max(map(width_of, ("complex-", "0.125", "61,000,-2.5", "1e-05")))
+    assert fitted(text, wide, 20).split("\n") == [
+        "rover/", "complex-", "10, gst=", "0.125 of", "61,000,-2.5", "or 1e-05",
+    ]  # fmt: skip
+
+
 def test_names_of_places_are_turned_only_if_they_must_be() -> None:
     assert labels_of(["dark-1", "dark-2"], 1.0) == (["dark-1", "dark-2"], 0.0)
     assert labels_of(["an_environment_far_away"] * 2, 0.6).angle == 30.0

@@ -79,6 +79,25 @@ def test_budgets_join_near_numbers_of_evaluations_and_keep_others_apart(tmp_path
     }
 
 
+def test_runs_of_one_planned_budget_belong_together_whatever_they_spent(tmp_path) -> None:
+    one = "rover/complex-1"
+    of = [
+        *cells([one], ["homcne"], budget=61, planned=100),
+        *cells([one], ["cone"], budget=82, planned=100),
+        *cells([one], ["mesp"], budget=82, planned=200),
+    ]
+    with tables_of(tmp_path, of, seeds=1) as tables:
+        found = {value.method: value.budget for value in tables.values()}
+    assert found == {
+        "homcne": "smoke, about 100 team evaluations of 500 team-steps",
+        "cone": "smoke, about 100 team evaluations of 500 team-steps",
+        "mesp": "smoke, about 200 team evaluations of 500 team-steps",
+    }
+    edit(tmp_path, "SELECT * REPLACE ('generations' AS stopped_by) FROM old")
+    with Tables(tmp_path / "campaign" / "tables") as tables:  # the budget did not end them
+        assert len({one.budget for one in tables.values()}) == 2
+
+
 def test_longer_evaluations_are_another_budget(tmp_path) -> None:
     write_campaign(tmp_path / "campaign", cells(["rover/complex-1"], ["ccga", "cone"]), seeds=1)
     edit(
@@ -135,12 +154,52 @@ def test_a_folder_without_runs_and_a_foreign_file_are_refused(tmp_path) -> None:
     ("sql", "says"),
     [
         ("SELECT nothing FROM runs", "nothing"),
-        ("COPY runs TO 'stolen.csv'", "disabled by configuration"),
         ("SELECT * FROM read_text('/etc/hostname')", "disabled by configuration"),
-        ("SET enable_external_access = true", "locked"),
+        ("DROP TABLE runs", "DROP is not a query; ask as in"),
+        ("SELECT 1; DROP TABLE runs", "DROP is not a query"),
+        ("WITH one AS (SELECT 1) INSERT INTO budgets SELECT 1, 2", "INSERT is not a query"),
+        ("COPY runs TO 'stolen.csv'", "COPY is not a query"),
+        ("SET enable_external_access = true", "SET is not a query"),
     ],
 )
 def test_a_query_only_asks_and_says_no_in_one_line(tmp_path, monkeypatch, sql, says) -> None:
+    monkeypatch.chdir(tmp_path)
+    with (
+        tables_of(tmp_path, cells(["rover/complex-1"], ["cone"]), seeds=1) as tables,
+        pytest.raises(UsageError, match=says) as refused,
+    ):
+        tables.ask(sql)
+    assert "\n" not in str(refused.value)
+    assert not (tmp_path / "stolen.csv").exists()
+
+
+@pytest.mark.parametrize(
+    "sql",
+    [
+        "FROM runs",
+        "WITH one AS (SELECT 1) FROM one",
+        "VALUES (1)",
+        "DESCRIBE runs",
+        "SHOW TABLES",
+        "SUMMARIZE runs",
+        "EXPLAIN SELECT 1",
+        "PIVOT runs ON method USING count(*)",
+    ],
+)
+def test_everything_that_only_asks_is_a_query(tmp_path, sql) -> None:
+    with tables_of(tmp_path, cells(["rover/complex-1"], ["cone"]), seeds=1) as tables:
+        columns, rows = tables.ask(sql)
+    assert {len(row) for row in rows} == {len(columns)}
+
+
+@pytest.mark.parametrize(
+    ("sql", "says"),
+    [
+        ("COPY runs TO 'stolen.csv'", "disabled by configuration"),
+        ("SET enable_external_access = true", "locked"),
+    ],
+)
+def test_what_is_no_query_reaches_no_file_either(tmp_path, monkeypatch, sql, says) -> None:
     monkeypatch.chdir(tmp_path)
     with (
         tables_of(tmp_path, cells(["rover/complex-1"], ["cone"]), seeds=1) as tables,

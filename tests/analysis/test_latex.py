@@ -5,12 +5,22 @@ from __future__ import annotations
 import re
 import shutil
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from conevo.analysis.drawing import Drawing
-from conevo.analysis.exhibits import Column, Figure, Table, interval, number, p_value, plain
+from conevo.analysis.exhibits import (
+    Column,
+    Figure,
+    Section,
+    Table,
+    interval,
+    number,
+    p_value,
+    plain,
+)
 from conevo.analysis.latex import TEXT_WIDTH, document, figures_to_latex, to_latex
 
 
@@ -81,17 +91,32 @@ def test_figures_have_captions_and_the_width_of_a_column_or_a_page() -> None:
     assert r"\label{fig:two}" in text
 
 
+def test_a_document_has_the_headings_of_the_page_and_no_empty_ones() -> None:
+    figure = Figure("drawn", "S", "n = 3.", (), [{"x": 1}], drawing=Drawing(b"", b""))
+    text = document("A & B", [
+        Section("Runs", exhibits=[table()]),
+        Section("Group", sections=[
+            Section("Learning", exhibits=[figure]), Section("Castes", ["None was studied."]),
+        ]),
+        Section("How to repeat it", preformatted="conevo"),
+    ])  # fmt: skip
+    shown = [r"\section{Runs}", r"\input{tables/own.tex}", r"\section{Group}",
+             r"\subsection{Learning}", r"{figures/drawn.pdf}"]  # fmt: skip
+    assert [text.count(one) for one in shown] == [1] * 5
+    assert sorted(shown, key=text.index) == shown
+    assert "Castes" not in text
+    assert "repeat" not in text
+
+
 @pytest.mark.skipif(shutil.which("pdflatex") is None, reason="no pdflatex")
 def test_it_compiles_and_nothing_is_wider_than_the_page(tmp_path: Path) -> None:
     tables = [table(50), wide(), wide(2), wide(5)]
     (tmp_path / "tables").mkdir()
-    for k, one in enumerate(tables):
-        (tmp_path / f"tables/{one.name}.tex").write_text("")
-        (tmp_path / f"tables/t{k}.tex").write_text(to_latex(one))
-    text = document("A & B", [])
-    inputs = "".join(rf"\input{{tables/t{k}.tex}}\clearpage" for k in range(len(tables)))
-    (tmp_path / "figures.tex").write_text("")
-    (tmp_path / "all.tex").write_text(text.replace(r"\input{figures.tex}", inputs))
+    tables = [replace(one, name=f"t{k}") for k, one in enumerate(tables)]
+    for one in tables:
+        (tmp_path / f"tables/{one.name}.tex").write_text(to_latex(one))
+    parts = [Section(f"Part {k} & more", exhibits=[one]) for k, one in enumerate(tables)]
+    (tmp_path / "all.tex").write_text(document("A & B", [Section("Group", sections=parts)]))
     done = subprocess.run(
         ["pdflatex", "-interaction=nonstopmode", "-halt-on-error", "all.tex"],
         cwd=tmp_path, capture_output=True, text=True, check=False,

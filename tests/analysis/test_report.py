@@ -17,6 +17,7 @@ from analysis.finished_runs import Cell, cells, mean_of, write_campaign
 from conevo.analysis.frames import Tables
 from conevo.analysis.report import sections_of, write_report
 from conevo.analysis.sections.champions import champions
+from conevo.analysis.sections.interventions import lesions
 from conevo.analysis.sections.overview import read_campaign
 from conevo.analysis.sections.scope import scopes
 from conevo.errors import UsageError
@@ -137,7 +138,7 @@ def test_scenarios_without_a_finite_value_are_counted_in_words(campaign, tmp_pat
 
 def test_what_failed_is_listed_and_escaped(report) -> None:
     text = (report / "index.html").read_text()
-    assert "36 of 37 planned runs are finished, 1 failed, 0 have not ended." in text
+    assert "Runs finished: 36 of 37 planned; failed: 1; not ended: 0." in text
     assert "the disk is &lt;full&gt; &amp; lost" in text
     assert rows_of(report / "numbers/failures.csv")[0]["message"] == "the disk is <full> & lost"
     assert r"the disk is $<$full$>$ \& lost" in (report / "tables/failures.tex").read_text()
@@ -182,6 +183,19 @@ def test_losses_are_those_of_the_same_run(report, campaign) -> None:
     assert float(hom["lost"]) == pytest.approx(np.mean([expected[r] for r in mine]), rel=1e-9)
     left = 100 * sum(value[r] for r in mine) / sum(whole[r] for r in mine)
     assert float(hom["percent"]) == pytest.approx(left, rel=1e-9)
+
+
+def test_intervals_of_losses_end_where_losses_do(tmp_path) -> None:
+    with Tables(write_campaign(tmp_path / "c", cells(["rover/complex-1"]), 3) / "tables") as tables:
+        tables.query(
+            "UPDATE scores SET value = CASE WHEN team = 'whole' THEN 1 WHEN contains(run, '-s1')"
+            " THEN 0.5 ELSE 0 END WHERE study = 'lesion'"
+        )
+        figure, table = lesions(scopes(tables)[0]).exhibits
+    ends = [row["interval"] for row in table.rows if row["n"] > 1 and row["interval"][0]]
+    assert max(high for _, high in ends) == 100.0
+    assert min(low for low, _ in ends) >= -100.0
+    assert all("which ends at ±100 %, where losses do" in one.note for one in (figure, table))
 
 
 def test_every_exhibit_has_its_numbers_and_every_table_its_latex(report) -> None:
@@ -298,13 +312,16 @@ def test_a_world_where_nothing_was_achieved_has_no_losses(tmp_path) -> None:
     of = cells(["rover/complex-1"], ["mesp", "cone"])
     root = write_campaign(tmp_path / "c", of, 2, 3, mean=lambda cell: -1e6)
     text = write_report(root, tmp_path / "out").read_text()
-    assert len(re.findall(r"\d+ teams are left out: neither they nor the unchanged", text)) == 2
+    assert (
+        len(re.findall(r"Teams left out, as neither they nor the unchanged ones scored: \d+", text))
+        == 2
+    )
 
 
 def test_a_campaign_without_a_finished_run_says_so(tmp_path) -> None:
     root = empty(tmp_path)
     text = write_report(root, tmp_path / "out").read_text()
-    assert "0 of 4 planned runs are finished, 0 failed, 4 have not ended." in text
+    assert "Runs finished: 0 of 4 planned; failed: 0; not ended: 4." in text
 
 
 def test_the_best_method_is_found_best(report) -> None:

@@ -11,7 +11,7 @@ from conevo.campaigns.campaign import ATTEMPTS, Campaign, Stopped, create
 from conevo.campaigns.executors import Ending, Job, Serial
 from conevo.campaigns.plan_file import read_plan
 from conevo.campaigns.work import carry_out
-from conevo.errors import UsageError
+from conevo.errors import EnvironmentFailure, UsageError
 from conevo.runs.run import Run
 
 
@@ -216,3 +216,19 @@ def test_a_foreign_run_in_its_place_is_left_alone(tmp_path):
         "request",
         True,
     )
+
+
+def test_without_a_place_for_compiled_kernels_no_run_begins(tmp_path, monkeypatch):
+    def refuse(rollout):
+        raise EnvironmentFailure("compiled kernels cannot be kept in /none")
+
+    begun = tiny_campaign(tmp_path / "begun")
+    monkeypatch.setattr("conevo.worlds.rollout.Rollout.build", refuse)
+    with pytest.raises(EnvironmentFailure, match="cannot be kept"):
+        tiny_campaign(tmp_path / "new")
+    assert [path.name for path in (tmp_path / "new").iterdir()] == ["tiny.toml"]
+    executor = Scripted()
+    with pytest.raises(EnvironmentFailure, match="cannot be kept"):
+        begun.carry_on(executor)
+    assert executor.begun == []
+    assert {entry.attempts for entry in begun.standings().values()} == {0}

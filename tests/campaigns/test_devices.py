@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import pytest
 
+import conevo
 from campaigns.plans import tiny_campaign
 from conevo.campaigns import devices, slurm, work
 from conevo.campaigns.devices import next_device, parse_devices
@@ -231,3 +232,21 @@ def test_the_check_of_a_node_is_quiet_where_all_is_well(monkeypatch, capsys):
     monkeypatch.setattr(sys, "argv", ["devices", "cpu"])
     devices.main()
     assert capsys.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize(
+    ("device", "code", "words"),
+    [("gpu", 2, "'gpu' is not a device; allowed: cpu, cuda, cuda:N"), ("cuda:", 2, "allowed: cpu"),
+     ("cuda:7", 3, "device 'cuda:7': ")],
+)  # fmt: skip
+def test_a_name_that_no_device_has_is_the_users_mistake(
+    device, code, words, tmp_path, monkeypatch, capsys
+):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SystemExit) as caught:
+        main(["run", "rover/complex-1", "--preset", "smoke", "--device", device])
+    assert caught.value.code == code
+    assert words in capsys.readouterr().err
+    with pytest.raises(UsageError if code == 2 else EnvironmentFailure, match=words):
+        conevo.Rollout(conevo.world("rover/complex-1"), device=device)
+    assert not any(tmp_path.iterdir())

@@ -20,6 +20,7 @@ from conevo.cli.main import main
 from conevo.errors import UsageError
 from conevo.runs.code import current_code
 from conevo.runs.run import Run
+from conevo.runs.store import Store
 from conevo.worlds.pursuit import prey_sets
 
 LIGHT = Path(__file__).parents[2] / "examples" / "light.py"
@@ -124,6 +125,7 @@ def begun_by_another(folder: Path) -> Campaign:
     for one in (about, *about["sessions"]):
         one |= {"conevo": "0.9.0", "code": "abc123abc123"}
     file.write_text(json.dumps(about))
+    Store(file.parent).seal()
     return Campaign(made.path)
 
 

@@ -156,6 +156,13 @@ def test_some_runs_of_a_plan_may_be_shapings(tmp_path):
         ("[settings]", '[[where]]\nmethod = "conne"\n[settings]', "did you mean 'cone'"),
         ("[settings]", '[[where]]\npreset = "smok"\n[settings]', "did you mean 'smoke'"),
         ("[settings]", '[[where]]\nworld = "rovr/complex-1"\n[settings]', "did you mean 'rover'"),
+        (
+            "[settings]",
+            '[[where]]\nmethod = ["mesp", "ccga"]\n[settings]',
+            r"where.method = \['mesp', 'ccga'\] in .* matches no run: .*method is homcne, cone",
+        ),
+        ("[settings]", "[[where]]\nmethod = []\n[settings]", r"where.method = \[\] in .* no run"),
+        ("[settings]", '[[where]]\nworld = "rover/simple-1"\n[settings]', "matches no run"),
         ("[settings]", '"run.method" = ["mesp", "ccga"]\n[settings]', "the method is given as"),
         ("[settings]", '[settings]\n"run.method" = "mesp"', "run.method = 'mesp'.*is given as"),
         ("[settings]", '[settings]\n"run.preset" = "desk"', "the preset is given as smoke"),

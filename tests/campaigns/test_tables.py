@@ -17,6 +17,7 @@ from conevo.campaigns.tables import seal_tables
 from conevo.runs.directory import read_json
 from conevo.runs.run import Run
 from conevo.runs.shrinkage import shrinkage
+from conevo.runs.store import Store
 
 
 @pytest.fixture(scope="module")
@@ -104,6 +105,7 @@ def test_a_value_that_is_not_finite_keeps_its_scenario(campaign, tmp_path):
     test = read_json(path)
     test["champion"]["performance"]["value"]["values"][1] = None
     path.write_text(json.dumps(test))
+    Store(places.run(label)).seal()
     shutil.rmtree(places.tables)
     seal_tables(places, list(campaign.planned.values()), {})
     with Tables(places.tables) as opened:
@@ -213,3 +215,28 @@ def test_a_damaged_run_is_left_out_and_the_rest_is_reported(campaign, tmp_path):
     copy.seal()
     with Tables(copy.places.tables) as tables:
         assert tables.query("SELECT count(*) FROM runs")[1] == [(len(copy.planned),)]
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new"),
+    [
+        ("test.json", '"mean": ', '"mean": 1'),
+        ("generations.jsonl", '"team_fitness": ', '"team_fitness": 1'),
+        ("provenance.json", '"stopped_by": "', '"stopped_by": "x'),
+    ],
+)
+def test_a_run_that_was_changed_is_left_out(campaign, tmp_path, file, old, new):
+    copy = Campaign(shutil.copytree(campaign.path, tmp_path / "copy"))
+    shutil.rmtree(copy.places.tables)
+    label = list(copy.planned)[1]
+    path = copy.places.run(label) / file
+    whole = path.read_text()
+    assert old in whole
+    path.write_text(whole.replace(old, new, 1))
+    copy.seal()
+    with Tables(copy.places.tables) as tables:
+        runs = [run for (run,) in tables.query("SELECT run FROM runs")[1]]
+    assert sorted(runs) == sorted(set(copy.planned) - {label})
+    assert read_campaign(copy.path).left_out == {
+        f"runs/{label}": f"runs/{label} was changed since it was finished: {file}"
+    }

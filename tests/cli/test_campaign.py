@@ -7,7 +7,9 @@ from pathlib import Path
 import pytest
 
 from campaigns.plans import tiny_campaign, write_plan
+from conevo.campaigns import work
 from conevo.cli.main import main
+from worlds.test_outside import written
 
 
 @pytest.fixture
@@ -160,6 +162,45 @@ def test_failures_are_said_with_their_reason_and_can_be_tried_again(conevo, tmp_
     assert [json.loads(line)["state"] for line in out.splitlines()] == ["failed"] * 2
 
 
+def test_a_campaign_says_where_a_world_fails_and_that_it_keeps_its_copy(conevo, tmp_path):
+    fails = "        if int(keys[0]) % 7 == 3:\n            raise ValueError('boom')\n"
+    shape = "        shape = (self"
+    file = written(tmp_path / "mine.py", (shape, fails + shape))
+    line = 1 + file.read_text().splitlines().index("            raise ValueError('boom')")
+    plan = PLAN.format(world="mine.py:dark-1", method="homcne").replace("= 2", "= 20")
+    (tmp_path / "a.toml").write_text(plan)
+    start = ("campaign", "start", "a.toml", "--executor", "serial")
+    copies = (
+        "the campaign keeps its copy of mine.py: once yours is corrected, start another campaign "
+        "with --out DIR"
+    )
+    for words in (start, ("campaign", "status", "a"), ("campaign", "retry", "a")):
+        code, out, _ = conevo(*words)
+        assert code == 1
+        reason = rf"failed .*-s1: \S+/mine.py:{line}: in scenarios: ValueError: boom\n"
+        assert re.search(reason, out)
+        assert copies in out.splitlines()
+    written(file)
+    code, _, err = conevo(*start)
+    assert code == 2
+    assert "was planned with another mine.py, of which it keeps a copy in inputs/; continue" in err
+    code, out, _ = conevo(*start, "--out", "other", "--quiet")
+    assert (code, out) == (0, "other\n")
+
+
+def test_the_programs_own_failure_is_recorded_with_its_place(tmp_path, monkeypatch):
+    def fail(*_, **more):
+        raise ValueError("boom")
+
+    campaign = tiny_campaign(tmp_path)
+    label = next(iter(campaign.planned))
+    monkeypatch.setattr(work, "start", fail)
+    assert not work.carry_out(campaign.path, label, 1)
+    ended = json.loads(campaign.places.ended(label).read_text())
+    line = fail.__code__.co_firstlineno + 1
+    assert ended["message"] == f"ValueError('boom') in fail ({__file__}:{line})"
+
+
 def test_a_dry_run_prints_every_run_and_writes_nothing(conevo, tmp_path):
     code, out, _ = conevo("campaign", "start", "rover-complex", "--seeds", "2", "--dry-run")
     assert code == 0
@@ -226,7 +267,7 @@ def test_a_job_array_has_the_runs_that_are_not_finished(conevo, tmp_path):
     tiny_campaign(tmp_path / "campaigns")
     code, out, _ = conevo("campaign", "slurm", "tiny", "--threads", "3", "--at-once", "2")
     assert code == 0
-    assert "4 runs; submit them with: sbatch " in out
+    assert "4 runs; submit with: sbatch " in out
     script = (tmp_path / "campaigns" / "tiny" / "slurm.sh").read_text()
     assert "--cpus-per-task=3" in script
     assert "--array=0-3%2" in script
@@ -257,4 +298,4 @@ def test_status_shows_runs_that_slurm_tasks_or_a_resume_carry_out(conevo, tmp_pa
     assert (found["running"], found["runs"][0]["state"]) == (False, "running")
     assert (found["runs"][0]["generations"], found["runs"][0]["generations_planned"]) == (1, 2)
     assert found["runs"][1]["written"] is None
-    assert "not running, 4 pending" in conevo("campaign", "status", "tiny")[1]
+    assert "not running, 3 pending, 1 interrupted\n" in conevo("campaign", "status", "tiny")[1]

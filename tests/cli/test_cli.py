@@ -131,6 +131,20 @@ def test_an_interrupted_run_is_shown_and_resumed(say, tmp_path: Path) -> None:
     assert content(path) == content(evolve_tiny(tmp_path / "whole", run__generations=60).path)
 
 
+def test_an_interrupted_extension_says_which_length_its_testing_phase_is_of(
+    say, tmp_path: Path
+) -> None:
+    run = evolve_tiny(tmp_path / "run")
+    assert "former length" not in say("show", "run").out
+    run.resume(generations=60, time_limit=1e-6, threads=1)
+    former = "Of the former length, 5 generations; the new one is tested when it is finished:\n"
+    assert former + "Testing phase, 3 fresh" in say("show", "run").out
+    run.resume(threads=1)
+    shown = say("show", "run").out
+    assert "Testing phase, 3 fresh" in shown
+    assert "former length" not in shown
+
+
 def test_lists(say) -> None:
     worlds = json.loads(say("list", "worlds", "--json").out)
     assert [row["world"] for row in worlds] == list(conevo.WORLDS)

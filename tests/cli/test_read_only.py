@@ -119,3 +119,25 @@ def test_a_mounted_archive_is_read(archive, tmp_path):
     assert done.returncode == 0, done.stderr
     made = {path.name for path in tmp_path.iterdir()}
     assert made == {"all.py", "archive", "report", "page.html", "film.gif"}
+
+
+def test_a_report_is_silent_about_folders_for_fonts(finished, tmp_path):
+    """Matplotlib keeps fonts in the home directory, which may not be there to be written."""
+    code = "from conevo.cli.main import main; main(['report', {!r}, '--out', {!r}])"
+    said = subprocess.run(
+        [sys.executable, "-c", code.format(str(finished), str(tmp_path / "report"))],
+        env=os.environ | {"MPLCONFIGDIR": "/proc/none"},
+        capture_output=True,
+        text=True,
+    )
+    assert (said.returncode, said.stderr) == (0, "")
+
+
+def test_no_place_for_compiled_kernels_is_not_the_working_directory(tmp_path):
+    said = subprocess.run(
+        [sys.executable, "-c", "from conevo.kernels import engine; engine.start()"],
+        env=os.environ | {"WARP_CACHE_PATH": "", "XDG_CACHE_HOME": str(tmp_path / "cache")},
+        cwd=tmp_path,
+    )
+    assert said.returncode == 0
+    assert [path.name for path in tmp_path.iterdir()] == ["cache"]

@@ -166,7 +166,8 @@ def test_a_shaping_that_has_not_begun_is_shown_and_has_no_team(say, tmp_path: Pa
     start_shaping(["rover/complex-1", "rover/complex-2"], preset="smoke", out=tmp_path / "here")
     assert "0 of 2 stages begun" in say("show", "here").out
     said = say("test", "here")
-    assert (said.code, said.err) == (2, "conevo: error: here has no finished generation yet\n")
+    line = "conevo: error: here has no finished generation yet, so there is no team\n"
+    assert (said.code, said.err) == (2, line)
 
 
 def test_shape_prey_leaves_prey_for_the_pursuit_world(say) -> None:

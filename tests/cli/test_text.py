@@ -15,7 +15,8 @@ from conevo.cli.progress import Display, Pace
 from conevo.cli.summary import exchange_text, run_text
 from conevo.cli.summary import test_text as text_of_test
 from conevo.cli.text import bars, castes, duration, neurons, number, progress, spread, table
-from runs.tiny import evolve_tiny
+from conevo.terms import counted
+from runs.tiny import TASK, evolve_tiny, tiny_settings
 
 
 @pytest.mark.parametrize(
@@ -158,3 +159,31 @@ def test_the_live_view_names_all_that_is_asked_of_it(tmp_path: Path) -> None:
     ):  # fmt: skip
         assert words in shown
     assert shown.splitlines()[3].startswith("generation 5/5")  # the bar has a line of its own
+
+
+def test_one_of_a_thing_is_not_many() -> None:
+    assert [counted(n, "fresh scenario") for n in (0, 1, 2, 1200)] == [
+        "0 fresh scenarios",
+        "1 fresh scenario",
+        "2 fresh scenarios",
+        "1,200 fresh scenarios",
+    ]
+
+
+def test_a_run_of_one_of_everything_is_told_in_the_singular(say) -> None:
+    ones = ("generations", "n_finalists", "n_validations", "n_tests")
+    settings = tiny_settings("cone") | {f"run.{name}": 1 for name in ones}
+    sets = [word for key, value in settings.items() for word in ("--set", f"{key}={value}")]
+    said = say("run", TASK, "--preset", "smoke", *sets, "--out", "run")
+    assert "Testing phase, 1 fresh scenario (mean" in said.out
+    assert "the best of 1 finalist in 1 validation scenario\n" in said.out
+    assert "\n1 of 1 generation, " in said.out
+    said = say("test", "run", "--on", "complex-2", "--robots", "2")
+    assert ", 1 fresh scenario (mean" in said.out
+    assert "complex-2, 2 robots\n" in said.out
+    start = ("campaign", "start", "rover-simple", "--preset", "smoke", "--seeds", "1", "--dry-run")
+    assert "only 1 core to use" in say(*start, "--threads", "2", "--cores", "1").err
+    every = re.compile(r"\b1 (?!times)[a-z-]+s\b", re.I)
+    for verb in ("show run", "test run", "run --config run/config.toml --dry-run"):
+        said = say(*verb.split())
+        assert not every.findall(said.out), verb

@@ -47,9 +47,11 @@ world = ["rover/complex-1"]
 method = {methods}
 [settings]
 {settings}
+"""
+FAILS = """
 [[where]]  # a budget that pays for nothing: such a run always fails
 method = "hetcne"
-settings = {{ "method.genotypes" = 20, "run.budget_evaluations" = 1 }}
+settings = { "method.genotypes" = 20, "run.budget_evaluations" = 1 }
 """
 
 COORDINATORS: list[subprocess.Popen[str]] = []
@@ -62,7 +64,8 @@ def campaign(tmp_path):
     def make(settings, seeds=1, methods=("homcne",)):
         path = tmp_path / "plan.toml"
         lines = [f'"{key}" = {value}' for key, value in (settings | FEW).items()]
-        path.write_text(PLAN.format(seeds=seeds, methods=list(methods), settings="\n".join(lines)))
+        text = PLAN.format(seeds=seeds, methods=list(methods), settings="\n".join(lines))
+        path.write_text(text + FAILS * ("hetcne" in methods))
         return create(read_plan(path), tmp_path / "campaign")
 
     return make

@@ -312,7 +312,7 @@ def test_stages_are_numbered_through(tmp_path):
         run = one(watched)
     assert (run["kind"], run["stage"], run["n_stages"]) == ("shaping", 2, 3)
     assert (run["generation"], run["generations"], run["evaluations"]) == (5, 12, 500)
-    assert run["task"] == "rover-v1/complex-3"
+    assert run["task"] == "rover-v1/complex-1 to complex-3"
     assert (run["champion_stage"], run["champion"]) == (2, 1)
     assert run["share"] == pytest.approx((1 + 2 / 4 + 0) / 3, abs=1e-4)
     assert run["ends_at"] == 2000 + (2 + 5) * 2.0

@@ -329,9 +329,17 @@ def test_a_server_that_goes_and_comes_back(tab, runs, complaints):
 def test_it_fits_windows_of_all_sizes(live):
     live.click("#runs tr[data-label=done] td")
     live.wait_for_selector("#chart-castes canvas")
-    for width in (1600, 900, 420):
+    for width in (1600, 900, 390):
         live.set_viewport_size({"width": width, "height": 800})
         assert overflow(live) <= 0
+
+
+def test_the_table_below_a_chart_is_no_wider_than_the_chart(live):
+    live.set_viewport_size({"width": 1280, "height": 800})
+    live.wait_for_selector(".standings td")
+    assert overflow(live) <= 0
+    wide = "all => all.map((one) => one.scrollWidth - one.clientWidth)"
+    assert live.eval_on_selector_all("#panels .wide", wide) == [0]
 
 
 def test_an_empty_folder_says_so(tab, tmp_path):

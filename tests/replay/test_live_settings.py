@@ -1,10 +1,11 @@
 """Runs with other settings have curves, medians and names of their own."""
 
+import json
 import tomllib
 
 import tomli_w
 
-from conevo.replay.live.settings import comparisons, factors
+from conevo.replay.live.settings import comparisons, differences, factors
 from conevo.replay.live.watched import Watched
 from replay.followed import write_run, write_shaping
 
@@ -71,8 +72,58 @@ def test_runs_that_differ_in_very_much_are_still_told_apart(tmp_path):
 def test_a_shaping_is_not_a_run_of_its_last_stage(tmp_path):
     write_shaping(tmp_path / "shaped", [(3, 3), (3, 3)])
     write_run(tmp_path / "run", 3, world="rover-v1/complex-2", generations=3)
-    ((by, _, series),) = panels_in(tmp_path)
-    assert (by, sorted(map(len, series.values()))) == ("variant", [1, 1])
+    titles = [panel["task"] for panel in Watched(folders=[tmp_path]).snapshot()["panels"]]
+    assert titles == ["rover-v1/complex-2", "rover-v1/complex-1 to complex-2"]
+    assert panels_in(tmp_path) == [
+        ("method", "", {"cone": ["run"]}),
+        ("method", "", {"cone": ["shaped"]}),
+    ]
+
+
+def declare(path, **about):
+    """Write what a run's provenance says."""
+    (path / "provenance.json").write_text(json.dumps(about))
+
+
+def test_runs_from_other_origins_have_medians_of_their_own(tmp_path):
+    begun = [("a", 1, "A", "aaaaaaaa"), ("b", 2, "A", "aaaaaaaa"), ("c", 1, "B", "bbbbbbbb")]
+    for name, seed, origin, checkpoint in begun:
+        path = write_run(tmp_path / name, 2, seed=seed)
+        declare(path, origin={"path": f"runs/{origin}", "checkpoint": checkpoint})
+    champion = {"path": "runs/A", "checkpoint": "cccccccc", "of": "champion"}
+    declare(write_run(tmp_path / "d", 2), origin=champion)
+    write_run(tmp_path / "e", 2)
+    assert panels_in(tmp_path) == [
+        (
+            "variant",
+            "",
+            {
+                "from=A (aaaaaa)": ["a", "b"],
+                "from=B (bbbbbb)": ["c"],
+                "from=champion of A (cccccc)": ["d"],
+                "no from": ["e"],
+            },
+        )
+    ]
+
+
+def test_runs_by_other_code_have_medians_of_their_own_once_they_have_begun(tmp_path):
+    sessions = {name: [{"conevo": "0.2", "code": name}] for name in "xy"}
+    for name, made in (("a", "x"), ("b", "x"), ("c", "y")):
+        declare(write_run(tmp_path / name, 2), sessions=sessions[made])
+    declare(write_run(tmp_path / "d", 2), sessions=sessions["x"] + sessions["y"] * 2)
+    assert panels_in(tmp_path)[0][2] == {
+        "code=0.2 (x)": ["a", "b"],
+        "code=0.2 (y)": ["c"],
+        "code=0.2 (x) + 0.2 (y)": ["d"],
+    }
+    assert differences(["cone"] * 2, [(("run.code", "x"),), ()]) == [{}, {}]
+
+
+def test_a_damaged_provenance_sets_nothing_apart(tmp_path):
+    for k, about in enumerate(({"origin": 5, "sessions": {}}, {"sessions": [7, {"code": [1]}]})):
+        declare(write_run(tmp_path / f"r{k}", 2), **about)
+    assert sum(len(lines) for _, _, of in panels_in(tmp_path) for lines in of.values()) == 2
 
 
 def test_factors_of_some_runs_of_a_plan_are_compared_with_the_others():

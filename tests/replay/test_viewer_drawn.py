@@ -290,6 +290,9 @@ def test_events_jump(tab, epoch, tmp_path):
         "#events-0 [data-event]", "all => all.map((one) => [+one.dataset.event, +one.dataset.t])"
     )
     assert sorted(listed) == [[k, event.t] for k, event in enumerate(events)]
+    cut = "all => all.filter((one) => one.scrollWidth > one.clientWidth && one.clientWidth).length"
+    tab.set_viewport_size({"width": 1280, "height": 800})
+    assert tab.eval_on_selector_all("#events-0 span, .lanes em", cut) == 0
     for k in (0, len(events) // 2, len(events) - 1):
         button = tab.locator(f"#events-0 [data-event='{k}']")
         assert events[k].text in button.text_content()

@@ -176,6 +176,39 @@ def test_a_finished_run_by_other_code_is_looked_at_and_tested(tmp_path: Path) ->
     assert conevo.Run(run.path).test(threads=1) == run.test_result["champion"]
 
 
+def test_the_code_of_an_origin_is_shown_where_it_is_another(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def shown(*command: str) -> tuple[str, str]:
+        with pytest.raises(SystemExit, match="0"):
+            main(command)
+        out, error = capsys.readouterr()
+        return out, error
+
+    with monkeypatch.context() as other:
+        for module in ("provenance", "code"):
+            other.setattr(f"conevo.runs.{module}.code_digest", lambda: "abc123abc123")
+        origin = evolve_tiny(tmp_path / "origin")
+    now, then = (f"{conevo.__version__} ({code})" for code in (code_digest(), "abc123abc123"))
+    assert shown("test", str(origin.path)) == (
+        shown("test", str(origin.path), "--threads", "1")[0],
+        f"conevo: note: {origin.path} was made by conevo {then}, and this is {now}, "
+        f"which may give other results\n",
+    )
+    sets = [
+        word for key, value in tiny_settings("cone").items() for word in ("--set", f"{key}={value}")
+    ]
+    for name, options in (("run", ["--from"]), ("bred", ["--from-champion"])):
+        run = str(tmp_path / name)
+        shown("run", TASK, "--preset", "smoke", *sets, *options, str(origin.path), "--out", run)
+        generation = conevo.Run(run).provenance["origin"]["generation"]
+        line = f" of {origin.path}, generation {generation} (made by {then}, this run by {now})\n"
+        assert line in shown("show", run)[0] + "\n"
+        assert shown("test", run)[1] == ""
+    shown("run", TASK, "--preset", "smoke", *sets, "--from", run, "--out", f"{run}-again")
+    assert "made by" not in shown("show", f"{run}-again")[0]
+
+
 def test_the_world_is_described_where_no_world_is_needed(tmp_path: Path) -> None:
     header = evolve_tiny(tmp_path / "run").provenance["world"]
     assert (header["name"], header["environment"], header["n_robots"]) == (

@@ -20,6 +20,7 @@ import conevo
 from conevo.errors import EnvironmentFailure, UsageError
 from conevo.evolution.methods.registry import METHODS
 from conevo.rng import fold
+from conevo.runs.code import last_code
 from conevo.runs.evolved_prey import PREY_TASKS
 from conevo.runs.shaping import Shaping, start_shaping, tasks_up_to
 from conevo.worlds.pursuit import prey_sets
@@ -78,6 +79,7 @@ def test_every_stage_begins_with_the_populations_of_the_one_before(
         assert origin == {
             "path": str(before.path),
             "run_id": before.config.run_id,
+            "code": last_code(before.provenance),
             "generation": 3,
             "checkpoint": checkpoint,
         }

@@ -154,7 +154,7 @@ def test_a_damaged_log_is_not_cut(tmp_path: Path) -> None:
 def test_a_log_shorter_than_the_checkpoint_is_refused(tmp_path: Path) -> None:
     store = fresh_store(tmp_path / "run")
     store.append(record(0))
-    with pytest.raises(UsageError, match="has 1 generations, the checkpoint is at 2"):
+    with pytest.raises(UsageError, match="has 1 generation, the checkpoint is at 2"):
         store.cut_generations(2)
 
 

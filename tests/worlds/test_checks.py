@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import json
 import re
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -81,7 +84,7 @@ DECLARED = {
     "infinite": ("np.float32) for key", "np.float32) * np.float32('inf') for key", "scenarios",
                  "places has values that are not finite"),
     "missing": ("places=places, ", "", "world",
-                f"bad.py:{line_with('places=places')}: TypeError: LightSc"),
+                f"bad.py:{line_with('places=places')}: in scenarios: TypeError: LightSc"),
     "name": ("1.0 - wp.length", "one - wp.length", "world",
              f"bad.py:{line_with('1.0 - wp.length')}: Referencing undefined symbol: one (in "
              "resolve: team.fitness[i] = one -"),
@@ -187,6 +190,39 @@ def test_a_mistake_in_what_is_played_is_one_line(name: str, tmp_path: Path) -> N
     assert len(found) <= 2
 
 
+NOTED = {
+    "heuristic": (
+        '("idler",)', '("idler", "runner")', "heuristics",
+        "'runner' does exactly what a network with equal outputs does: does act have a case for "
+        "heuristic 1?",
+    ),
+    "environments": (
+        '("dark-1",)', '("dark-1", "dark-2")', "environments",
+        "dark-2 is the same as dark-1: in its parameters, and in a scenario of one key",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", NOTED)
+def test_what_is_declared_and_never_used_is_noted(name: str, tmp_path: Path) -> None:
+    old, new, topic, words = NOTED[name]
+    file = written(tmp_path / "odd.py", (old, new))
+    found = [one for one in findings(f"{file}:dark-1") if one.status in ("note", "problem")]
+    assert [(one.status, one.topic, one.text) for one in found] == [("note", topic, words)]
+
+
+def test_another_environment_whose_scenarios_are_wrong_is_a_problem(tmp_path: Path) -> None:
+    fails = "        if self.environment == 'dark-2':\n            places = places[:0]\n"
+    made = "        return LightScenarios("
+    file = written(
+        tmp_path / "bad.py", ('("dark-1",)', '("dark-1", "dark-2")'), (made, fails + made)
+    )
+    assert problems(file) == [
+        ("environments", "dark-2: LightScenarios.places must have a row for each of 1 scenarios, "
+                         "got shape [0, 4, 2]"),
+    ]  # fmt: skip
+
+
 def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str]:
     with pytest.raises(SystemExit) as caught:
         main(["check", *arguments])
@@ -229,13 +265,107 @@ def test_an_index_outside_an_array_is_found_with_its_line(
     assert out.endswith("1 problem\n")
 
 
+CALLED = """
+@wp.func
+def beyond(team: Team, i: int) -> int:
+    if i > 5:
+        return i
+    return i + 70
+
+
+@wp.func
+def both(team: Team, i: int):
+    return beyond(team, i), i
+
+
+@wp.func
+def reset("""
+MISPLACED = {
+    "after a call": (
+        "team.x[i] = team.y[\n        beyond(team, i)\n    ]",
+        "in `team.x[i] = team.y[ beyond(team, i) ]`",
+    ),
+    "after two": ("u, v = both(team, i)\n    team.x[v] = team.y[u]", "in `team.x[v] = team.y[u]`"),
+    "loop": (
+        "k = int(0)\n    while team.x[k] < 7.0:\n        k += 1\n        if k < 2:\n"
+        "            continue",
+        "in `while team.x[k] < 7.0:`",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", MISPLACED)
+def test_the_line_is_the_one_that_reads_not_the_one_that_ran_before(
+    name: str, tmp_path: Path
+) -> None:
+    lines, words = MISPLACED[name]
+    a = "    a = team.chosen[i]\n"
+    file = written(
+        tmp_path / "bad.py", ("\n@wp.func\ndef reset(", CALLED), (a, f"{a}    {lines}\n")
+    )
+    at = 1 + file.read_text().splitlines().index(
+        f"    {lines}".splitlines()[name != "after a call"]
+    )
+    found = [one.text for one in checking.check(str(file)) if one.status == "problem"]
+    assert found == [f"{file}:{at}: {words} an index lies outside its array"]
+
+
 def test_a_check_that_does_not_go_on_is_ended(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(checking, "MOST_SECONDS", 0.1)
-    code, out = run(capsys, str(written(tmp_path / "light.py")), "--json")
+    monkeypatch.setattr(checking, "STEP_SECONDS", 2)
+    monkeypatch.setattr(checking, "AGAIN_SECONDS", 2)
+    endless = "k = int(0)\n    while True:\n        k = 1 - k\n    a = team.chosen[i]"
+    file = written(tmp_path / "light.py", ("a = team.chosen[i]", endless))
+    code, out = run(capsys, str(file), "--json")
     assert code == 2
-    assert json.loads(out)[-1]["text"] == "the check did not end: a loop may run forever"
+    n = line_with("a = team.chosen[i]")
+    assert re.fullmatch(
+        rf"{file}:({n}|{n + 1}|{n + 2}): in `.*` the check did not end: a loop may run forever",
+        json.loads(out)[-1]["text"],
+    )
+
+
+def test_only_what_is_running_must_go_on_soon() -> None:
+    """Kernels that are compiled after a finding take the time they take."""
+    code = (
+        "import time; print('[\"ok\"]', flush=True); time.sleep(1);"
+        "print('[\"running\"]', flush=True); time.sleep(60)"
+    )
+    child = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE)
+    assert child.stdout is not None
+    began = time.monotonic()
+    with open(child.stdout.fileno(), closefd=False) as lines:
+        assert [*checking._heard(child, lines, 0.5)] == [["ok"], ["running"]]
+    assert 1.4 < time.monotonic() - began < 30
+    child.stdout.close()
+
+
+@pytest.mark.parametrize(("line", "words"), [
+    ("import os; os._exit(7)", "the process that checked it ended with exit status 7"),
+    ("import os; os._exit(0)", "the process that checked it ended with exit status 0"),
+    ("raise SystemExit(3)", f"bad.py:{line_with('shape = (self')}: in scenarios: SystemExit: 3"),
+])  # fmt: skip
+def test_a_world_that_ends_the_process_is_not_sound(
+    line: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shape = "        shape = (self"
+    file = written(tmp_path / "bad.py", (shape, f"        {line}\n{shape}"))
+    code, out = run(capsys, str(file))
+    assert (code, out.splitlines()[-1]) == (2, "1 problem")
+    assert words in out.splitlines()[-2]
+
+
+def test_a_machine_that_fails_says_nothing_of_the_world(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("WARP_CACHE_PATH", "/proc/none")
+    with pytest.raises(SystemExit) as caught:
+        main(["check", "rover/complex-1"])
+    out, err = capsys.readouterr()
+    assert caught.value.code == 3
+    assert "problem" not in out
+    assert re.fullmatch(r"conevo: error: compiled kernels cannot be kept in /proc/none/.*\n", err)
 
 
 def test_a_sound_world_has_no_problem_and_a_wrong_name_is_one_line(

@@ -305,6 +305,52 @@ def test_a_session_on_the_command_line(
     assert {row["status"] for row in listed} == {"finished"}
 
 
+SOME = "        if int(keys[0]) % 7 == 3:\n            "
+LATER = {
+    "raises": (
+        "        shape = (self",
+        f"{SOME}self.fail()\n        shape = (self",
+        "{file}:{line}: in scenarios: ValueError: boom; r keeps its copy of the world's file as it "
+        "is: correct yours, and start another run",
+    ),
+    "returns nothing": (
+        "        return LightScenarios(",
+        f"{SOME}return None\n        return LightScenarios(",
+        "world light-v1: scenarios: NoneType needs an array places, as Scene has one",
+    ),
+    "loses rows": (
+        "        return LightScenarios(",
+        f"{SOME}places = places[:0]\n        return LightScenarios(",
+        "world light-v1: scenarios: LightScenarios.places must have a row for each of 1 scenarios, "
+        "got shape [0, 4, 2]",
+    ),
+}
+FAIL = (
+    "    def simulation(self)",
+    "    def fail(self):\n        raise ValueError('boom')\n\n    def simulation(self)",
+)
+
+
+@pytest.mark.parametrize("name", LATER)
+def test_a_world_that_fails_later_is_named_with_its_line_and_the_call(
+    name: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    old, new, words = LATER[name]
+    file = written(tmp_path / "bad.py", (old, new), FAIL)
+    line = 1 + file.read_text().splitlines().index("        raise ValueError('boom')")
+    settings = tiny_settings("homcne") | {"run.epochs": 1, "run.generations": 40}
+    sets = [w for k, v in settings.items() if k != "world.n_robots" for w in ("--set", f"{k}={v}")]
+    task = [f"{file}:dark-1", "--method", "homcne", "--preset", "smoke", "--quiet"]
+    code, out, err = say(capsys, "run", *task, "--out", "r", *sets)
+    assert (code, out) == (2, "")
+    assert err == f"conevo: error: {words.format(file=file, line=line)}\n"
+    assert conevo.Run("r").done()[0] > 0
+
+
 ENTRY = TEXT[TEXT.index("ENTRY = ") :]
 BAD = {
     "none": ("", "has no ENTRY"),

@@ -22,12 +22,22 @@ export function options(xLabel: string, yLabel: string, height: number): uPlot.O
     scales: { x: { time: false } },
     axes: [
       { ...axis, label: xLabel, size: 30, values: ticks, space: 60, incrs: WHOLE },
-      { ...axis, label: yLabel, size: 52, values: ticks },
+      { ...axis, label: fitting(yLabel, height), size: 52, values: ticks },
     ],
     series: [],
     cursor: { points: { size: 6 }, drag: { x: true, y: false } },
     padding: [10, 22, 0, 0],
   };
+}
+
+/** Return a label that fits beside a chart that high: without its direction, or its unit, if need be. */
+function fitting(label: string, height: number): string {
+  const pen = document.createElement("canvas").getContext("2d");
+  if (!pen) return label;
+  pen.font = FONT;
+  const room = height - 50; // it is centred on the area between the upper rim and the numbers below
+  const shorter = [label, label.replace(/, \w+ is better\)$/, ")"), label.replace(/ \([^(]*\)$/, "")];
+  return shorter.find((text) => pen.measureText(text).width <= room) ?? shorter[2]!;
 }
 
 /** A chart in a place of the page, as wide as the place. It is made anew when its options change. */

@@ -93,7 +93,12 @@ export class Marks {
     for (const measure of this.stage.measures) {
       const value = make("b");
       this.values.push(value);
-      const row = make("span", { title: measure.name }, make("em", {}, measure.name), value);
+      const row = make(
+        "span",
+        { class: "measure", title: measure.name },
+        make("em", {}, measure.name),
+        value,
+      );
       row.style.height = `${CURVE}px`;
       this.right.append(row);
     }

@@ -147,8 +147,8 @@ def caste_courses(
 ) -> tuple[Floats, dict[Cell, dict[str, Floats]]]:
     """Return n points [X] and each cell's share of the robots [X] in each caste.
 
-    Of the fittest team of each generation, mean over runs. Points before the first generation of a
-    cell's first run show that generation.
+    Of the fittest team of each generation, mean over runs; NaN before the first generation of a
+    cell's first run.
     """
     x = histories.grid(n)
     made = {}
@@ -157,9 +157,8 @@ def caste_courses(
         counts = has.sum(axis=0)
         if not counts.any() or not shares.any():
             continue
+        present = shares.any(axis=0)
         shares[counts > 0] /= counts[counts > 0, None]
-        shares[counts == 0] = shares[(counts > 0).argmax()]
-        made[cell] = {
-            name: shares[:, k] for k, name in enumerate(histories.castes) if shares[:, k].any()
-        }
+        shares[counts == 0] = math.nan
+        made[cell] = {name: shares[:, k] for k, name in enumerate(histories.castes) if present[k]}
     return x, made

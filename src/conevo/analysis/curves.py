@@ -146,8 +146,9 @@ def stacks(
     """Draw shares of a whole along an axis, a panel per row and column.
 
     Args:
-        panels: (row, column) -> name in the legend -> shares [X] in [0, 1].
-        x: [X].
+        panels: (row, column) -> name in the legend -> shares [X] in [0, 1]; NaN where there are
+            none.
+        x: [X], above 0, where the axis begins.
         colours: name -> colour, from below.
         x_label: under the panels.
         y_label: left of them.
@@ -166,7 +167,7 @@ def stacks(
         colours = {drawable(name): colour for name, colour in colours.items()}
         high = len(rows) * (shape[1] + 0.12) + above * LINE + 0.5
         figure, axes = one_panel(high + legend_height(list(colours), width), width)
-        limits = (float(x[0]), float(x[-1]))
+        limits = (0.0, float(x[-1]))
         field = Panels(axes, len(rows), len(columns), limits, (0.0, 1.0), shape)
         used = [(rows.index(row), columns.index(column)) for row, column in panels]
         below = [np.zeros(len(x)) for _ in panels]

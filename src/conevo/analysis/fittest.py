@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from conevo.errors import UsageError
+from conevo.errors import UsageError, without_team
 from conevo.runs.champions import Team
 from conevo.runs.lab import Lab
 from conevo.runs.run import Run
@@ -18,7 +18,7 @@ def equip(run: Run, threads: int | None = None) -> tuple[Team, Lab]:
     """
     team, about = run.champion, run.provenance
     if team is None:
-        raise run.without_team()
+        raise without_team(run.path, run.generations())
     lab = Lab.equip(run.config, threads, about["device"])
     if lab.simulator.fingerprint != about["kernel_hash"]:
         raise UsageError(

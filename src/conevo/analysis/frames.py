@@ -30,6 +30,7 @@ SCHEMA: dict[str, dict[str, str]] = {
         "seed": "BIGINT",
         "variant": "VARCHAR",
         "generations": "INTEGER",
+        "planned_evaluations": "BIGINT",
         "evaluations": "BIGINT",
         "team_steps": "BIGINT",
         "seconds": "DOUBLE",
@@ -113,13 +114,16 @@ SCHEMA: dict[str, dict[str, str]] = {
 }
 """Columns of each table and their DuckDB types, as written to and read from NAME.parquet.
 
-``runs``: title is the method's name as published; exchanges is the number of pairs of
-sub-populations that recombined between populations, in the mean of the generations, exchange_share
-that of the pairs that could have; both are NULL for methods that never do. ``measures``: the
-world's, as it declares them; of a measure that is not listed larger is better.
+``runs``: title is the method's name as published; planned_evaluations is the budget of team
+evaluations that a run was given, NULL without one; evaluations is what it spent; exchanges is the
+number of pairs of sub-populations that recombined between populations, in the mean of the
+generations, exchange_share that of the pairs that could have; both are NULL for methods that never
+do. ``measures``: the world's, as it declares them; of one that is not listed larger is better.
 """
 
 
+QUERY = '"SELECT method, count(*) FROM runs GROUP BY ALL"'
+QUERIES = ("SELECT", "EXPLAIN", "MULTI")  # as DuckDB names them: VALUES is a SELECT, PIVOT MULTI
 NEAR = 0.2  # budgets that differ by no more are one
 
 
@@ -158,7 +162,9 @@ class Tables:
     ``budgets`` (run, budget) tells which runs may be compared: those of one world, one preset, and
     about equal numbers of team evaluations and of team-steps per evaluation; stages of shapings
     apart. Choice: "about equal" is within 20 %, as methods do not divide a budget evenly and CONE
-    spends some on type C. A run that ended at its target counts with those it saved evaluations to.
+    spends some on type C. A run that ended because the next generation would have exceeded its
+    budget counts with that budget, whatever it spent of it, and so does one that ended at its
+    target before. Without a budget, the latter counts with those it saved evaluations to.
 
     Use as a context, or ``close`` it.
     """
@@ -182,13 +188,30 @@ class Tables:
             remember_title(name, title or name)
         self._connection.execute("CREATE TABLE budgets (run VARCHAR, budget VARCHAR)")
         rows = self.query(
-            "SELECT run, world, preset, contains(run, '/stage-'), stopped_by, evaluations,"
-            " team_steps FROM runs ORDER BY ALL"
+            "SELECT run, world, preset, contains(run, '/stage-'), stopped_by, planned_evaluations,"
+            " evaluations, team_steps FROM runs ORDER BY ALL"
         )[1]
         named = sorted(_budgets(rows).items())
         self._connection.executemany("INSERT INTO budgets VALUES (?, ?)", named or [("", "")])
         self._connection.execute("SET enable_external_access = false")
         self._connection.execute("SET lock_configuration = true")
+
+    def ask(self, sql: str) -> tuple[list[str], list[tuple[Any, ...]]]:
+        """Return what ``query`` does of a text that must only ask: anybody's.
+
+        Raises:
+            UsageError: a statement that is not a query, or as ``query``.
+        """
+        import duckdb
+
+        try:
+            statements = self._connection.extract_statements(sql)
+        except duckdb.Error as error:
+            raise _refused(error) from error
+        for one in statements:
+            if one.type.name not in QUERIES:
+                raise UsageError(f"{one.type.name} is not a query; ask as in {QUERY}")
+        return self.query(sql)
 
     def query(self, sql: str) -> tuple[list[str], list[tuple[Any, ...]]]:
         """Return the column names and the rows that one SQL statement gives.
@@ -201,9 +224,7 @@ class Tables:
         try:
             result = self._connection.execute(sql)
             if result is None or not result.description:
-                raise UsageError(
-                    'no SQL statement, as in "SELECT method, count(*) FROM runs GROUP BY ALL"'
-                )
+                raise UsageError(f"no SQL statement, as in {QUERY}")
             return [str(column[0]) for column in result.description], result.fetchall()
         except duckdb.Error as error:
             raise _refused(error) from error
@@ -311,11 +332,14 @@ def _budgets(rows: list[tuple[Any, ...]]) -> dict[str, str]:
     """Return the budget of each run in words.
 
     Args:
-        rows: run, world, preset, whether a stage of a shaping, stopped_by, evaluations, team_steps.
+        rows: run, world, preset, whether a stage of a shaping, stopped_by, planned evaluations,
+            evaluations, team_steps.
     """
     scales = defaultdict(list)
-    for run, world, preset, is_stage, stopped_by, evaluations, steps in rows:
-        one = (stopped_by == "target", evaluations, steps / max(evaluations, 1), run)
+    for run, world, preset, is_stage, stopped_by, planned, evaluations, steps in rows:
+        counted = (stopped_by in ("budget", "target") and planned) or evaluations
+        is_saver = stopped_by == "target" and not planned
+        one = (is_saver, counted, steps / max(evaluations, 1), run)
         scales[world, preset, is_stage].append(one)
     budgets = {}
     for (_, preset, is_stage), runs in scales.items():

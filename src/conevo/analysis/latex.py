@@ -3,16 +3,16 @@
 A table is no wider than ``TEXT_WIDTH``: its letters are those of Computer Modern, its headings are
 broken into lines, sentences into paragraphs, and what is still too wide is split by columns, each
 part with the columns that name its rows. Tables need the packages array and booktabs, figures
-graphicx.
+graphicx, and the document of all of them hyperref.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-from conevo.analysis.exhibits import Column, Exhibit, Figure, Table
+from conevo.analysis.exhibits import Column, Figure, Section, Table
 
 __all__ = ["document", "figures_to_latex", "to_latex"]
 
@@ -121,19 +121,41 @@ def figures_to_latex(figures: Sequence[Figure]) -> str:
     return "\n".join(made)
 
 
-def document(title: str, exhibits: Sequence[Exhibit]) -> str:
-    """Return a document of all tables and figures, to be compiled next to them."""
-    tables = [one.name for one in exhibits if isinstance(one, Table) and one.rows]
+def document(title: str, sections: Sequence[Section]) -> str:
+    """Return a document of all tables and figures, to be compiled next to them.
+
+    In the order of the page and under its headings, which are in the contents and the bookmarks.
+    """
     return "\n".join([
         r"\documentclass[10pt]{article}",
         r"\usepackage{array,booktabs,graphicx}",
+        r"\usepackage[hidelinks]{hyperref}",
         r"\begin{document}",
         rf"\section*{{{_escaped(title)}}}",
-        *(rf"\input{{tables/{name}.tex}}\clearpage" for name in tables),
-        r"\input{figures.tex}",
+        r"\tableofcontents",
+        r"\clearpage",
+        *(line for section in sections for line in _inside(section, 0)),
         r"\end{document}",
         "",
     ])  # fmt: skip
+
+
+def _inside(section: Section, level: int) -> Iterator[str]:
+    """Yield a heading and what is below it; nothing if there is no table or figure."""
+    shown = [one for one in section.exhibits if one.rows]
+    if not any(one.rows for one in section.all_exhibits()):
+        return
+    yield rf"\{'sub' * level}section{{{_escaped(section.title)}}}"
+    yield r"\suppressfloats[t]"  # none above its heading
+    for one in shown:
+        if isinstance(one, Table):
+            yield rf"\input{{tables/{one.name}.tex}}\clearpage"
+        elif isinstance(one, Figure):
+            yield figures_to_latex([one])
+    if shown:
+        yield r"\clearpage"
+    for part in section.sections:
+        yield from _inside(part, level + 1)
 
 
 def _parts(table: Table, cells: Sequence[Sequence[str]]) -> list[_Part]:

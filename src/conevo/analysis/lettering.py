@@ -26,7 +26,8 @@ __all__ = [
 FONT = "DejaVu Sans"
 SIZE, SMALL = 7.5, 7.0  # points: of text, and of numbers along axes; journals ask for 7 at least
 LINE = 1.2 * SIZE / 72  # inches from one line to the next
-BREAKS = re.compile(r"(?<=[\s,_/=.·-])(?=\S)")  # a line may end after any of these
+# A line may end after any of these, but not inside a number such as 1,000, 0.5, -2 or 1e-5.
+BREAKS = re.compile(r"(?<=[\s_/=·])(?=\S)|(?<=[,.])(?=[^\s\d])|(?<=\w-)(?<!\de-)(?=\S)")
 
 
 class Labels(NamedTuple):

@@ -16,7 +16,7 @@ from conevo.analysis.behaviours import BEHAVIOURS, Rules
 from conevo.analysis.captures import COLLECTIVES, COMPOSITIONS, Capture, most_frequent
 from conevo.analysis.lesions import WHOLE, lesion
 from conevo.analysis.pursuit import lab_of, observe
-from conevo.errors import UsageError
+from conevo.errors import UsageError, without_team
 from conevo.rng import fold
 from conevo.runs.run import Run
 from conevo.runs.shrinkage import shrinkage
@@ -130,7 +130,7 @@ def fittest_runs(runs: Iterable[Run]) -> dict[str, Run]:
     by_method: dict[str, list[Run]] = {}
     for run in runs:
         if run.champion is None:
-            raise UsageError(f"{run.path} has no finished generation yet, so no team to observe")
+            raise without_team(run.path, run.generations())
         by_method.setdefault(run.config.method, []).append(run)
     if not by_method:
         raise UsageError("no runs were given, so there is no table")

@@ -6,7 +6,7 @@
     tables/NAME.tex       every table, for LaTeX with array and booktabs
     figures/NAME.svg|pdf  every figure
     figures.tex           all of them with their captions, for LaTeX with graphicx
-    all.tex               a document of all tables and figures
+    all.tex               a document of all tables and figures, under the headings of the page
     numbers/NAME.csv      the numbers behind each of them, unrounded
     marl-eval.json        raw results for marl-eval
     manifest.json         digest of every file
@@ -143,7 +143,7 @@ def _files(campaign: Campaign, sections: list[Section]) -> Iterator[tuple[str, b
             yield f"figures/{one.name}.pdf", one.drawing.pdf
     drawn = [one for one in exhibits if isinstance(one, Figure)]
     yield "figures.tex", figures_to_latex(drawn).encode()
-    yield "all.tex", document(campaign.title, exhibits).encode()
+    yield "all.tex", document(campaign.title, sections).encode()
     yield "index.html", _page(campaign, sections).encode()
 
 

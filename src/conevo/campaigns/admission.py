@@ -14,6 +14,7 @@ from conevo.errors import UsageError
 from conevo.reading import DamagedFile, read_json
 from conevo.runs.code import current_code, last_code
 from conevo.runs.durable import replace_file
+from conevo.terms import quoted
 
 __all__ = ["admit_code", "admitted_codes"]
 
@@ -41,7 +42,7 @@ def admit_code(places: Places, labels: Iterable[str], accept: bool = False) -> N
         raise UsageError(
             f"{places.root} was begun by conevo {', '.join(codes)}, and this is {here}, which may "
             f"give other results: use that version, or continue with 'conevo campaign start "
-            f"{places.root} --accept-other-code'"
+            f"{quoted(places.root)} --accept-other-code'"
         )
     replace_file(places.code, json.dumps({"codes": [*codes, here]}, indent=1).encode() + b"\n")
 

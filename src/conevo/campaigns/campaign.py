@@ -24,6 +24,7 @@ import dataclasses
 import time
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from pathlib import Path
 
 from conevo.campaigns.admission import admit_code
@@ -41,8 +42,9 @@ from conevo.campaigns.work import planned_runs
 from conevo.errors import UsageError
 from conevo.reading import read_json
 from conevo.runs.directory import Directory, appearing
-from conevo.runs.durable import replace_file
+from conevo.runs.durable import is_there, replace_file
 from conevo.runs.time_limit import TimeLimit
+from conevo.terms import quoted
 from conevo.worlds.registry import resolve as resolve_world
 
 __all__ = ["ATTEMPTS", "CAMPAIGNS", "Campaign", "Stopped", "check", "create"]
@@ -67,7 +69,7 @@ def check(plan: Plan, path: Path) -> list[PlannedRun]:
         UsageError: a run that cannot be, or ``path`` holds a campaign that this does not extend.
     """
     runs = plan.write_out()
-    if Places(path).plan.is_file():
+    if is_there(Places(path).plan):
         check_plan(Campaign(path), {run.label: run for run in runs})
     return runs
 
@@ -91,7 +93,7 @@ def create(plan: Plan, path: Path, accept_other_code: bool = False) -> Campaign:
     plan = plan.mapped(lambda value: located(value, Path.cwd()))
     runs = check(plan, path)
     _build_worlds(runs)
-    if not Places(path).plan.is_file():
+    if not is_there(Places(path).plan):
         with appearing(path) as draft:
             places, texts = Places(draft), texts_of(plan, runs, draft)
             replace_file(places.plan, texts["plan"].encode())
@@ -108,12 +110,21 @@ def create(plan: Plan, path: Path, accept_other_code: bool = False) -> Campaign:
 
 
 def _build_worlds(runs: Iterable[PlannedRun]) -> None:
-    """Build the kernels of worlds in files of their own, whose authors may have made mistakes."""
-    for address in sorted({run.world for run in runs if ".py:" in run.world}):
-        from conevo.worlds.rollout import Rollout
+    """Build the kernels of all worlds, once for all runs, and before any of them begins.
 
+    Raises:
+        UsageError: a world in a file of its own, whose author made a mistake.
+        EnvironmentFailure: there is no place for compiled kernels.
+    """
+    from conevo.controllers.registry import DEFAULT, controller
+    from conevo.worlds.simulators import simulator
+
+    for address, name in sorted(
+        {(r.world, str(r.overrides.get("controller.name", DEFAULT))) for r in runs}
+    ):
         entry, environment = resolve_world(address)
-        Rollout(entry.build(environment, entry.params_class())).build()
+        built = entry.build(environment, entry.params_class())
+        simulator(built, controller(name, world=built))
 
 
 class Campaign:
@@ -217,7 +228,7 @@ class Campaign:
         """
         if not self.is_running:
             raise UsageError(
-                f"{self.path} is not running; see 'conevo campaign status {self.path}'"
+                f"{self.path} is not running; see 'conevo campaign status {quoted(self.path)}'"
             )
         replace_file(self.places.stop, b"")
 
@@ -259,12 +270,16 @@ class Campaign:
 
         Raises:
             UsageError: a coordinator is at work already, or other code has begun the campaign.
+            EnvironmentFailure: there is no place for compiled kernels, or for the campaign's files.
             Stopped: by ``stop``, or the time is over; the campaign can be carried on.
         """
         limit = time_limit if isinstance(time_limit, TimeLimit) else TimeLimit(time_limit)
         with self.locked():
             self.settle()
             self.admit_code()
+            left = [run for label, run in self.planned.items() if not self.is_finished(label)]
+            with suppress(UsageError):  # of a world: its runs record that
+                _build_worlds(left)
             self.places.stop.unlink(missing_ok=True)
             self._reconcile()
             try:

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import platform
-import re
 import sys
 from collections import Counter
 from collections.abc import Iterable, Sequence
 
 from conevo.errors import ConevoError, UsageError, shown
+from conevo.kernels.devices import CPU, DEVICE
 
 __all__ = ["CPU", "check_here", "main", "next_device", "parse_devices"]
-
-CPU = "cpu"
-DEVICE = re.compile(r"cpu|cuda(:\d{1,3})?")
 
 
 def parse_devices(text: str) -> tuple[str, ...]:

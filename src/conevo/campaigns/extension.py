@@ -20,6 +20,8 @@ from conevo.reading import read_json
 from conevo.runs.config import RunConfig
 from conevo.runs.directory import as_json
 from conevo.runs.durable import replace_file, writing
+from conevo.runs.inputs import INPUTS
+from conevo.terms import quoted
 
 if TYPE_CHECKING:
     from conevo.campaigns.campaign import Campaign
@@ -55,7 +57,8 @@ def check_plan(campaign: Campaign, runs: Mapping[str, PlannedRun]) -> None:
         campaign: that is there.
         runs: of the new plan, by label.
     """
-    advice = f"continue it with 'conevo campaign start {campaign.path}', or choose another --out"
+    start = f"conevo campaign start {quoted(campaign.path)}"
+    advice = f"continue it with '{start}', or choose another --out"
     cells: dict[str, str] = {}
     for label, planned in campaign.planned.items():
         if label not in runs:
@@ -101,6 +104,9 @@ def _cell(planned: PlannedRun) -> list[object]:
 def _why_not(old: list[RunConfig], new: list[RunConfig]) -> str:
     """Return why runs of one cell cannot go on as those of another, "" if they can."""
     for one, other in zip(old, new, strict=True):
+        if one.entry.digest != other.entry.digest:
+            file = Path(one.entry.file or other.entry.file).name
+            return f"was planned with another {file}, of which it keeps a copy in {INPUTS}/"
         if one.stem_id != other.stem_id:
             return "has other settings in this plan"
         for name in ("generations", "budget_evaluations"):

@@ -221,6 +221,13 @@ def _where(table: Any, of_all: Mapping[str, Any], place: str) -> Where:
     for name in conditions.get("world", ()):
         if name not in of_all["world"] and ".py" not in name:
             resolve_world(name)  # a condition on a world that does not exist never holds
+    for key in ("world", "method"):
+        names = conditions.get(key)
+        if names is not None and not any(n in of_all[key] or ".py" in n for n in names):
+            raise UsageError(
+                f"where.{key} = {shown(list(names))} {place} matches no run: factors.{key} is "
+                f"{', '.join(of_all[key])}"
+            )
     shape = _truth(table["shape"], "where.shape", place) if "shape" in table else None
     factors = _factors(_table(table, "factors", place), "where.factors", place)
     if twice := sorted(factors.keys() & of_all.keys()):

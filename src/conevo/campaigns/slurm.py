@@ -43,7 +43,7 @@ SCRIPT = """\
 #SBATCH --signal=B:USR1@{grace}
 #SBATCH --requeue
 #SBATCH --output=/dev/null
-{options}# {n_runs} runs in {tasks} tasks. Submit this file with sbatch.
+{options}# Runs: {n_runs}, tasks: {tasks}. Submit this file with sbatch.
 set -u
 campaign={campaign}
 runs=(

@@ -29,6 +29,7 @@ from conevo.runs.outline import Outline
 from conevo.runs.provenance import describe_world
 from conevo.runs.run import Run
 from conevo.runs.shrinkage import shrinkage
+from conevo.runs.store import Store
 
 __all__ = ["is_sealed", "seal_tables"]
 
@@ -55,8 +56,9 @@ def seal_tables(
 ) -> None:
     """Make the tables of these runs, unless they are there.
 
-    A run whose files are damaged is left out, and the manifest shows which and why; it is looked at
-    again the next time. A kill leaves the tables that were there before, or none.
+    A run whose files are damaged, or are not those that it was sealed with, is left out, and the
+    manifest shows which and why; it is looked at again the next time. A kill leaves the tables that
+    were there before, or none.
 
     Args:
         places: of the campaign.
@@ -126,6 +128,7 @@ def _rows(places: Places, planned: PlannedRun, cost: float) -> Iterator[tuple[st
         provenance, records, test = run.provenance, run.generations(), run.test_result
         if test is None or not records:
             raise DamagedFile(f"{path} is sealed, but lacks its generations or its testing phase")
+        Store(path).refuse_changed()
         world = provenance.get("world") or describe_world(run.config.build_world())  # 0.1.0: none
         measures = world["measures"]
         exchanges, share = exchanged(records)
@@ -177,6 +180,7 @@ def _run_row(
         "seed": run.seed,
         "variant": planned.variant,
         "generations": len(records),
+        "planned_evaluations": run.budget_evaluations or None,
         "evaluations": records[-1]["team_evaluations"],
         "team_steps": records[-1]["team_steps"],
         "seconds": sum(record["seconds"] for record in records),

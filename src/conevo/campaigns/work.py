@@ -26,6 +26,7 @@ from conevo.campaigns.places import Places
 from conevo.campaigns.plan import PlannedRun
 from conevo.campaigns.records import PlannedLine
 from conevo.errors import ConevoError, EnvironmentFailure, UsageError
+from conevo.outside import line_of
 from conevo.reading import read_json_lines
 from conevo.runs.directory import as_json, kind_of
 from conevo.runs.durable import replace_file
@@ -124,7 +125,11 @@ def _describe(error: Exception) -> dict[str, str]:
         origin = "machine" if isinstance(error, EnvironmentFailure) else "request"
         return {"origin": origin, "message": str(error), "traceback": ""}
     trace = traceback.format_exc()
-    return {"origin": "program", "message": repr(error), "traceback": trace}
+    if line := line_of(error):
+        return {"origin": "request", "message": line, "traceback": trace}
+    last = traceback.extract_tb(error.__traceback__)[-1]
+    message = f"{error!r} in {last.name} ({last.filename}:{last.lineno})"
+    return {"origin": "program", "message": message, "traceback": trace}
 
 
 def _evolve(

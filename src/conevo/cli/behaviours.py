@@ -48,7 +48,7 @@ def behaviours(
 
 def _text(found: dict[str, Any]) -> str:
     from conevo.cli.text import castes, number, table
-    from conevo.terms import S_SCALE
+    from conevo.terms import S_SCALE, counted
 
     def two(values: Any) -> list[str]:
         return [f"{v:.2f}" if isinstance(v, float) else str(v) for v in values]
@@ -57,8 +57,9 @@ def _text(found: dict[str, Any]) -> str:
     names, columns = list(lives[0]["shares"]), ("reproduced", "primitive", "left", "right")
     seen = {name: n for name, n in found["captures"].items() if n}
     return "\n".join([
-        f"{found['run']}: fittest team (generation {found['generation']}), {found['scenarios']} "
-        f"fresh scenarios, capture time {number(found['capture_time'])}",
+        f"{found['run']}: fittest team (generation {found['generation']}), "
+        f"{counted(found['scenarios'], 'fresh scenario')}, "
+        f"capture time {number(found['capture_time'])}",
         f"\nShares of the windows in which a predator interacts or idles (S: {S_SCALE})",
         table(["", *names, "S", "label"], [
             [f"predator {k}", *two(one["shares"].values()), number(one["specialization"]),

@@ -11,6 +11,7 @@ import click
 
 from conevo.cli.carry import accept_option, time_limit_option
 from conevo.errors import UsageError
+from conevo.terms import counted, quoted
 
 if TYPE_CHECKING:
     from conevo.campaigns.plan import Plan
@@ -194,7 +195,7 @@ def slurm(
         options=options,
         device=device,
     )
-    click.echo(f"{len(left)} runs; submit them with: sbatch {script}")
+    click.echo(f"{counted(len(left), 'run')}; submit with: sbatch {quoted(script)}")
     if device != "cpu" and not any(option.startswith(("--gres", "--gpus")) for option in options):
         click.echo("conevo: note: the tasks ask SLURM for no GPU; add --gres gpu:1", err=True)
 
@@ -227,7 +228,8 @@ def stop(name: str) -> None:
 
     found = find_campaign(name)
     found.stop()
-    click.echo(f"asked {found.path} to stop; continue with: conevo campaign start {found.path}")
+    advice = f"conevo campaign start {quoted(found.path)}"
+    click.echo(f"asked {found.path} to stop; continue with: {advice}")
 
 
 @campaign.command(short_help="Retry the failed runs.")

@@ -16,11 +16,12 @@ from conevo.campaigns.devices import parse_devices
 from conevo.campaigns.estimate import remaining_seconds
 from conevo.campaigns.executors import Ending, Executor, make_executor
 from conevo.campaigns.ledger import Entry
-from conevo.cli.campaign_text import counts, grid
+from conevo.cli.campaign_text import counts, grid, print_failed
 from conevo.cli.carry import drop_output, style_of
 from conevo.cli.text import duration
 from conevo.errors import EnvironmentFailure, UsageError
 from conevo.runs.time_limit import TimeLimit
+from conevo.terms import counted, quoted
 
 __all__ = ["Execution", "carry_on", "ready"]
 
@@ -58,7 +59,7 @@ def ready(
     devices = parse_devices(device)
     made = make_executor(executor, cores, address, store, devices)
     if threads > made.cores:
-        raise UsageError(f"--threads {threads}: there are only {made.cores} cores to use")
+        raise UsageError(f"--threads {threads}: only {counted(made.cores, 'core')} to use")
     if executor == "serial":
         threads = made.cores  # of the only run at work
     return Execution(made, threads, devices, style_of(as_json, quiet, False), limit)
@@ -67,7 +68,7 @@ def ready(
 def carry_on(campaign: Campaign, execution: Execution) -> int:
     """Finish what is missing, then say what can be done next; returns the exit code."""
     view = View(campaign, execution)
-    advice = f"conevo campaign start {campaign.path}"
+    advice = f"conevo campaign start {quoted(campaign.path)}"
     try:
         with view.showing():
             entries = campaign.carry_on(
@@ -83,6 +84,8 @@ def carry_on(campaign: Campaign, execution: Execution) -> int:
         word = str(error) if isinstance(error, Stopped) else "interrupted"
         done = counts(campaign.standings())
         click.echo(f"{word} with {done}; continue with: {advice}", err=True)
+        if isinstance(error, Stopped) and execution.style == "quiet":
+            click.echo(str(campaign.path))
         sys.exit(0 if isinstance(error, Stopped) else 130)
     except EnvironmentFailure as error:
         raise EnvironmentFailure(f"{error}; once fixed: {advice}") from error
@@ -107,7 +110,7 @@ class View:
         if self.execution.style == "plain":
             found = self.campaign
             click.echo(f"{found.plan.title or found.plan.name}\n{found.path}")
-            click.echo(f"{len(found.planned)} runs, {counts(found.standings())}")
+            click.echo(f"{counted(len(found.planned), 'run')}, {counts(found.standings())}")
         if self.execution.style != "live":
             return nullcontext()
         from rich.live import Live
@@ -176,12 +179,12 @@ class View:
         """Say what there is now and what can be done with it."""
         path = self.campaign.path
         click.echo(f"{counts(entries)}")
-        for entry in [entry for entry in entries.values() if entry.state == "failed"]:
-            click.echo(f"  failed {entry.label}: {entry.reason}")
-        if any(entry.state == "failed" for entry in entries.values()):
-            click.echo(f"retry them:       conevo campaign retry {path}")
-        click.echo(f"write a report:   conevo report {path}")
+        failed = [entry for entry in entries.values() if entry.state == "failed"]
+        print_failed(self.campaign, failed)
+        if failed:
+            click.echo(f"retry them:       conevo campaign retry {quoted(path)}")
+        click.echo(f"write a report:   conevo report {quoted(path)}")
         click.echo(
-            f"query its tables: conevo query {path} "
+            f"query its tables: conevo query {quoted(path)} "
             '"SELECT task, method, count(*) FROM runs GROUP BY ALL"'
         )

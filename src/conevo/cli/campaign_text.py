@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import time
 from collections import Counter
 from collections.abc import Iterable, Mapping
+from pathlib import Path
 from typing import Any
 
 import click
@@ -22,6 +24,7 @@ from conevo.cli.find import campaigns_in
 from conevo.cli.text import duration, table
 from conevo.errors import ConevoError
 from conevo.evolution.methods.registry import name_in
+from conevo.terms import counted
 
 __all__ = [
     "campaigns_here",
@@ -29,6 +32,7 @@ __all__ = [
     "experiments",
     "grid",
     "print_lists",
+    "print_failed",
     "print_plan",
     "print_status",
 ]
@@ -84,11 +88,17 @@ def print_plan(runs: Iterable[PlannedRun], as_json: bool) -> None:
 
 def print_status(campaign: Campaign, with_runs: bool, as_json: bool) -> bool:
     """Print how a campaign stands; returns whether runs have failed."""
-    entries = campaign.standings()
+    standings = campaign.standings()
+    entries = {
+        label: dataclasses.replace(entry, state="interrupted")
+        if entry.state == "pending" and last_written(campaign.places, label) is not None
+        else entry
+        for label, entry in standings.items()
+    }  # as the live page has it: a run with a generation does not wait for its first
     failed = [entry for entry in entries.values() if entry.state == "failed"]
     left = None
     if campaign.is_running:
-        left = remaining_seconds(campaign, entries, usable_cores(), time.time())
+        left = remaining_seconds(campaign, standings, usable_cores(), time.time())
     if as_json:
         rows = [
             {"run": e.label, "state": e.state, "attempts": e.attempts, "reason": e.reason}
@@ -113,9 +123,22 @@ def print_status(campaign: Campaign, with_runs: bool, as_json: bool) -> bool:
     else:
         head, cells = grid(campaign.planned.values(), entries)
         click.echo(table(head, cells))
+    print_failed(campaign, failed)
+    return bool(failed)
+
+
+def print_failed(campaign: Campaign, failed: Iterable[Entry]) -> None:
+    """Print why runs failed, and what a correction of their world's file takes."""
+    files = set()
     for entry in failed:
         click.echo(f"failed {entry.label}: {entry.reason}")
-    return bool(failed)
+        file, _, environment = campaign.planned[entry.label].world.rpartition(":")
+        files |= {Path(file).name} if environment else set()
+    for file in sorted(files):
+        click.echo(
+            f"the campaign keeps its copy of {file}: once yours is corrected, start another "
+            f"campaign with --out DIR"
+        )
 
 
 def _whose(campaign: Campaign, entries: Mapping[str, Entry]) -> str:
@@ -129,7 +152,7 @@ def _whose(campaign: Campaign, entries: Mapping[str, Entry]) -> str:
 
 def _sign_of_life(campaign: Campaign, entries: Mapping[str, Entry]) -> str:
     """Return when a run that is not finished was last written, whoever writes it and where."""
-    labels = [e.label for e in entries.values() if e.state in ("pending", "running")]
+    labels = [e.label for e in entries.values() if e.state in ("pending", "interrupted", "running")]
     at = max(filter(None, (last_written(campaign.places, label) for label in labels)), default=None)
     return "" if at is None else f"last generation written {_ago(at)}"
 
@@ -145,11 +168,11 @@ def _progress(campaign: Campaign, entry: Entry) -> tuple[str, str]:
         return "", ""
     done = f"{found.generations}"
     if entry.state == "finished":
-        return f"{done} generations", ""
+        return counted(found.generations, "generation"), ""
     if found.budget:
         done = f"{found.evaluations:,} of {found.budget:,} evaluations"
     elif found.of:
-        done = f"{done} of {found.of} generations"
+        done = f"{done} of {counted(found.of, 'generation')}"
     return done, _ago(found.written)
 
 
@@ -168,7 +191,7 @@ def _how_far(campaign: Campaign, entry: Entry) -> dict[str, Any]:
 def counts(entries: Mapping[str, Entry]) -> str:
     """Return how many runs are in each state: "12 finished, 2 running, 76 pending"."""
     found = Counter(entry.state for entry in entries.values())
-    order = ("finished", *(state for state in STATES if state != "finished"))
+    order = ("finished", *(state for state in STATES if state != "finished"), "interrupted")
     return ", ".join(f"{found[state]} {state}" for state in order if found[state])
 
 

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from conevo.errors import EnvironmentFailure, UsageError
+from conevo.errors import ConevoError, EnvironmentFailure, UsageError
+from conevo.terms import quoted
 
 if TYPE_CHECKING:
     from conevo.runs.run import Run
@@ -97,6 +98,7 @@ def carry_on(
     from conevo.cli.progress import watching
     from conevo.cli.stages import print_shaping_end
     from conevo.cli.summary import print_end
+    from conevo.outside import line_of
     from conevo.runs.run import Run
 
     def remark(text: str) -> None:
@@ -122,11 +124,12 @@ def carry_on(
     elif not isinstance(found, Run):
         raise UsageError(
             f"{found.path} is a shaping, whose stages keep their length; start a run from the "
-            f"populations of its last stage: conevo run WORLD/ENVIRONMENT --from {found.path}"
+            f"populations of its last stage: conevo run WORLD/ENVIRONMENT "
+            f"--from {quoted(found.path)}"
         )
     if not accept_other_code:
         found.refuse_other_code()
-    advice = f"conevo resume {found.path}"
+    advice = f"conevo resume {quoted(found.path)}"
     try:
         if isinstance(found, Run):
             carry(found)
@@ -139,6 +142,13 @@ def carry_on(
         sys.exit(130)
     except EnvironmentFailure as error:
         raise EnvironmentFailure(f"{error}; once fixed: {advice}") from error
+    except Exception as error:
+        if isinstance(error, ConevoError) or not (line := line_of(error)):
+            raise
+        raise UsageError(
+            f"{line}; {found.path} keeps its copy of the world's file as it is: correct yours, and "
+            f"start another run"
+        ) from error
     if found.status != "finished":
         click.echo(f"time limit reached after {_done(found)}; continue with: {advice}", err=True)
     if isinstance(found, Run):

@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING
 
 import click
 
-from conevo.errors import EnvironmentFailure, UsageError, unknown_name
+from conevo.errors import EnvironmentFailure, UsageError, unknown_name, without_team
 from conevo.runs.directory import CAMPAIGN, kind_of
+from conevo.runs.durable import is_there
 from conevo.runs.run import RUNS, Run
 from conevo.runs.shaping import Shaping
+from conevo.terms import quoted
 
 if TYPE_CHECKING:
     from conevo.campaigns.campaign import Campaign
@@ -60,7 +62,7 @@ def find_run(text: str) -> Run:
         return found
     stages = [stage for stage in found.stages if stage.champion is not None]
     if not stages:
-        raise UsageError(f"{found.path} has no finished generation yet")
+        raise without_team(found.path, found.generations())
     return stages[-1]
 
 
@@ -76,7 +78,7 @@ def find_last(text: str) -> Run:
     if found.status != "finished":
         raise UsageError(
             f"{found.path} is not finished, so no run can begin with its populations; "
-            f"finish it with 'conevo resume {found.path}'"
+            f"finish it with 'conevo resume {quoted(found.path)}'"
         )
     return found.stages[-1]
 
@@ -95,18 +97,22 @@ def find_shaping(text: str) -> Shaping:
 
 def directories(folder: Path) -> list[Path]:
     """Return the directories in ``folder`` that hold a run or a shaping, by name."""
+    return _holding(folder, "run", "shaping")
+
+
+def campaigns_in(folder: Path) -> list[Path]:
+    """Return the directories in ``folder`` that hold a campaign, by name."""
+    return _holding(folder, "campaign")
+
+
+def _holding(folder: Path, *kinds: str) -> list[Path]:
     if not folder.is_dir():
         return []
     return sorted(
         path
         for path in folder.iterdir()
-        if not path.name.startswith(".") and kind_of(path) in ("run", "shaping")
+        if not path.name.startswith(".") and kind_of(path) in kinds
     )
-
-
-def campaigns_in(folder: Path) -> list[Path]:
-    """Return the directories in ``folder`` that hold a campaign, by name."""
-    return sorted(file.parent for file in folder.glob(f"[!.]*/{CAMPAIGN}"))
 
 
 def campaign_at(text: str) -> Campaign | None:
@@ -114,7 +120,7 @@ def campaign_at(text: str) -> Campaign | None:
     from conevo.campaigns.campaign import CAMPAIGNS, Campaign
 
     for path in (Path(text), CAMPAIGNS / text):
-        if (path / CAMPAIGN).is_file():
+        if is_there(path / CAMPAIGN):
             return Campaign(path)
     return None
 
@@ -192,6 +198,7 @@ def open_directory(path: Path) -> Run | Shaping:
     """
     if kind_of(path) == "campaign":
         raise UsageError(
-            f"{path} is a campaign; see its runs with 'conevo campaign status {path} --runs'"
+            f"{path} is a campaign; see its runs with "
+            f"'conevo campaign status {quoted(path)} --runs'"
         )
     return Shaping(path) if kind_of(path) == "shaping" else Run(path)

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import atexit
 import errno
 import io
+import math
 import os
+import signal
 import sys
+import threading
+import time
 from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
@@ -33,6 +38,7 @@ VERBS = {
     "show": "Print a finished or running run.",
     "list": "List worlds, methods, presets, settings or runs.",
 }
+IN_A_ROW = 2.0  # seconds between two interrupts that count as one
 MODULES = {"list": "listing", "shape-prey": "shape_prey"}
 
 
@@ -99,12 +105,36 @@ def _ready_streams() -> None:
             stream.reconfigure(errors="backslashreplace")
 
 
+def _count_interrupts_once() -> None:
+    """Let Ctrl-C that is pressed several times in a row interrupt once.
+
+    A second one would interrupt what the first has begun: checkpoints and the last message. One
+    that comes later is another. Where interrupts are ignored, as in a shell's background jobs, they
+    still are.
+    """
+    if signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+        return
+    if threading.current_thread() is not threading.main_thread():
+        return
+    last = -math.inf
+
+    def interrupt(*_: object) -> None:
+        nonlocal last
+        before, last = last, time.monotonic()
+        if last - before > IN_A_ROW:
+            raise KeyboardInterrupt
+
+    signal.signal(signal.SIGINT, interrupt)
+    atexit.register(signal.signal, signal.SIGINT, signal.SIG_IGN)  # the message has been printed
+
+
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
     """Run a command line; every error is one line, every ending has its exit code.
 
     2: the request cannot be carried out as written; 3: the machine refused; 130: interrupted.
     """
     _ready_streams()
+    _count_interrupts_once()
     try:
         words = list(sys.argv[1:] if arguments is None else arguments)
         for word in words:

@@ -65,7 +65,7 @@ class Order:
     """What a command line asks for; the fields are named as the options are.
 
     Raises:
-        UsageError: options that are mutually exclusive.
+        UsageError: options that are mutually exclusive, or a device that cannot be.
     """
 
     method: str | None
@@ -84,8 +84,10 @@ class Order:
     comparing: bool = False
 
     def __post_init__(self) -> None:
+        from conevo.kernels.devices import refuse_unknown_device
         from conevo.runs.assignments import parse_assignments
 
+        refuse_unknown_device(self.device)
         self.style = style_of(self.as_json, self.quiet, self.verbose)
         self.overrides = parse_assignments(self.settings)
         names = (("method", self.method), ("preset", self.preset), ("seed", self.seed))

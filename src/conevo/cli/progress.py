@@ -13,7 +13,7 @@ import click
 from conevo.cli.summary import declared, measures_text, title
 from conevo.cli.text import bars, castes, count, duration, neurons, number
 from conevo.runs.run import Run
-from conevo.terms import S_MEANS
+from conevo.terms import S_MEANS, counted
 from conevo.worlds.measures import Measure
 
 __all__ = ["watching"]
@@ -174,10 +174,10 @@ class Display:
             yield (
                 "thresholds",
                 f"SST {number(last['sst'])}, GST {number(last['gst'])}, "
-                f"{last['recombinations']} recombinations between populations",
+                f"{counted(last['recombinations'], 'recombination')} between populations",
             )
         yield "neurons", neurons(last["n_hidden"])
         spent = f"{count(self.pace.spent)} spent"
         yield "speed", f"{number(self.pace.rate)} team evaluations/s, {spent}"
         if last["n_nonfinite"]:
-            yield "not finite", f"{last['n_nonfinite']} scores, ranked last"
+            yield "not finite", f"{counted(last['n_nonfinite'], 'score')}, ranked last"

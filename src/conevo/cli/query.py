@@ -35,7 +35,7 @@ def query(arguments: tuple[str, ...], as_csv: bool, as_json: bool) -> None:
         raise UsageError('query takes a campaign and one SQL text: conevo query NAME "SELECT ..."')
     found = find_campaign(arguments[0]) if len(arguments) == 2 else only_campaign()
     with sealed(found) as folder, Tables(folder) as tables:
-        columns, rows = tables.query(arguments[-1])
+        columns, rows = tables.ask(arguments[-1])
     if as_json:
         for row in rows:
             values = [None if _is_no_json(value) else value for value in row]

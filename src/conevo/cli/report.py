@@ -20,10 +20,13 @@ def report(name: str, out: str | None) -> None:
 
     Try: conevo report rover-complex
     """
+    import logging
+
     from conevo.analysis.report import write_report
     from conevo.cli.find import find_campaign, sealed
     from conevo.errors import EnvironmentFailure
 
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)  # it caches fonts, or need not
     found = find_campaign(name)
     with sealed(found) as tables:
         try:

@@ -19,6 +19,7 @@ from conevo.errors import UsageError
 from conevo.runs.config import PRESETS, RunConfig, resolve
 from conevo.runs.lab import price_of
 from conevo.runs.settings import preset_purpose, settings_of
+from conevo.terms import counted
 
 __all__ = ["preset_rows", "print_dry_run", "print_settings", "setting_rows"]
 
@@ -120,8 +121,8 @@ def print_dry_run(
         )
     for one, price in zip(configs, prices, strict=True):
         click.echo(
-            f"# {title(one.outline)}: {count(price.evaluations)} team evaluations in the first "
-            f"generation, at most {count(price.generations)} generations, "
+            f"# {title(one.outline)}: {counted(price.evaluations, 'team evaluation')} in the first "
+            f"generation, at most {counted(price.generations, 'generation')}, "
             f"about {price.team_steps:.2g} team-steps"
         )
     click.echo(configs[-1].to_toml().rstrip())

@@ -12,7 +12,7 @@ from conevo.cli.text import castes, count, duration, number, progress, spread, t
 from conevo.runs.code import changes_text
 from conevo.runs.run import Run
 from conevo.runs.shaping import Shaping
-from conevo.terms import S_SCALE
+from conevo.terms import S_SCALE, counted, quoted
 
 __all__ = ["print_shaping_end", "shaping_text", "span", "stage_summary", "stages_test_text"]
 
@@ -55,7 +55,8 @@ def shaping_text(shaping: Shaping, n_rows: int = 0) -> str:
     parts = [
         title(shaping.outlines[-1]).replace(shaping.outlines[-1].task, span(shaping)),
         f"{shaping.path}: {state}",
-        f"{len(stages)} of {len(shaping.outlines)} stages begun, {len(records)} generations, "
+        f"{len(stages)} of {counted(len(shaping.outlines), 'stage')} begun, "
+        f"{counted(len(records), 'generation')}, "
         f"{duration(seconds)}",
         *changes_text(shaping.sessions),
     ]
@@ -64,7 +65,7 @@ def shaping_text(shaping: Shaping, n_rows: int = 0) -> str:
     if records and n_rows:
         parts += ["", generations_table(_chosen(records, n_rows), "number", "stage", "task")]
     if shaping.status == "interrupted":
-        parts += ["", f"Continue it with: conevo resume {shaping.path}"]
+        parts += ["", f"Continue it with: conevo resume {quoted(shaping.path)}"]
     return "\n".join(parts)
 
 
@@ -94,8 +95,9 @@ def stages_test_text(results: list[dict[str, Any]]) -> str:
     last = results[0]
     return (
         f"The fittest team of stage {last['team_of']} (generation {last['generation']}), "
-        f"{last['scenarios']} fresh scenarios of each stage (mean +- standard deviation; "
-        f"S: {S_SCALE})\n" + table(["stage", "task", *measures, "S", "castes"], rows)
+        f"{counted(last['scenarios'], 'fresh scenario')} of each stage "
+        f"(mean +- standard deviation; S: {S_SCALE})\n"
+        + table(["stage", "task", *measures, "S", "castes"], rows)
     )
 
 
@@ -135,15 +137,16 @@ def _table(stages: list[Run]) -> str:
 
 def _next_commands(shaping: Shaping) -> list[str]:
     """Return the exact commands for what can be done now, each after a comment."""
+    path = quoted(shaping.path)
     commands = {
-        f"conevo show {shaping.path}": "its generations, stage by stage",
-        f"conevo replay {shaping.path}": "see its last team in the browser",
-        f"conevo test {shaping.path} --scenarios 100": "test its last team in more scenarios",
+        f"conevo show {path}": "its generations, stage by stage",
+        f"conevo replay {path}": "see its last team in the browser",
+        f"conevo test {path} --scenarios 100": "test its last team in more scenarios",
     }
     if len({run.champion.genes.shape for run in shaping.stages if run.champion}) == 1:
-        every = f"conevo test {shaping.path} --stages"
+        every = f"conevo test {path} --stages"
         commands[every] = "test it in the environment of every stage"
     if shaping.prey is not None:
-        pursuit = f"conevo run pursuit/team-3 --prey {shaping.prey}"
+        pursuit = f"conevo run pursuit/team-3 --prey {quoted(shaping.prey)}"
         commands[pursuit] = "set predators on the evolved prey"
     return [line for command, what in commands.items() for line in (f"# {what}", command)]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shlex
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -24,11 +23,11 @@ from conevo.cli.text import (
     table,
 )
 from conevo.evolution.methods.registry import title_of
-from conevo.runs.code import changes_text, sessions_of
+from conevo.runs.code import changes_text, last_code, sessions_of
 from conevo.runs.outline import Outline
 from conevo.runs.run import Run
 from conevo.runs.shrinkage import shrinkage
-from conevo.terms import S_SCALE
+from conevo.terms import S_SCALE, counted, quoted
 from conevo.worlds.measures import Measure
 
 __all__ = [
@@ -79,14 +78,17 @@ def run_text(run: Run, n_rows: int) -> str:
         parts += [*exchange_text(records), *measures_text(about)]
         parts += ["", generations_table(spaced(records, n_rows))]
     if run.test_result:
-        parts += ["", test_text(run.test_result)]
-    if origin := run.provenance.get("origin"):
+        parts += ["", *_former_test(run), test_text(run.test_result)]
+    if origin := about.get("origin"):
         what = "Bred from the champion" if origin.get("of") else "Started from the populations"
-        parts += ["", f"{what} of {origin['path']}, generation {origin['generation']}"]
+        here = last_code(about)
+        made = origin.get("code", here)
+        other = f" (made by {made}, this run by {here})" if made != here else ""
+        parts += ["", f"{what} of {origin['path']}, generation {origin['generation']}{other}"]
     if lines := _former_ends(run):
         parts += ["", *lines]
     if run.status == "interrupted":
-        parts += ["", f"Continue it with: conevo resume {run.path}"]
+        parts += ["", f"Continue it with: conevo resume {quoted(run.path)}"]
     return "\n".join(parts)
 
 
@@ -156,7 +158,7 @@ def test_text(result: dict[str, Any]) -> str:
         )
     head = ["", "generation", *measures, "S"]
     lines = [
-        f"Testing phase, {n} fresh scenarios (mean +- standard deviation; S: {S_SCALE})",
+        f"Testing phase, {counted(n, 'fresh scenario')} (mean +- standard deviation; S: {S_SCALE})",
         table(head, rows),
     ]
     lines += [
@@ -193,10 +195,11 @@ def conditions_text(run: Run, both: dict[str, Any]) -> str:
     settings = "".join(f", {key}={value}" for key, value in conditions["settings"].items())
     return "\n".join(
         [
-            f"Champion of {run.path} (generation {both['own']['generation']}), {n} fresh scenarios "
-            f"(mean +- standard deviation)",
+            f"Champion of {run.path} (generation {both['own']['generation']}), "
+            f"{counted(n, 'fresh scenario')} (mean +- standard deviation)",
             f"own conditions: {run.config.task}",
-            f"changed conditions: {conditions['task']}, {conditions['robots']} robots{settings}",
+            f"changed conditions: {conditions['task']}, "
+            f"{counted(conditions['robots'], 'robot')}{settings}",
             table(["conditions", "robots", *measures, "S"], rows),
             f"castes, own: {castes(both['own']['castes'])}",
             f"castes, changed: {castes(both['changed']['castes'])}",
@@ -219,7 +222,8 @@ def shrinkage_text(result: dict[str, Any]) -> str:
     ]
     return (
         f"The fittest team (generation {about['chosen']}) is the best of "
-        f"{len(about['finalists'])} finalists in {about['scenarios']} validation scenarios\n"
+        f"{counted(len(about['finalists']), 'finalist')} in "
+        f"{counted(about['scenarios'], 'validation scenario')}\n"
         + table(["", "selection", "validation", "test", "test / selection"], rows)
     )
 
@@ -230,19 +234,19 @@ def next_commands(run: Run) -> list[str]:
     other = "mesp" if config.method.startswith("cone") else "cone"
     tables = config.tables()
     changes = [
-        f" --set {section}.{key}={tables[section][key]}"
+        f" --set {quoted(f'{section}.{key}={tables[section][key]}')}"
         for section, _, key in (name.partition(".") for name in config.changed)
         if section in ("run", "world") and key in tables[section]
     ]
     seed = config.run.seed
-    world = shlex.quote(config.address)
+    world, path = quoted(config.address), quoted(run.path)
     repeat = f"conevo run {world} --method {other} --preset {config.preset} --seed {seed}"
-    again = f"conevo run --config {run.path}/config.toml --seed {seed + 1}"
+    again = f"conevo run --config {path}/config.toml --seed {seed + 1}"
     commands = {
-        f"conevo show {run.path}": "its generations",
-        f"conevo replay {run.path}": "see its team in the browser",
-        f"conevo test {run.path} --scenarios 100": "test its team in more scenarios",
-        f"conevo resume {run.path} --{_twice_as_long(run)}": "evolve it longer",
+        f"conevo show {path}": "its generations",
+        f"conevo replay {path}": "see its team in the browser",
+        f"conevo test {path} --scenarios 100": "test its team in more scenarios",
+        f"conevo resume {path} --{_twice_as_long(run)}": "evolve it longer",
     }
     if "origin" not in run.provenance:  # which neither the file nor the options have
         commands[again] = "the same with another seed"
@@ -274,6 +278,16 @@ def _former_ends(run: Run) -> list[str]:
     ]
 
 
+def _former_test(run: Run) -> list[str]:
+    """Return which length the testing phase is of, unless it is the one that the run has now."""
+    about = run.provenance
+    ends = [former for former in about.get("extended", []) if former["finished"]]
+    if not ends or "finished" in about:
+        return []
+    length = generations(ends[-1]["generations"])
+    return [f"Of the former length, {length}; the new one is tested when it is finished:"]
+
+
 def _state(run: Run) -> str:
     """Return a run's place, state and cost in two lines."""
     records, about = run.generations(), run.provenance
@@ -287,6 +301,6 @@ def _state(run: Run) -> str:
     done = progress(len(records), planned, evaluations, budget)
     if records:
         seconds = sum(record["seconds"] for record in records)
-        done += "" if "evaluations" in done else f", {count(evaluations)} team evaluations"
+        done += "" if "evaluations" in done else f", {counted(evaluations, 'team evaluation')}"
         done += f", {count(records[-1]['team_steps'])} team-steps, {duration(seconds)}"
     return f"{run.path}: {state}\n{done}"

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import json
+from typing import TYPE_CHECKING
 
 import click
 
 from conevo.errors import UsageError
+
+if TYPE_CHECKING:
+    from conevo.runs.run import Run
 
 __all__ = ["test"]
 
@@ -68,10 +72,14 @@ def test(
     if stages:
         if is_changed:
             raise UsageError("--stages and --on, --set or --robots are mutually exclusive")
-        results = find_shaping(run).test(scenarios, seed, threads=threads)
+        shaping = find_shaping(run)
+        for stage in shaping.stages[-1:]:
+            note_other_code(stage)
+        results = shaping.test(scenarios, seed, threads=threads)
         click.echo(json.dumps(results) if as_json else stages_test_text(results))
         return
     found = find_run(run)
+    note_other_code(found)
     if is_changed:
         from conevo.cli.summary import conditions_text
         from conevo.runs.assignments import parse_assignments
@@ -82,3 +90,11 @@ def test(
         return
     result = found.test(scenarios, seed, threads=threads)
     click.echo(json.dumps(result) if as_json else test_text({"champion": result}))
+
+
+def note_other_code(run: Run) -> None:
+    """Print that other code than this made a run, if it did."""
+    from conevo.runs.code import last_code, other_code
+
+    if problem := other_code(run.path, last_code(run.provenance)):
+        click.echo(f"conevo: note: {problem}", err=True)

@@ -7,6 +7,8 @@ from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import Any
 
+from conevo.terms import counted
+
 __all__ = [
     "bars",
     "castes",
@@ -66,7 +68,7 @@ def count(value: int) -> str:
 
 def generations(number: int) -> str:
     """Return so many generations in words: "1 generation", "5 generations"."""
-    return f"{count(number)} generation{'' if number == 1 else 's'}"
+    return counted(number, "generation")
 
 
 def progress(done: int, planned: int, spent: int, budget: int) -> str:

@@ -11,6 +11,7 @@ from conevo.evolution.generation import Populations
 from conevo.evolution.protocol import BoolArray, FloatArray, Layout, Method, State
 from conevo.evolution.variation import VariationConfig, mutate
 from conevo.rng import stream
+from conevo.terms import counted
 
 __all__ = ["breed_from", "hand_on"]
 
@@ -100,7 +101,9 @@ def breed_from(
     ]
     is_whole = fresh.fitness.ndim == 2
     if not different and is_whole and not (active == fresh.active[0]).all():
-        different = [f"{method.title} has networks of {layout.n_hidden} neurons, which never grow"]
+        different = [
+            f"{method.title} has networks of {counted(layout.n_hidden, 'neuron')}, which never grow"
+        ]
     if different:
         raise UsageError(f"no population can be bred from this team: {'; '.join(different)}")
     source = np.arange(n_populations)[:, None] + np.zeros(n_genotypes, dtype=np.int64)

@@ -54,6 +54,8 @@ def start() -> None:
     global _is_started
     with building:
         if not _is_started:
+            if not os.environ.get("WARP_CACHE_PATH"):
+                os.environ.pop("WARP_CACHE_PATH", None)  # an empty one is not the working directory
             wp.config.log_level = wp.LOG_WARNING
             with _without_driver_warning(), _cache_named():
                 wp.init()

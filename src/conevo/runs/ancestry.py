@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING, Any
 from conevo.controllers.registry import genome_of
 from conevo.errors import UsageError
 from conevo.runs.champions import Team
+from conevo.runs.code import last_code
 from conevo.runs.lab import layout_of, refuse_other_state
 from conevo.runs.store import Store
+from conevo.terms import quoted
 
 if TYPE_CHECKING:
     from conevo.evolution.protocol import State
@@ -35,14 +37,15 @@ def ancestor_of(
     if not store.is_finished:
         raise UsageError(
             f"{path} is not finished, so no run can begin with its populations; "
-            f"finish it with 'conevo resume {path}'"
+            f"finish it with 'conevo resume {quoted(path)}'"
         )
     if changed := store.check_seal():
         raise UsageError(
             f"{path} was changed since it was finished ({', '.join(changed)}): "
             f"no run can begin with its populations"
         )
-    about = {"path": str(path), "run_id": store.read_provenance()["run_id"]}
+    made = store.read_provenance()
+    about = {"path": str(path), "run_id": made["run_id"], "code": last_code(made)}
     if of_champion:
         team, digest = store.load_final_champion()
         about |= {"generation": team.generation, "checkpoint": digest, "of": "champion"}

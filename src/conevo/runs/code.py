@@ -11,6 +11,7 @@ from typing import Any
 
 import conevo
 from conevo.errors import UsageError
+from conevo.terms import quoted
 
 __all__ = [
     "DECIDING",
@@ -19,6 +20,7 @@ __all__ = [
     "code_spans",
     "current_code",
     "last_code",
+    "other_code",
     "refuse_other_code",
     "sessions_of",
     "version",
@@ -99,12 +101,19 @@ def sessions_of(provenance: Record, before: int = 0) -> list[Record]:
 
 def refuse_other_code(path: Path, code: str) -> None:
     """Raise UsageError unless ``code``, of the run or shaping at ``path``, is this conevo's."""
-    if code != current_code():
+    if problem := other_code(path, code):
         raise UsageError(
-            f"{path} was made by conevo {code}, and this is {current_code()}, which may give other "
-            f"results: use that version, or continue with 'conevo resume {path} "
+            f"{problem}: use that version, or continue with 'conevo resume {quoted(path)} "
             f"--accept-other-code'"
         )
+
+
+def other_code(path: Path, code: str) -> str:
+    """Return that ``code``, of the run at ``path``, is not this conevo's; nothing if it is."""
+    here = current_code()
+    if code == here:
+        return ""
+    return f"{path} was made by conevo {code}, and this is {here}, which may give other results"
 
 
 def code_spans(sessions: Sequence[Record]) -> list[Span]:
@@ -149,7 +158,11 @@ def _spans(sessions: Sequence[Record], thing: Callable[[Record], str]) -> list[S
 
 def _text(spans: Sequence[Span]) -> str:
     return ", ".join(
-        f"{one} from {first}" if last is None else f"{one} generations {first}-{last}"
+        f"{one} from {first}"
+        if last is None
+        else f"{one} generation {first}"
+        if first == last
+        else f"{one} generations {first}-{last}"
         for one, first, last in spans
     )
 

@@ -14,7 +14,7 @@ import hashlib
 import json
 import os
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -23,7 +23,8 @@ from conevo.errors import EnvironmentFailure, UsageError
 from conevo.reading import read_bytes, read_json, read_text
 from conevo.runs import locks
 from conevo.runs.drafts import draft_of, remove_abandoned, remove_torn
-from conevo.runs.durable import replace_file, sync_directory, writing
+from conevo.runs.durable import is_there, replace_file, sync_directory, writing
+from conevo.terms import quoted
 
 __all__ = [
     "CAMPAIGN",
@@ -42,8 +43,11 @@ KINDS = {CONFIG: "run", SHAPING: "shaping", CAMPAIGN: "campaign"}
 
 
 def kind_of(path: Path) -> str:
-    """Return what a directory holds: "run", "shaping", "campaign" or nothing ("")."""
-    return next((kind for name, kind in KINDS.items() if (path / name).is_file()), "")
+    """Return what a directory holds: "run", "shaping", "campaign" or nothing ("").
+
+    The name of its file decides: whether it can be read is said where it is read.
+    """
+    return next((kind for name, kind in KINDS.items() if is_there(path / name)), "")
 
 
 @contextmanager
@@ -72,13 +76,18 @@ def _appear(draft: Path, path: Path) -> None:
     try:
         draft.rename(path)
     except OSError:
-        refuse_existing(path)
+        refuse_existing(path, is_new=True)
         raise
 
 
-def refuse_existing(path: Path) -> None:
-    """Say what is at ``path`` and what can be done with it, if anything is."""
-    if not (path.is_symlink() or path.exists()) or (path.is_dir() and not any(path.iterdir())):
+def refuse_existing(path: Path, *, is_new: bool = False) -> None:
+    """Say what is at ``path`` and what can be done with it, if anything is.
+
+    Args:
+        path: a directory's.
+        is_new: whether nothing was there a moment ago, so that another process makes it now.
+    """
+    if not is_there(path) or (path.is_dir() and not any(path.iterdir())):
         return
     kind = kind_of(path)
     if not kind:
@@ -86,14 +95,22 @@ def refuse_existing(path: Path) -> None:
             f"{path} already exists and is not a run; choose another directory with --out"
         )
     directory = Directory(path, kind)
+    if is_new:
+        raise UsageError(
+            f"another conevo has just begun a {kind} at {path}; leave it to that one, or choose "
+            f"another directory with --out"
+        )
     if kind == "campaign":
-        raise UsageError(f"{path} already holds a campaign; see 'conevo campaign status {path}'")
+        raise UsageError(
+            f"{path} already holds a campaign; see 'conevo campaign status {quoted(path)}'"
+        )
     if directory.is_finished:
-        advice = f"finished: see it with 'conevo show {path}', or choose another --seed or --out"
+        show = f"conevo show {quoted(path)}"
+        advice = f"finished: see it with '{show}', or choose another --seed or --out"
     elif directory.is_in_use:
-        advice = f"in use by {directory.user}; watch it with 'conevo show {path}'"
+        advice = f"in use by {directory.user}; watch it with 'conevo show {quoted(path)}'"
     else:
-        advice = f"unfinished: continue it with 'conevo resume {path}'"
+        advice = f"unfinished: continue it with 'conevo resume {quoted(path)}'"
     raise UsageError(f"{path} already holds a {kind}, {advice}")
 
 
@@ -110,7 +127,7 @@ class Directory:
 
     def __init__(self, path: Path, kind: str) -> None:
         name = next(name for name in KINDS if KINDS[name] == kind)
-        if not (path / name).is_file():
+        if not is_there(path / name):
             raise UsageError(f"{path} is not a {kind} (it has no {name})")
         self.path = path
 
@@ -183,20 +200,29 @@ class Directory:
         files: dict[str, str] = read_json(self.path / SEAL, Seal)["files"]
         return files
 
-    def check_seal(self) -> list[str]:
-        """Return the names of files that are not as they were when the directory was sealed."""
-        sealed = self.read_seal()
-        found = self._digests()
-        return sorted(name for name in sealed if found.get(name) != sealed[name])
+    def check_seal(self, names: Collection[str] | None = None) -> list[str]:
+        """Return the names of files that are not as they were when the directory was sealed.
 
-    def _digests(self) -> dict[str, str]:
-        files = sorted(p for p in self.path.rglob("*") if p.is_file() and p.suffix != ".tmp")
+        Args:
+            names: those that are looked at, all by default.
+        """
+        sealed = self.read_seal()
+        asked = sealed if names is None else sealed.keys() & names
+        found = self._digests(asked)
+        return sorted(name for name in asked if found.get(name) != sealed[name])
+
+    def _digests(self, names: Collection[str] | None = None) -> dict[str, str]:
+        """Return the digests of the files of these names that there are; by default of all."""
+        if names is None:
+            names = [
+                p.relative_to(self.path).as_posix()
+                for p in self.path.rglob("*")
+                if p.suffix != ".tmp" and p.name not in (SEAL, LOCK)
+            ]
         return {
-            p.relative_to(self.path).as_posix(): hashlib.blake2b(
-                read_bytes(p), digest_size=16
-            ).hexdigest()
-            for p in files
-            if p.name not in (SEAL, LOCK)
+            name: hashlib.blake2b(read_bytes(self.path / name), digest_size=16).hexdigest()
+            for name in sorted(names)
+            if (self.path / name).is_file()
         }
 
 

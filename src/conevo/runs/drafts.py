@@ -85,7 +85,7 @@ def _begin(path: Path, must_lock: bool) -> tuple[Path, int]:
                 is_ours = locks.take(handle)
             except OSError as error:
                 if must_lock:
-                    raise locks.no_locks(path.parent, error) from error
+                    raise locks.no_locks(path.parent, error, " with --out") from error
                 is_ours = True  # nobody can tell that it is in use, and nobody removes it
             # Between two of these lines another process may have found it without an owner.
             if is_ours and os.path.samestat(os.fstat(handle), os.stat(folder / OWNER)):

@@ -71,9 +71,14 @@ def write_new(files: Mapping[Path, bytes]) -> None:
                 sync_directory(path.parent)
 
 
+def is_there(path: Path) -> bool:
+    """Whether anything has this name: a file, a directory, a pipe, a link to nothing."""
+    return path.exists() or path.is_symlink()
+
+
 def refuse_file(path: Path) -> None:
     """Raise UsageError if there is something at ``path`` already."""
-    if path.is_symlink() or path.exists():
+    if is_there(path):
         raise UsageError(f"{path} exists already; choose another place with --out, or remove it")
 
 

@@ -21,6 +21,7 @@ from conevo.runs.outline import LENGTH
 from conevo.runs.provenance import now
 from conevo.runs.settings import RunSettings
 from conevo.runs.store import Store
+from conevo.terms import counted, quoted
 from conevo.worlds.measures import measures_of
 
 __all__ = ["give_length", "length_of", "refuse_parts"]
@@ -90,13 +91,14 @@ def _check(path: Path, config: RunConfig, about: Record, records: Sequence[Recor
     if "stem_id" not in about and config.run_id != about["run_id"]:
         raise UsageError(
             f"{path} was made by conevo {about['conevo']}, whose runs cannot be "
-            f"extended; start another run from its populations: --from {path}"
+            f"extended; start another run from its populations: "
+            f"conevo run WORLD/ENVIRONMENT --from {quoted(path)}"
         )
     if about.get("stem_id", config.stem_id) != config.stem_id:
         raise UsageError(f"{path} has other settings: it cannot be continued as this run")
     if settings.generations < len(records):
         raise UsageError(
-            f"{path} has done {len(records)} generations: "
+            f"{path} has done {counted(len(records), 'generation')}: "
             f"run.generations = {settings.generations} is fewer"
         )
     if not records:
@@ -132,7 +134,8 @@ def _check_later(
     n, ended = len(records), f"(it was stopped by: {about.get('stopped_by')})"
     if settings.generations <= n:
         raise UsageError(
-            f"{path} has finished {n} generations {ended}: continue it with --generations above {n}"
+            f"{path} has finished {counted(n, 'generation')} {ended}: "
+            f"continue it with --generations above {n}"
         )
     budget = settings.budget_evaluations
     if about.get("stopped_by") == "budget" and 0 < budget <= former.budget_evaluations:
@@ -177,12 +180,12 @@ def refuse_parts(path: Path, length: Mapping[str, Any]) -> None:
     if kind_of(whole.parent) == "shaping":
         raise UsageError(
             f"{path} is a stage of {path.parent}, whose stages keep their length; begin a run with "
-            f"its populations: conevo run WORLD/ENVIRONMENT --from {path}"
+            f"its populations: conevo run WORLD/ENVIRONMENT --from {quoted(path)}"
         )
     campaign = whole.parent.parent
     if whole.parent.name == "runs" and kind_of(campaign) == "campaign":
         sets = " ".join(f"--set run.{name}={value}" for name, value in length.items())
         raise UsageError(
             f"{path} is a run of the campaign {campaign}, which decides its length: "
-            f"conevo campaign start {campaign} {sets}"
+            f"conevo campaign start {quoted(campaign)} {sets}"
         )

@@ -56,11 +56,17 @@ def is_held(path: Path) -> bool:
         os.close(handle)
 
 
-def no_locks(directory: Path, error: OSError) -> EnvironmentFailure:
-    """Return the error for a directory whose file system has no locks."""
+def no_locks(directory: Path, error: OSError, advice: str = "") -> EnvironmentFailure:
+    """Return the error for a directory whose file system has no locks.
+
+    Args:
+        directory: that cannot be locked.
+        error: what was said of it.
+        advice: how another place is chosen, if it can be.
+    """
     return EnvironmentFailure(
         f"cannot lock {directory}: {error.strerror or error}; without locks two processes could "
-        f"write there at once, so choose a place on another file system with --out"
+        f"write there at once, so choose a place on another file system{advice}"
     )
 
 

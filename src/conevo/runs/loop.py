@@ -13,6 +13,7 @@ from conevo.errors import UsageError
 from conevo.evolution.protocol import Method, Progress, Scores, State
 from conevo.runs.evaluation import Evaluate, Portrait, describe
 from conevo.runs.settings import RunSettings
+from conevo.terms import counted
 from conevo.worlds.measures import Measure
 
 __all__ = ["check_budget", "evolve_generations", "has_reached", "price"]
@@ -90,7 +91,7 @@ def check_budget(method: Method, state: State, budget: int) -> None:
     if budget and (first := price(method, state)) > budget:
         raise UsageError(
             f"run.budget_evaluations = {budget} does not pay for one generation: "
-            f"the first takes {first} team evaluations"
+            f"the first takes {counted(first, 'team evaluation')}"
         )
 
 

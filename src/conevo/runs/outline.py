@@ -15,6 +15,7 @@ from typing import Any
 from conevo.errors import UsageError
 from conevo.evolution.methods.registry import name_in, remember_title
 from conevo.reading import DamagedFile, parse_toml
+from conevo.terms import quoted
 
 __all__ = ["LENGTH", "Outline", "digest_of", "identify", "outline_of", "read_outline"]
 
@@ -128,7 +129,7 @@ def read_outline(content: bytes, provenance: Mapping[str, Any], place: str) -> O
         (task or not is_own_file) and identify(tables, outline.task) != provenance.get("run_id")
     ):
         raise UsageError(
-            f"{place} was changed after the run was started; start another run with --config "
-            f"{place} --out DIR"
+            f"{place} was changed after the run was started; start another run with "
+            f"'conevo run --config {quoted(place)} --out DIR'"
         )
     return outline

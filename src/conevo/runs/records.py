@@ -79,6 +79,7 @@ class Origin(TypedDict):
     run_id: RunId
     generation: Count
     checkpoint: Digest
+    code: NotRequired[str]
     of: NotRequired[Literal["champion"]]
 
 

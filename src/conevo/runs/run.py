@@ -8,13 +8,14 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from conevo.errors import EnvironmentFailure, UsageError
+from conevo.errors import EnvironmentFailure, UsageError, without_team
 from conevo.runs import provenance
 from conevo.runs.code import last_code, refuse_other_code
-from conevo.runs.directory import refuse_existing
+from conevo.runs.directory import CONFIG, refuse_existing
 from conevo.runs.outline import Outline
 from conevo.runs.store import Store, create
 from conevo.runs.time_limit import TimeLimit
+from conevo.terms import quoted
 
 # A run is looked at more often than it is carried on: what simulates it is loaded where it is used.
 if TYPE_CHECKING:
@@ -120,6 +121,7 @@ def start(
         **ancestry,
         "sessions": [],
     }
+    refuse_existing(path, is_new=True)
     return Run(create(path, config, about, first if ancestry else None), lab)
 
 
@@ -387,11 +389,6 @@ class Run:
             self.outline, self.config = self._store.read_outline(), self._store.read_config()
             yield
 
-    def without_team(self) -> UsageError:
-        """Return the error for a run that has no champion."""
-        lost = "lost its champion.npz" if self.generations() else "no finished generation yet"
-        return UsageError(f"{self.path} has {lost}, so there is no team")
-
     def test(
         self,
         scenarios: int | None = None,
@@ -417,7 +414,7 @@ class Run:
         refuse_numbers(scenarios, seed)
         champion = team or self.champion
         if champion is None:
-            raise self.without_team()
+            raise without_team(self.path, self.generations())
         return self._test(self._equip(threads), champion, scenarios, seed)
 
     def test_under(
@@ -459,9 +456,10 @@ class Run:
     def refuse_finished(self) -> None:
         """Raise UsageError if there is nothing left to do."""
         if self._store.is_finished:
+            path = quoted(self.path)
             raise UsageError(
-                f"{self.path} is finished; see it with 'conevo show {self.path}', or continue it "
-                f"with 'conevo resume {self.path} --generations N', N above {self.done()[0]}"
+                f"{self.path} is finished; see it with 'conevo show {path}', or continue it "
+                f"with 'conevo resume {path} --generations N', N above {self.done()[0]}"
             )
 
     def refuse_other_code(self) -> None:
@@ -488,7 +486,8 @@ class Run:
             raise UsageError(
                 f"{self.path} was made with other kernels ({about['kernel_hash']}, here "
                 f"{lab.simulator.fingerprint}): install conevo {about['conevo']} and warp-lang "
-                f"{about['warp']}, or start another run with --config {self.path}/config.toml"
+                f"{about['warp']}, or start another run with "
+                f"'conevo run --config {quoted(self.path / CONFIG)}'"
             )
         return lab
 

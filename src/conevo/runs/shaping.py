@@ -24,15 +24,16 @@ from typing import TYPE_CHECKING, Any
 
 import tomli_w
 
-from conevo.errors import UsageError
+from conevo.errors import UsageError, without_team
 from conevo.reading import check, read_bytes, read_toml
 from conevo.runs.code import last_code, refuse_other_code, sessions_of
 from conevo.runs.directory import CONFIG, SHAPING, Directory, appearing, refuse_existing
-from conevo.runs.durable import replace_file
+from conevo.runs.durable import is_there, replace_file
 from conevo.runs.evolved_prey import PREY, PREY_TASKS, refuse_other_prey, save_prey
 from conevo.runs.outline import Outline, identify, outline_of
 from conevo.runs.run import RUNS, Record, Run, Watch, start
 from conevo.runs.time_limit import TimeLimit
+from conevo.terms import quoted
 
 if TYPE_CHECKING:
     from conevo.evolution.protocol import State
@@ -109,6 +110,7 @@ def start_shaping(
     for before, stage in zip([configs[0], *configs], configs, strict=False):
         state = Lab.equip(stage, threads, device).first_state(state)
         refuse_other_controllers("a stage", before, stage)
+    refuse_existing(path, is_new=True)
     with appearing(path) as draft:
         about = {
             "format": FORMAT,
@@ -177,7 +179,7 @@ class Shaping:
         """
         begun: list[Run] = []
         for number, run_id in enumerate(self.run_ids, start=1):
-            if not (self._stage_path(number) / CONFIG).is_file():
+            if not is_there(self._stage_path(number) / CONFIG):
                 break
             run = Run(self._stage_path(number))
             if run.provenance["run_id"] != run_id:
@@ -236,7 +238,7 @@ class Shaping:
         while of and (champion := stages[of - 1].champion) is None:
             of -= 1
         if champion is None:
-            raise UsageError(f"{self.path} has no finished generation yet, so no team to test")
+            raise without_team(self.path, self.generations())
         return [
             self.place(stage)
             | {"team_of": of}
@@ -258,7 +260,8 @@ class Shaping:
     def refuse_finished(self) -> None:
         """Raise UsageError if there is nothing left to do."""
         if self._directory.is_finished:
-            raise UsageError(f"{self.path} is finished; see it with 'conevo show {self.path}'")
+            show = f"conevo show {quoted(self.path)}"
+            raise UsageError(f"{self.path} is finished; see it with '{show}'")
 
     def refuse_other_code(self) -> None:
         """Raise UsageError if another conevo made the stages so far."""

@@ -49,6 +49,7 @@ from conevo.runs.code import version
 from conevo.runs.directory import CONFIG, Directory, appearing, as_json
 from conevo.runs.durable import append_line, replace_file, writing
 from conevo.runs.outline import LENGTH, Outline, digest_of, read_outline
+from conevo.terms import counted
 
 if TYPE_CHECKING:
     from conevo.evolution.protocol import State
@@ -178,6 +179,17 @@ class Store(Directory):
         """Replace the provenance."""
         replace_file(self.path / PROVENANCE, as_json(provenance))
 
+    def refuse_changed(self) -> None:
+        """Refuse a finished run whose records are not those that it was sealed with.
+
+        Raises:
+            DamagedFile: its settings, generations or testing phase were changed.
+        """
+        if changed := self.check_seal((CONFIG, PROVENANCE, GENERATIONS, TEST)):
+            raise DamagedFile(
+                f"{self.path} was changed since it was finished: {', '.join(changed)}"
+            )
+
     # --- another length ---------------------------------------------------------------------------
 
     def extend(self, config: RunConfig, former: Record, at: str) -> None:
@@ -280,7 +292,7 @@ class Store(Directory):
         records = self._parse_log(kept)  # before anything is cut
         if len(records) != count:
             raise UsageError(
-                f"{path} has {len(records)} generations, the checkpoint is at {count}: "
+                f"{path} has {counted(len(records), 'generation')}, the checkpoint is at {count}: "
                 f"the run cannot be resumed"
             )
         if content != kept:

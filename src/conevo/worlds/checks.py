@@ -14,7 +14,7 @@ import numpy.typing as npt
 from pydantic import ValidationError
 
 from conevo.controllers.registry import controller, genome_of, refuse_misfit
-from conevo.errors import ConevoError, UsageError
+from conevo.errors import ConevoError, EnvironmentFailure, UsageError
 from conevo.outside import line_of
 from conevo.parameters import wrong_values
 from conevo.rng import fold, stream
@@ -36,9 +36,12 @@ KEYS = [fold(1, "check", k) for k in range(3)]
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that was looked at: "ok", a "note" to think about, or a "problem"."""
+    """One thing that was looked at: "ok", a "note" to think about, or a "problem".
 
-    status: Literal["ok", "note", "problem"]
+    One that is "running" says nothing of the world: what begins now takes seconds, in a good one.
+    """
+
+    status: Literal["ok", "note", "problem", "running"]
     topic: str
     text: str
 
@@ -48,13 +51,18 @@ def findings(path: str) -> Iterator[Finding]:
 
     Args:
         path: "FILE.py:ENVIRONMENT" or "rover/complex-1".
+
+    Raises:
+        EnvironmentFailure: the machine failed, and nothing is known of the world.
     """
     try:
         entry, environment = resolve(path)
         yield from _all(entry, environment)
+    except EnvironmentFailure:
+        raise
     except ConevoError as error:
         yield Finding("problem", "world", str(error))
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         line = line_of(error)
         if not line:
             raise
@@ -129,8 +137,12 @@ def _of_parameters(params_class: Any) -> Iterator[str]:
 def _drawn(entry: WorldEntry, environment: str) -> Iterator[Finding]:
     """Check how scenarios are drawn."""
     a_world = entry.build(environment, entry.params_class())
+    yield Finding("running", "scenarios", "")
     fine = "the same for the same key, different for different keys"
-    yield from _topic("scenarios", _of_scenarios(a_world), fine)
+    found = list(_topic("scenarios", _of_scenarios(a_world), fine))
+    yield from found
+    if all(finding.status == "ok" for finding in found):
+        yield from _of_environments(entry)
 
 
 def _of_scenarios(a_world: World) -> Iterator[str]:
@@ -156,6 +168,27 @@ def _of_scenarios(a_world: World) -> Iterator[str]:
         yield f"{names} are the same for all keys: draw them from stream(key, NAME)"
 
 
+def _of_environments(entry: WorldEntry) -> Iterator[Finding]:
+    """Note environments that nothing tells apart: neither parameters nor a scenario."""
+    known: dict[tuple[object, ...], str] = {}
+    for name in entry.environments:
+        a_world = entry.build(name, entry.params_class())
+        simulation, drawn = a_world.simulation(), a_world.scenarios(KEYS[:1])
+        if wrong := list(scenario_faults(simulation.scene, drawn, 1)):
+            yield Finding("problem", "environments", f"{name}: {wrong[0]}")
+            continue
+        made = (
+            *(getattr(drawn, field).tobytes() for field in simulation.scene.vars),
+            repr(simulation.params.numpy_value()),
+            repr(a_world.controller),
+            a_world.n_robots,
+            tuple(simulation.functions.values()),
+        )
+        if (other := known.setdefault(made, name)) != name:
+            text = f"{name} is the same as {other}: in its parameters, and in a scenario of one key"
+            yield Finding("note", "environments", text)
+
+
 def random_teams(a_world: World, n: int) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.int32]]:
     """Return a pool of random genotypes and ``n`` teams of controllers made of it [N, R, U].
 
@@ -179,10 +212,13 @@ def _stepped(entry: WorldEntry, environment: str) -> Iterator[Finding]:
     a_world = _shorter(entry, environment)
     trial = Trial(a_world, *mixed_teams(a_world), a_world.scenarios(KEYS[:2]))
     about = f"{trial.n_worlds} epochs of {a_world.params.iterations} iterations"
-    trial.run()
+    for _ in trial.run():
+        yield Finding("running", "memory", "")
     yield Finding("ok", "memory", f"{about}: all array indices are in bounds")
     for topic, problems, fine in trial.seen():
         yield from _topic(topic, iter(problems), fine)
+    for text in trial.unplayed_heuristics():
+        yield Finding("note", "heuristics", text)
 
 
 def mixed_teams(

@@ -1,7 +1,9 @@
 """Which line of a world's file was running when its process died.
 
 A copy of the file notes the number of each line of its Warp functions before running it, in a small
-file that the process shares with the one that started it.
+file that the process shares with the one that started it. A function that returns notes the line
+that called it once more, which goes on with what the call gave; the end of a ``while`` loop that of
+its condition.
 """
 
 import ast
@@ -12,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import warp as wp
 
-__all__ = ["MARKS", "mark", "marked", "read_mark"]
+__all__ = ["MARKS", "last_mark", "mark", "marked", "read_mark", "statement_at"]
 
 MARKS = "CONEVO_MARKS"  # the variable that names the shared file
 LINES = 1_000_000  # more than a file has: a mark is the number of the file, times this, plus a line
@@ -24,16 +26,21 @@ def marked(text: str, file: int) -> str:
     tree = ast.parse(text)
     for node in ast.walk(tree):
         if isinstance(node, ast.FunctionDef) and any(map(_is_warp, node.decorator_list)):
-            for inner in ast.walk(node):
-                for name in ("body", "orelse"):
-                    lines = getattr(inner, name, None)
-                    if isinstance(lines, list):
-                        setattr(inner, name, _marked(lines, file))
+            node.body = [
+                *_parsed("_mark_of_caller = _last_mark()"),
+                *_marked(node.body, file * LINES),
+                *_parsed("_mark_line(_mark_of_caller)"),
+            ]
     after = next(
         (k for k, line in enumerate(tree.body) if not _is_first(line)), len(tree.body)
     )  # imports of the future come first
-    tree.body[after:after] = ast.parse(f"from {__name__} import mark as _mark_line").body
+    names = "last_mark as _last_mark, mark as _mark_line"
+    tree.body[after:after] = _parsed(f"from {__name__} import {names}")
     return ast.unparse(tree)
+
+
+def _parsed(text: str) -> list[ast.stmt]:
+    return ast.parse(text).body
 
 
 def _is_warp(decorator: ast.expr) -> bool:
@@ -46,14 +53,50 @@ def _is_first(line: ast.stmt) -> bool:
     )
 
 
-def _marked(lines: list[ast.stmt], file: int) -> list[ast.stmt]:
+def _marked(lines: list[ast.stmt], file: int, loop: ast.stmt | None = None) -> list[ast.stmt]:
+    """Return lines with their marks; ``file`` is added to each, ``loop`` is the one around them."""
     found: list[ast.stmt] = []
     for line in lines:
         is_text = isinstance(line, ast.Expr) and isinstance(line.value, ast.Constant)
         if not is_text:
-            found += ast.parse(f"_mark_line({file * LINES + line.lineno})").body
+            found += _parsed(f"_mark_line({file + line.lineno})")
+        if isinstance(line, ast.Return):
+            found += _returning(line)
+        if isinstance(line, ast.Continue) and isinstance(loop, ast.While):
+            found += _parsed(f"_mark_line({file + loop.lineno})")
+        around = line if isinstance(line, ast.For | ast.While) else loop
+        for name in ("body", "orelse"):
+            if inner := getattr(line, name, None):
+                setattr(line, name, _marked(inner, file, around))
+        if isinstance(line, ast.While):
+            line.body += _parsed(f"_mark_line({file + line.lineno})")
         found.append(line)
     return found
+
+
+def _returning(line: ast.Return) -> list[ast.stmt]:
+    """Return the lines before a return: they compute its value, and note the caller again."""
+    whole = line.value
+    values = whole.elts if isinstance(whole, ast.Tuple) else [whole] if whole else []
+    found: list[ast.stmt] = []
+    for k, value in enumerate(values):
+        if not isinstance(value, ast.Constant):
+            name = f"_returned_{line.lineno}_{k}"
+            found += _parsed(f"{name} = {ast.unparse(value)}")
+            values[k] = ast.Name(name)
+    if whole and not isinstance(whole, ast.Tuple):
+        line.value = values[0]
+    return [*found, *_parsed("_mark_line(_mark_of_caller)")]
+
+
+def statement_at(text: str, line: int) -> str:
+    """Return the statement that begins at a line, in one line; of a compound one its first part."""
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.stmt) and node.lineno == line:
+            body = getattr(node, "body", None)
+            end = max(line, body[0].lineno - 1) if body else node.end_lineno
+            return " ".join(" ".join(text.splitlines()[line - 1 : end]).split())
+    return ""
 
 
 def read_mark(path: Path) -> tuple[int, int] | None:
@@ -73,3 +116,8 @@ else:
 @wp.func_native(f"*reinterpret_cast<volatile int*>({_address}ull) = number;")
 def mark(number: int):  # type: ignore[no-untyped-def]
     """Note that a line is about to run."""
+
+
+@wp.func_native(f"return *reinterpret_cast<volatile int*>({_address}ull);")
+def last_mark() -> int:  # type: ignore[empty-body]
+    """Return what was noted last."""

@@ -149,7 +149,7 @@ def resolve(path: str, digest: str = "", is_whole: bool = True) -> tuple[WorldEn
 
         name, entry = file, load(Path(file), digest)
         example = f"{file}:{entry.environments[0]}"
-    elif file or ".py/" in path:
+    elif file or ".py/" in path or path.startswith(("/", ".")):
         raise UsageError(f"world {path!r}: a world in a file is named FILE.py:ENVIRONMENT")
     else:
         name, _, environment = path.partition("/")

@@ -16,10 +16,11 @@ import warp as wp
 from conevo.controllers.protocol import Controller, Mind
 from conevo.controllers.registry import controller as make_controller
 from conevo.controllers.registry import genome_of, refuse_misfit
-from conevo.errors import EnvironmentFailure
+from conevo.errors import EnvironmentFailure, UsageError
 from conevo.kernels import engine
+from conevo.kernels.devices import refuse_unknown_device
 from conevo.kernels.engine import barrier
-from conevo.worlds.contract import PHASES, refuse_faults, sizes_of
+from conevo.worlds.contract import PHASES, refuse_faults, scenario_faults, sizes_of
 from conevo.worlds.measures import measures_of
 from conevo.worlds.protocol import Outcome, Scenarios, Simulation, World
 
@@ -150,7 +151,13 @@ def loading_kernel(Weights: Any, Shape: Any, load: Any) -> Any:
 
 
 def check_device(device: str) -> None:
-    """Raise EnvironmentFailure for a device that this machine does not have."""
+    """Refuse a device that this machine does not have.
+
+    Raises:
+        UsageError: it is not the name of a device.
+        EnvironmentFailure: there is none of this name here.
+    """
+    refuse_unknown_device(device)
     engine.start()
     allowed = ["cpu", *(d.alias for d in wp.get_cuda_devices())]
     if device not in (*allowed, *(["cuda"] if len(allowed) > 1 else [])):
@@ -183,7 +190,8 @@ class Rollout:
         lanes: lanes of a CPU block (for tests of the CUDA form; needs Warp's CPU blocks).
 
     Raises:
-        UsageError: the world lacks what the engine needs of it, or the controller does not fit it.
+        UsageError: the world lacks what the engine needs of it, the controller does not fit it, or
+            no device is named so.
         EnvironmentFailure: the device does not exist.
     """
 
@@ -253,7 +261,9 @@ class Rollout:
 
         Raises:
             ValueError: shapes or rows that do not fit this world.
+            UsageError: scenarios whose arrays are not those of the world's scene.
         """
+        self._refuse_faulty(scenarios)
         genes, teams, heuristic = self._checked(genes, teams, heuristic)
         n_teams, r = len(teams), self.world.n_robots
         e, odd = divmod(len(scenarios), rounds)
@@ -307,6 +317,7 @@ class Rollout:
             [T, R, U], the activation of the part in each slot; ``performance`` [T, measures], each
             as if the epoch ended there.
         """
+        self._refuse_faulty(scenarios)
         if len(scenarios) != 1:
             raise ValueError(f"record takes one scenario, got {len(scenarios)}")
         genes, teams, modes = self._checked(
@@ -332,6 +343,12 @@ class Rollout:
         return {name: np.stack(values) for name, values in steps.items()} | {
             name: values[: sizes[name]].copy() for name, values in final.items()
         }
+
+    def _refuse_faulty(self, scenarios: Scenarios) -> None:
+        """Raise UsageError for scenarios that are not those of the world's scene."""
+        n = len(getattr(scenarios, "seed", ()))
+        for fault in scenario_faults(self._simulation.scene, scenarios, n):
+            raise UsageError(f"world {self.world.name}: scenarios: {fault}")
 
     def _checked(
         self,

@@ -56,8 +56,8 @@ class Trial:
         self._switched = np.zeros((self.n_worlds, world.n_robots), int)
         self._action = np.full((self.n_worlds, world.n_robots), -1, np.int32)
 
-    def run(self) -> None:
-        """Run the epochs, which ends the process where an array has no such index."""
+    def run(self) -> Iterator[None]:
+        """Run the epochs, which ends the process where an array has no such index; yields often."""
         plain, iterations = self.plain, self.world.params.iterations
         robots = stream(1, "check", "order")
         others = {"reverse": Stepper(*self._task), "random": Stepper(*self._task)}
@@ -68,6 +68,7 @@ class Trial:
             if step == "sense" and t in (0, 1, iterations // 2):
                 self._look_at_sensors(t)
             before = {name: values.copy() for name, values in plain.arrays().items()}
+            yield
             plain.step(step, plain.natural, t)
             for kind, stepper in list(others.items()):
                 order = plain.natural
@@ -75,6 +76,7 @@ class Trial:
                     order = order[:, ::-1]
                 elif kind == "random":
                     order = robots.permuted(order, axis=1)
+                yield
                 stepper.step(step, order, t)
                 if found := _differences(plain.arrays(), stepper.arrays()):
                     del others[kind]
@@ -231,6 +233,26 @@ class Trial:
             if other := played.get(row.tobytes()):
                 yield f"{name!r} does exactly what {other} does"
             played[row.tobytes()] = repr(name)
+
+    def unplayed_heuristics(self) -> Iterator[str]:
+        """Yield a line for each that ends as a network without neurons, as if act did not know it.
+
+        One that is meant to do what such a network does ends so, too.
+        """
+        world, genes, teams, scenarios, heuristic = self._task
+        nobody = np.full_like(teams[:1], -1), scenarios, np.full_like(heuristic[:1], -1)
+        idle = Stepper(world, genes, *nobody)
+        for step, t in idle.epoch(world.params.iterations):
+            idle.step(step, idle.natural, t)
+        ended, all_ended = idle.arrays(), self.plain.arrays()
+        for k, name in enumerate(world.heuristics):
+            team = self._n_teams - len(world.heuristics) + k
+            rows = slice(team * len(scenarios), (team + 1) * len(scenarios))
+            if all(ended[one].tobytes() == all_ended[one][rows].tobytes() for one in RESULTS):
+                yield (
+                    f"{name!r} does exactly what a network with equal outputs does: does act have "
+                    f"a case for heuristic {k}?"
+                )
 
 
 def _only(order: Order, i: int) -> Order:

@@ -224,7 +224,12 @@ def test_world_preset_and_variant_are_judged_apart(tmp_path: Path) -> None:
         ("rover-v2", "smoke", ""): [30.0],
     }
     # CONE alone, so there is nothing to compare it with; but it is told which runs there are.
-    assert [one.budget for one in told] == ["desk", "smoke", "smoke; gst=0.1", "smoke"]
+    assert [(one.budget, one.variant) for one in told] == [
+        ("desk", ""),
+        ("smoke", ""),
+        ("smoke", "gst=0.1"),
+        ("smoke", ""),
+    ]
     assert {one.verdict for one in told} == {"undecided: no such runs"}
     assert all("no runs of HetCNE in 10 environments" in one.why for one in told)
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import dataclasses
 from pathlib import Path
 
+import duckdb
+
 from analysis.claims.known_truth import rover, write_tables
 from conevo.analysis.frames import Tables
 from conevo.analysis.sections.claims import claims
@@ -43,6 +45,22 @@ def test_the_power_of_the_rule_is_next_to_what_is_to_be_alike(tmp_path: Path) ->
     assert f"in which all are alike {share} % show it" in rows["R4"]["reasons"]
     assert rows["R10"]["power"] is None
     assert "power" not in rows["R10"]["reasons"]
+
+
+def test_a_verdict_has_the_levels_that_it_belongs_to(tmp_path: Path) -> None:
+    truth = {key: cell for key, cell in rover().items() if key[1] in ("homcne", "hetcne")}
+    folder = write_tables(tmp_path, "rover-v1", truth, 3)
+    runs = folder / "runs.parquet"
+    level = "if(seed = 1, 'gst=0.1, rounds=2', 'gst=0.3, rounds=2')"
+    with duckdb.connect() as connection:
+        connection.execute(f"CREATE TABLE old AS FROM read_parquet('{runs}')")
+        connection.execute(f"COPY (SELECT * REPLACE ({level} AS variant) FROM old) TO '{runs}'")
+    with Tables(folder) as tables:
+        exhibits = claims(tables).exhibits
+    for table in exhibits:
+        assert [column.title for column in table.columns][:2] == ["claim", "levels"]
+        assert {row["variant"] for row in table.rows} == {"gst=0.1, rounds=2", "gst=0.3, rounds=2"}
+    assert "rounds" not in exhibits[0].rows[0]["how"]
 
 
 def test_a_campaign_about_no_claim_has_one_line(tmp_path: Path) -> None:

@@ -46,7 +46,8 @@ class Verdict:
         low, high: its 95 % interval, None where there is none.
         tests: names of the tests and intervals used.
         n: runs per sample, "20" or "3 to 20".
-        budget: preset and team evaluations, then the variant.
+        budget: preset and team evaluations.
+        variant: the levels of the campaign's further factors, "gst=0.1, rounds=2"; empty without.
         verdict: "reproduced", "not reproduced", "not tested: no exchange", "not judged: the thesis
             contradicts itself", or "undecided: " and why.
         alone: the verdict if nothing else in the thesis counted.
@@ -68,6 +69,7 @@ class Verdict:
     tests: str
     n: str
     budget: str
+    variant: str
     verdict: str
     alone: str
     caution: str
@@ -106,7 +108,7 @@ def judge(claim: Claim, evidence: Evidence) -> Verdict:
     agree = by_t == by_rank or both_undecided
     key = next((cell for cell in sorted(cells, key=lambda c: c.weight) if cell.has_runs), None)
     budgets = sorted({budget for cell in cells for budget in cell.gathered.budgets})
-    spent = [*(budgets or [evidence.preset]), evidence.variant]
+    spent = budgets or [evidence.preset]
     low, high = key.interval if key else (None, None)
     power = _power(claim, cells)
     alone = by_rank if agree else f"{UNDECIDED}the tests disagree"
@@ -127,6 +129,7 @@ def judge(claim: Claim, evidence: Evidence) -> Verdict:
         tests=wording.tests(cells),
         n=wording.sizes(cells),
         budget="; ".join(one for one in spent if one),
+        variant=evidence.variant,
         verdict=NOT_JUDGED if claim.contradiction and key else alone,
         alone=alone,
         caution=claim.contradiction or claim.caution,

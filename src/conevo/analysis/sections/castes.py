@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -56,6 +57,7 @@ def _over_generations(
         for cell, parts in found.items()
         for name, shares in parts.items()
         for evaluations, share in zip(x, shares, strict=True)
+        if math.isfinite(share)
     ]
     size = sizes(len(scope.cells.get(cell, ())) for cell in found)
     colours = caste_colours(scope.group.world, histories.castes)
@@ -63,7 +65,8 @@ def _over_generations(
         f"{scope.stem}-castes",
         "Castes of the fittest team over the generations",
         "Share of the robots in each caste, mean over runs, at equal numbers of team evaluations; "
-        f"a robot is in the caste of what it does most if S < 0.5 ({S_SCALE}). {size} per panel.",
+        f"a robot is in the caste of what it does most if S < 0.5 ({S_SCALE}). A panel is empty "
+        f"until the first generation has ended. {size} per panel.",
         (),
         rows,
         drawing=curves.stacks(

@@ -7,6 +7,7 @@ from typing import Any
 from conevo.analysis.comparison import Treatment
 from conevo.analysis.exhibits import Column, Section, Table, plain
 from conevo.analysis.sections.scope import Scope
+from conevo.terms import counted
 
 __all__ = ["champions"]
 
@@ -81,8 +82,8 @@ def _not_finite(scope: Scope) -> list[str]:
         f" AND b.budget = '{budget}' GROUP BY ALL HAVING count(*) > count(s.value) ORDER BY ALL"
     )[1]
     return [
-        f"Not finite: {measure.replace('_', ' ')} in {values} of {of_values} values of "
-        f"{NAMES.get((study, team), study)}, of {runs} of {of_runs} runs. Means are those of the "
-        "other scenarios; a run without any is left out of tables and figures."
+        f"Not finite: {measure.replace('_', ' ')} in {values} of {counted(of_values, 'value')} of "
+        f"{NAMES.get((study, team), study)}, of {runs} of {counted(of_runs, 'run')}. Means are "
+        "those of the other scenarios; a run without any is left out of tables and figures."
         for measure, study, team, runs, of_runs, values, of_values in found
     ]

@@ -32,6 +32,7 @@ def claims(tables: Tables) -> Section:
     ]
     columns = [
         Column("place", "claim", plain),
+        *_level(found),
         Column("claim", "claim of the thesis", plain, is_wide=True),
         Column("effect", "effect", plain, is_wide=True),
         Column("interval", "95 % interval", interval),
@@ -41,11 +42,12 @@ def claims(tables: Tables) -> Section:
         Column("verdict", "verdict", plain, is_wide=True),
         Column("reasons", "why", plain, is_wide=True),
     ]
+    levels = "Levels: of the runs that a verdict is about. " if _level(found) else ""
     note = (
-        "n: runs per sample. Exchange: pairs of sub-populations of CONE that recombined between "
-        "populations in a generation, and of those that could have; where that is next to nothing "
-        "(fewer than one pair, and fewer than a tenth) statements about CONE are not tested. "
-        "Significant: p < 0.05, by the t-test uncorrected as in the thesis and "
+        f"{levels}n: runs per sample. Exchange: pairs of sub-populations of CONE that recombined "
+        "between populations in a generation, and of those that could have; where that is next to "
+        "nothing (fewer than one pair, and fewer than a tenth) statements about CONE are not "
+        "tested. Significant: p < 0.05, by the t-test uncorrected as in the thesis and "
         "by Mann-Whitney with Holm's correction over the claim; alike: no significant difference, "
         "and the interval of the difference inside ±15 % of the larger mean. Power: how often "
         "methods that are exactly alike would be found so, with as many runs that scatter as much."
@@ -63,6 +65,7 @@ def _row(one: Verdict) -> dict[str, Any]:
     return {
         "id": one.id,
         "place": f"{one.id} ({one.source})",
+        "variant": one.variant or None,
         "claim": one.claim,
         "source": one.source,
         "effect": one.effect,
@@ -78,6 +81,12 @@ def _row(one: Verdict) -> dict[str, Any]:
     }
 
 
+def _level(found: list[Verdict]) -> list[Column]:
+    """Return the column of the levels that verdicts belong to, if the campaign has any."""
+    has_any = any(one.variant for one in found)
+    return [Column("variant", "levels", plain)] if has_any else []
+
+
 def _statements(found: list[Verdict]) -> Table:
     """Return every comparison and share that a verdict was made of."""
     rows: list[dict[str, Any]] = []
@@ -90,6 +99,7 @@ def _statements(found: list[Verdict]) -> Table:
             rows.append(
                 {
                     "id": one.id,
+                    "variant": one.variant or None,
                     "environment": place_of(cell.statement),
                     "what": what_of(cell.statement),
                     "n": ", ".join(str(len(sample)) for sample in cell.gathered.samples),
@@ -105,6 +115,7 @@ def _statements(found: list[Verdict]) -> Table:
             )
     columns = [
         Column("id", "claim", plain),
+        *_level(found),
         Column("environment", "environment", plain),
         Column("what", "what", plain, is_wide=True),
         Column("n", "n", plain),

@@ -9,6 +9,8 @@ of the means. Of a measure of which smaller is better, what is added is lost.
 from __future__ import annotations
 
 from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 from conevo.analysis import figures
@@ -28,6 +30,9 @@ from conevo.analysis.sections.scope import KEYS, Scope, named, sizes
 from conevo.analysis.statistics import Estimate, compare, holm, mean_interval
 
 __all__ = ["clones", "lesions"]
+
+MOST = 100.0  # percent that can be lost, and gained: of the larger of two performances
+ENDS = "which ends at ±100 %, where losses do"
 
 
 class _Team(NamedTuple):
@@ -79,7 +84,7 @@ def _section(scope: Scope, study: str, title: str, what: str, note: str) -> Sect
     cells, lost = _teams(scope, study)
     text = []
     if lost:
-        text.append(f"{lost} teams are left out: neither they nor the unchanged ones scored.")
+        text.append(f"Teams left out, as neither they nor the unchanged ones scored: {lost}.")
     if not cells:
         return Section(title, text or ["None of these runs has an intervention study."])
     rows = _rows(scope, cells)
@@ -151,20 +156,28 @@ def _figure(
         title,
         f"{note} Percent of the larger of the two; below 0 the changed team was better "
         f"({scope.main.direction}). A point per run: the mean over its castes"
-        + ("; next to them the mean with Student's 95 % interval" if several else "")
+        + (f"; next to them the mean with Student's 95 % interval, {ENDS}" if several else "")
         + f". {size} per cell.",
         (),
         rows,
         drawing=figures.points(
-            at.grid(means, lambda values: figures.Runs(values, _ends(mean_interval(values)))),
+            at.grid(means, lambda values: figures.Runs(values, _ends(_mean_lost(values)))),
             at.places,
             named({cell: len(values) for cell, values in means.items()}),
             x_label=at.axis,
             y_label="lost, % of the larger",
             reference=0.0,
-            within=(-100.0, 100.0),
+            within=(-MOST, MOST),
         ),
     )
+
+
+def _mean_lost(values: Sequence[float]) -> Estimate:
+    """Return the mean of losses in percent, with an interval that ends where losses do."""
+    mean = mean_interval(values)
+    if mean.low is None or mean.high is None:
+        return mean
+    return replace(mean, low=max(mean.low, -MOST), high=min(mean.high, MOST))
 
 
 def _ends(mean: Estimate) -> tuple[float, float, float] | None:
@@ -180,7 +193,7 @@ def _rows(scope: Scope, cells: dict[Cell, list[_Team]]) -> list[dict[str, Any]]:
         for caste in sorted({team.caste for team in teams}):
             with_it = [team for team in teams if team.caste == caste]
             result = compare([team.value for team in with_it], [team.whole for team in with_it])
-            lost = mean_interval([team.lost for team in with_it])
+            lost = _mean_lost([team.lost for team in with_it])
             of = _percent(result.mean_a, result.mean_b)
             rows.append(
                 scope.key(cell.environment, cell.treatment)
@@ -214,9 +227,9 @@ def _table(scope: Scope, study: str, what: str, note: str, rows: list[dict[str, 
     shown = with_values(columns, rows)
     is_tested = any(column.key == "p_t" for column in shown)
     tests = (
-        " with Student's 95 % interval. p (t): Student's independent t-test of changed and "
-        "unchanged teams, uncorrected, as in the thesis; p (MW, Holm): Mann-Whitney, corrected by "
-        f"Holm for the {len(rows)} rows."
+        f" with Student's 95 % interval, {ENDS}. p (t): Student's independent t-test of changed "
+        "and unchanged teams, uncorrected, as in the thesis; p (MW, Holm): Mann-Whitney, corrected "
+        f"by Holm for the {len(rows)} rows."
     )
     return Table(
         f"{scope.stem}-{study}-castes",

@@ -13,6 +13,7 @@ from conevo.analysis.frames import Tables
 from conevo.errors import ConevoError
 from conevo.evolution.methods.registry import name_in
 from conevo.reading import parse_toml, read_json, read_json_lines, read_text
+from conevo.terms import counted
 
 __all__ = ["Campaign", "overview", "read_campaign", "repetition"]
 
@@ -95,10 +96,10 @@ def overview(tables: Tables, campaign: Campaign) -> Section:
     if campaign.produces:
         text.append(f"Data of the thesis' {', '.join(campaign.produces)}.")
     planned = f" of {len(campaign.planned):,} planned" if campaign.planned else ""
-    stages = f" ({len(runs):,} stages)" if len(runs) > len(finished) else ""
+    stages = f" ({counted(len(runs), 'stage')})" if len(runs) > len(finished) else ""
     text.append(
-        f"{len(finished):,}{planned} runs are finished{stages}, {len(failed):,} failed, "
-        f"{len(waiting):,} have not ended. Only finished runs count below. Runs of different "
+        f"Runs finished: {len(finished):,}{planned}{stages}; failed: {len(failed):,}; not ended: "
+        f"{len(waiting):,}. Only finished runs count below. Runs of different "
         "presets or budgets are never in one table or figure."
     )
     if waiting:

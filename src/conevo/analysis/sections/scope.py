@@ -186,7 +186,8 @@ def place_names(environments: Sequence[str]) -> list[str]:
 
 def sizes(counts: Iterable[int]) -> str:
     """Return the number of runs in words."""
-    return f"{span(list(counts))} runs"
+    found = list(counts)
+    return f"{span(found)} {'run' if set(found) == {1} else 'runs'}"
 
 
 def span(counts: Sequence[int]) -> str:

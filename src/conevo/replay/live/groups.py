@@ -18,7 +18,7 @@ from conevo.errors import ConevoError, UsageError
 from conevo.evolution.methods.registry import name_in
 from conevo.replay.live.files import Stamp, is_locked, readable, stamp
 from conevo.replay.live.panels import Panel, panels_of
-from conevo.replay.live.runs import Standing, Subject
+from conevo.replay.live.runs import Standing, Subject, span
 from conevo.runs.directory import LOCK, kind_of
 
 __all__ = ["Experiment", "Group", "Names", "Runs", "children"]
@@ -200,7 +200,8 @@ class Experiment(Group):
         for label, run in campaign.planned.items():
             path = folder / Path(label).name
             about = {name: getattr(run, name) for name in ("preset", "seed", "variant")}
-            about |= {"task": shown_as(run.world), "method": name_in(run.method)}
+            about |= {"task": span([shown_as(task) for task in run.tasks])}
+            about |= {"method": name_in(run.method)}
             name = f"{self._prefix}/{label}" if self._prefix else label
             self._by_label[label] = known.get(label) or Subject(
                 self._names.of(path, name), path, about

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import tomllib
 from array import array
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -16,13 +17,13 @@ import numpy.typing as npt
 
 from conevo.errors import ConevoError, UsageError
 from conevo.evolution.methods.registry import name_in
-from conevo.replay.live.declared import Declared
+from conevo.replay.live.declared import NOTHING, Declared, Found
 from conevo.replay.live.files import Log, Whole, is_locked, readable, stamp
-from conevo.replay.live.settings import Choices, choices_of, factors
+from conevo.replay.live.settings import CODE, FROM, Choices, choices_of, factors
 from conevo.runs.directory import CONFIG, LOCK, SEAL, SHAPING, kind_of
 from conevo.worlds.measures import Measure
 
-__all__ = ["Settings", "Standing", "Subject", "plain"]
+__all__ = ["Settings", "Standing", "Subject", "plain", "span"]
 
 RECENT = 10  # generations by which the pace is judged
 SHOWN = 2000  # generations of a run in its details, at most
@@ -192,7 +193,11 @@ class Subject:
     @property
     def measures(self) -> dict[str, Measure]:
         """The measures that it declares, by name; of a shaping those of its last stage begun."""
-        return self._declared.read() if self._declared is not None else {}
+        return self._found.measures
+
+    @property
+    def _found(self) -> Found:
+        return self._declared.read() if self._declared is not None else NOTHING
 
     # --- what is said -----------------------------------------------------------------------------
 
@@ -212,7 +217,7 @@ class Subject:
         found |= self._about
         if self._settings:
             last = self._settings[-1]
-            found |= {"task": last.task, "method": last.method}
+            found |= {"task": span([one.task for one in self._settings]), "method": last.method}
             found |= {"preset": last.preset, "seed": last.seed}
         for name, none in (("task", ""), ("method", ""), ("preset", ""), ("seed", None)):
             found.setdefault(name, none)
@@ -265,17 +270,22 @@ class Subject:
 
     @property
     def apart(self) -> Choices:
-        """The settings that set it apart from runs of the same names; of a plan only its factors.
+        """What sets it apart from runs of the same names: settings, origin and code.
 
-        A shaping has those of every stage.
+        Of a plan only its factors, instead of all settings. A shaping has those of every stage.
         """
+        declared = self._found
+        # The stages of a shaping begin with each other's populations.
+        origin = declared.origin if self._kind == "run" else ""
+        made = [(k, v) for k, v in ((FROM, origin), (CODE, declared.codes)) if v]
         if self._is_planned:
-            return tuple((f"plan.{k}", v) for k, v in factors(str(self._about["variant"])).items())
+            levels = factors(str(self._about["variant"])).items()
+            return (*((f"plan.{k}", v) for k, v in levels), *made)
         if self._kind == "run":
-            return self._settings[0].choices if self._settings else ()
+            return (*(self._settings[0].choices if self._settings else ()), *made)
         stages = enumerate(self._settings, start=1)
         found = [(f"stage-{n}.{key}", value) for n, one in stages for key, value in one.choices]
-        return (("shaping.stages", str(len(self._settings))), *found)
+        return (("shaping.stages", str(len(self._settings))), *found, *made)
 
     @property
     def _n_generations(self) -> int:
@@ -405,6 +415,12 @@ class Subject:
                     ]
                 ),
             )
+
+
+def span(tasks: Sequence[str]) -> str:
+    """Return the tasks of a run or shaping in short: "rover-v1/complex-1 to complex-3"."""
+    last = re.split("[/:]", tasks[-1])[-1]
+    return tasks[0] if len(tasks) == 1 else f"{tasks[0]} to {last}"
 
 
 def plain(values: npt.NDArray[np.float64]) -> list[float | None]:

@@ -1,4 +1,4 @@
-"""By which settings runs differ: only runs with the same ones have a common median."""
+"""By what runs differ, settings, origin and code: only runs that are alike have a common median."""
 
 from __future__ import annotations
 
@@ -7,11 +7,12 @@ from typing import Any
 
 from conevo.replay.live.files import readable
 
-__all__ = ["Choices", "choices_of", "comparisons", "differences", "factors"]
+__all__ = ["CODE", "FROM", "Choices", "choices_of", "comparisons", "differences", "factors"]
 
-Choices = tuple[tuple[str, str], ...]  # key and value of every setting but names and seed
+Choices = tuple[tuple[str, str], ...]  # key and value of all but names and seed
 NAMES = ("run.world", "run.method", "run.preset", "run.seed")
 METHOD = "method."
+FROM, CODE = "run.from", "run.code"  # the origin of a run, and what evolved it
 LISTED = 4  # settings that a label names
 LONGEST = 120  # characters of a label
 
@@ -76,10 +77,17 @@ def comparisons(parts: Sequence[Mapping[str, str]]) -> list[tuple[str, list[int]
 
 
 def _differing(tables: Sequence[Mapping[str, str]]) -> list[dict[str, str]]:
-    """Return of each table what is not the same in all."""
+    """Return of each table what is not the same in all.
+
+    A run that has not begun has no code yet, and goes with runs of any.
+    """
     keys = dict.fromkeys(key for table in tables for key in table)
-    apart = [key for key in keys if len({table.get(key) for table in tables}) > 1]
-    return [{key: table.get(key, "") for key in apart} for table in tables]
+    values = {key: {table.get(key) for table in tables} for key in keys}
+    apart = [key for key in keys if len(values[key] - ({None} if key == CODE else set())) > 1]
+    return [
+        {key: table.get(key, "") for key in apart if key != CODE or key in table}
+        for table in tables
+    ]
 
 
 def _label(settings: Mapping[str, str], taken: Iterable[str]) -> str:

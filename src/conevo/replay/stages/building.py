@@ -11,6 +11,7 @@ from conevo.palette import BLUE, FAINT, GREEN, INK, ORANGE, VERMILION
 from conevo.replay.stage import Event, Kind
 from conevo.replay.stages.parts import Parts
 from conevo.replay.stages.words import enumerated
+from conevo.terms import counted
 from conevo.worlds.gacc.plans import TYPES
 
 __all__ = ["EVENT_KINDS", "Building"]
@@ -124,7 +125,7 @@ class Building:
             if situation[t, i] == NOT_NEEDED:
                 why = ", which is not needed now"
             elif waited[t, i] + 1 >= wait:
-                why = f" after waiting for {wait} iterations"
+                why = f" after waiting for {counted(wait, 'iteration')}"
             events.append(Event(t, LET_GO, f"robot {i} lets go of {self._letter(k)}{why}", (i,)))
         return events
 

@@ -23,6 +23,7 @@ from conevo.replay.stage import (
 )
 from conevo.replay.stages.parts import Parts, begun
 from conevo.replay.stages.words import enumerated
+from conevo.terms import counted
 
 __all__ = ["stage"]
 
@@ -155,7 +156,7 @@ def _captures(
         else:
             free = np.flatnonzero(captured[:t, q] == 0)
             n = t - 1 - int(free[-1]) if len(free) else t
-            text = f"{prey} is free again after {n} iteration{'s' * (n != 1)}"
+            text = f"{prey} is free again after {counted(n, 'iteration')}"
             events.append(Event(t, ESCAPE, f"{text} ({n * SECONDS:.1f} s)"))
     return events
 

@@ -16,6 +16,7 @@ from conevo.errors import UsageError
 from conevo.kernels.khepera import RADIUS
 from conevo.parameters import parameters
 from conevo.rng import stream
+from conevo.terms import counted
 from conevo.worlds.protocol import Scenarios, Simulation, World, kernel_params
 from conevo.worlds.pursuit.bodies import N_OBSTACLES, Params, Scene, Team
 
@@ -160,7 +161,9 @@ def _free_place(
         place = rng.uniform(edge, max(edge, arena_cm - edge), 2)
         if all(math.dist(place, other) >= 2 * float(RADIUS) + margin for other in taken):
             return place
-    raise UsageError(f"an arena of {arena_cm:g} cm has no room for {len(taken) + 1} robots")
+    raise UsageError(
+        f"an arena of {arena_cm:g} cm has no room for {counted(len(taken) + 1, 'robot')}"
+    )
 
 
 def simulate(

@@ -49,6 +49,7 @@ from annotated_types import Ge, Le
 
 from conevo.errors import UsageError, unknown_name
 from conevo.parameters import parameters
+from conevo.terms import counted
 from conevo.worlds.measures import Measure
 from conevo.worlds.protocol import Simulation, names_of
 from conevo.worlds.pursuit import prey_sets
@@ -126,7 +127,7 @@ class PursuitWorld:
         if self.params.capture_predators > self.n_robots:
             raise UsageError(
                 f"world.capture_predators ({self.params.capture_predators}) must not be above the "
-                f"{self.n_robots} predators of {self.environment}"
+                f"{counted(self.n_robots, 'predator')} of {self.environment}"
             )
 
     @property
