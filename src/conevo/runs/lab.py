@@ -12,7 +12,6 @@ from conevo.errors import EnvironmentFailure, UsageError
 from conevo.evolution.inheritance import breed_from, hand_on
 from conevo.evolution.protocol import Layout, Method, Progress, State
 from conevo.reading import DamagedFile
-from conevo.runs import checkpoint
 from conevo.runs.champions import Team
 from conevo.runs.config import RunConfig
 from conevo.runs.evaluation import Evaluate, make_evaluator
@@ -75,13 +74,15 @@ def _first(method: Method, layout: Layout, seed: int, ancestor: State | Team | N
     Raises:
         UsageError: it cannot be kept, its header is not of this run, or the ancestor does not fit.
     """
+    from conevo.runs.checkpoint import refuse_unkept
+
     if ancestor is None:
         state = method.init(layout, seed)
     elif isinstance(ancestor, Team):
         state = breed_from(method, layout, seed, ancestor.genes, ancestor.active)
     else:
         state = hand_on(method, layout, seed, ancestor)
-    checkpoint.refuse_unkept(state, method.title)
+    refuse_unkept(state, method.title)
     progress = getattr(state, "progress", None)
     if not isinstance(progress, Progress):
         raise UsageError(f"the state of {method.title} has no progress, made by Progress.first")
@@ -194,8 +195,10 @@ def refuse_other_state(state: State, blank: State, path: Path) -> None:
 
     It begins a generation, and has the types, the dimensions and the seed of the first one.
     """
+    from conevo.runs.checkpoint import difference
+
     problem = (
-        checkpoint.difference(state, blank)
+        difference(state, blank)
         or state.progress.problem(blank.progress)
         or getattr(state, "problem", lambda _: "")(blank)
     )
