@@ -71,5 +71,5 @@ def test_a_setting_passes_at_most_twenty_files_from_flag_to_kernel(
         sys.setprofile(None)
     walk = list(dict.fromkeys(passed))
     assert walk[0] == "cli/main.py"
-    assert "worlds/rover.py" in walk
+    assert any(file.startswith("worlds/rover") for file in walk)
     assert len(walk) <= 20, walk
