@@ -1,6 +1,7 @@
 """Parameters: dataclasses whose values are checked when one is made, whoever makes it.
 
-A parameter is one field, with its type, its bounds and its default::
+A parameter is one field, with its type, its bounds and its default, and a text below it with its
+unit and meaning, as "(side) the largest step."::
 
     @parameters("world")
     class LightParams:
@@ -52,7 +53,7 @@ def parameters(section: str) -> Callable[[type[Part]], type[Part]]:
     first unknown key or wrong value.
 
     Args:
-        section: table of a configuration that the fields are keys of: "world", "method", "run".
+        section: table of a configuration that the fields are keys of, "world".
     """
 
     def decorate(part: type[Part]) -> type[Part]:

@@ -23,8 +23,15 @@ from runs.tiny import TASK, evolve_tiny, tiny_settings
 # Loaded by what decides results without deciding any: what is asked for is spelt out in a run's
 # config.toml, and files keep what they are given.
 NOT_DECIDING = {
-    f"conevo{name}"
-    for name in ("", ".errors", ".reading", ".runs", ".runs.config", ".runs.outline", ".terms")
+    "conevo",
+    "conevo.errors",
+    "conevo.parameters",
+    "conevo.reading",
+    "conevo.runs",
+    "conevo.runs.config",
+    "conevo.runs.outline",
+    "conevo.runs.settings",
+    "conevo.terms",
 }
 
 

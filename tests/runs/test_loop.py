@@ -98,6 +98,73 @@ def test_a_generation_without_a_portrait_is_refused() -> None:
         log_of(Still(portrait=False))
 
 
+@pytest.mark.parametrize(
+    ("asked", "words"),
+    [
+        ({"genes": np.zeros((1, 4), np.float32)}, r"genes must be \[K, 3\] float32, not \[1, 4\]"),
+        ({"genes": np.zeros((1, 3))}, r"genes must be .* not \[1, 3\] float64"),
+        ({"genes": np.full((1, 3), 1.5, np.float32)}, r"genes must be in \[-1, 1\]"),
+        ({"genes": np.full((1, 3), np.nan, np.float32)}, r"genes must be in \[-1, 1\]"),
+        (
+            {"teams": np.zeros((2, 3, 1), np.int32)},
+            r"teams must be \[N, 2, 1\] int32, not",
+        ),
+        ({"teams": np.zeros((2, 2, 1), int)}, "teams must be .* not .* int64"),
+        ({"teams": np.ones((2, 2, 1), np.int32)}, "teams must hold rows of its 1 genotypes"),
+        ({"teams": np.zeros((0, 2, 1), np.int32)}, "0 teams cannot be played in 1 equal rounds"),
+        ({"rounds": 3}, "2 teams cannot be played in 3 equal rounds"),
+        ({"scenarios": "old"}, r"scenarios must be one of \('fresh', 'fixed'\), not 'old'"),
+        ({"generation": 4}, "its generation must be 0, not 4"),
+    ],
+)
+def test_what_cannot_be_evaluated_is_refused(asked: dict[str, Any], words: str) -> None:
+    @dataclass(frozen=True)
+    class Wrong(Still):
+        def ask(self, state: Note) -> Trials:
+            return replace(super().ask(state), **asked)
+
+    with pytest.raises(UsageError, match=f"Still: what ask returns cannot .*: {words}") as caught:
+        log_of(Wrong())
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("told", "words"),
+    [
+        ({"team_evaluations": 0}, "tell counts 0 team evaluations, 2 were made"),
+        ({"generation": 3}, "generation 0 of 1 became 3 of 1"),
+        ({"root": 5}, "generation 0 of 1 became 1 of 5"),
+    ],
+)
+def test_a_header_that_does_not_follow_is_refused(told: dict[str, Any], words: str) -> None:
+    @dataclass(frozen=True)
+    class Wrong(Still):
+        def tell(self, state: Note, trials: Trials, scores: Scores) -> Note:
+            return Note(replace(super().tell(state, trials, scores).progress, **told))
+
+    for use in (log_of, lambda method: price(method, method.init(LAYOUT, 1))):
+        with pytest.raises(UsageError, match=words) as caught:
+            use(Wrong())
+        assert "\n" not in str(caught.value)
+
+
+def test_what_is_no_request_or_no_state_is_refused() -> None:
+    @dataclass(frozen=True)
+    class Mute(Still):
+        def ask(self, state: Note) -> Any:
+            return None
+
+    @dataclass(frozen=True)
+    class Deaf(Still):
+        def tell(self, state: Note, trials: Trials, scores: Scores) -> Any:
+            return None
+
+    with pytest.raises(UsageError, match="ask must return Trials, not NoneType"):
+        log_of(Mute())
+    with pytest.raises(UsageError, match="tell must return a state, not NoneType"):
+        log_of(Deaf())
+
+
 def test_a_number_does_not_take_the_place_of_another_entry() -> None:
     with pytest.raises(UsageError, match="Still gives a number the name castes, which the log has"):
         log_of(Still(numbers={"castes": 1.0}))

@@ -317,6 +317,11 @@ UNKEPT = (
     [
         ("[1.0]", "the state of random search cannot be kept: fitness is list;"),
         ("stream(1, 'a')", "the state of random search cannot be kept: fitness is Generator;"),
+        ("begun.fitness, progress=7", "the state of random search has no progress, made by"),
+        (
+            "begun.fitness, progress=replace(begun.progress, root=99)",
+            "the first state of random search has a progress with another root",
+        ),
     ],
 )
 def test_a_state_that_cannot_be_kept_is_refused_before_anything_is_written(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 
 import conevo
 from conevo.cli.main import main
+from conevo.cli.summary import generations_table
 from conevo.errors import UsageError
 from conevo.runs.checkpoint import save
 from conevo.runs.config import resolve
@@ -60,6 +62,9 @@ def test_its_step_size_is_in_the_log_and_its_state_in_the_checkpoint(tmp_path: P
     assert sizes[0] == 0.2
     assert len(set(sizes)) == 6
     assert {record["sst"] for record in run.generations()} == {None}
+    shown = generations_table(run.generations()).splitlines()
+    assert re.search(r" recombined  step_size  neurons ", shown[0])
+    assert "  0.2  " in shown[1]
     (file,) = run.path.glob("checkpoint-?.npz")
     with np.load(file) as archive:
         assert archive["field.mean"].shape == archive["field.path"].shape == (3, 2, 23)

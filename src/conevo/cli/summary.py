@@ -25,6 +25,7 @@ from conevo.cli.text import (
 from conevo.evolution.methods.registry import title_of
 from conevo.runs.code import changes_text, last_code, sessions_of
 from conevo.runs.outline import Outline
+from conevo.runs.records import own_numbers
 from conevo.runs.run import Run
 from conevo.runs.shrinkage import shrinkage
 from conevo.terms import S_SCALE, counted, quoted
@@ -120,7 +121,8 @@ def generations_table(records: list[dict[str, Any]], *lead: str) -> str:
     """Return generations as a table; ``lead`` are entries that stand before a run's own."""
     measures = list(dict.fromkeys(name for one in records for name in one["performance"]))
     head = [*lead, "generation", *measures, "best fitness", "mean fitness", "S", "SST", "GST"]
-    head += ["recombined", "neurons", "evaluations", "castes of the fittest team"]
+    own = own_numbers(records)  # of the method
+    head += ["recombined", *own, "neurons", "evaluations", "castes of the fittest team"]
     rows = [
         [
             *(str(record[name]) for name in (*lead, "generation")),
@@ -131,6 +133,7 @@ def generations_table(records: list[dict[str, Any]], *lead: str) -> str:
             number(record["sst"]),
             number(record["gst"]),
             str(record["recombinations"]),
+            *(number(record.get(name)) for name in own),
             neurons(record["n_hidden"]),
             count(record["team_evaluations"]),
             castes(record["castes"]),

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, Literal, Protocol
+from typing import Any, Literal, Protocol, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -32,6 +32,7 @@ __all__ = [
 FloatArray = npt.NDArray[np.floating[Any]]
 IntArray = npt.NDArray[np.integer[Any]]
 BoolArray = npt.NDArray[np.bool_]
+SCENARIOS = Literal["fresh", "fixed"]
 
 
 @dataclass(frozen=True)
@@ -76,7 +77,7 @@ class Trials:
     generation: int
     genes: FloatArray
     teams: IntArray
-    scenarios: Literal["fresh", "fixed"] = "fresh"
+    scenarios: SCENARIOS = "fresh"
     portrait: bool = False
     rounds: int = 1
     purpose: str = ""
@@ -86,6 +87,33 @@ class Trials:
         found: FloatArray = self.genes[self.teams]
         found[self.teams < 0] = 0.0
         return found
+
+    def problem(self, progress: Progress) -> str:
+        """Return what makes these no trials of a run, nothing if they are some.
+
+        Args:
+            progress: the header of the state that asks for them.
+        """
+        genes, teams, sizes = self.genes, self.teams, progress.fittest_genes.shape
+        if not (genes.ndim == 2 and genes.shape[1] == sizes[2] and genes.dtype == np.float32):
+            return f"genes must be [K, {sizes[2]}] float32, not {_kind(genes)}"
+        if not (teams.ndim == 3 and teams.shape[1:] == sizes[:2] and teams.dtype == np.int32):
+            return f"teams must be [N, {sizes[0]}, {sizes[1]}] int32, not {_kind(teams)}"
+        if not len(teams) or len(teams) % self.rounds:
+            return f"{len(teams)} teams cannot be played in {self.rounds} equal rounds"
+        if teams.min() < -1 or teams.max() >= len(genes):
+            return f"teams must hold rows of its {len(genes)} genotypes, or -1 for an empty slot"
+        if not (np.abs(genes) <= 1).all():
+            return "genes must be in [-1, 1]"
+        if self.scenarios not in get_args(SCENARIOS):
+            return f"scenarios must be one of {get_args(SCENARIOS)}, not {self.scenarios!r}"
+        if self.generation != progress.generation:
+            return f"its generation must be {progress.generation}, not {self.generation}"
+        return ""
+
+
+def _kind(array: Any) -> str:
+    return f"{list(array.shape)} {array.dtype}"
 
 
 @dataclass(frozen=True)

@@ -67,7 +67,7 @@ def save(path: Path, record: Any, identity: Mapping[str, str]) -> None:
 
 
 def refuse_unkept(record: Any, owner: str) -> None:
-    """Raise UsageError if a dataclass has a field that a file cannot hold.
+    """Raise UsageError if this is no dataclass, or one with a field that a file cannot hold.
 
     Args:
         record: the dataclass.
@@ -75,6 +75,8 @@ def refuse_unkept(record: Any, owner: str) -> None:
     """
     import numpy as np
 
+    if not dataclasses.is_dataclass(record):
+        raise UsageError(f"the state of {owner} must be a dataclass, not {type(record).__name__}")
     for name, value in _leaves(record).items():
         is_array = type(value) is np.ndarray and not value.dtype.hasobject
         if not is_array and type(value) not in PLAIN:

@@ -8,11 +8,10 @@ from pathlib import Path
 
 from conevo.controllers.protocol import Controller
 from conevo.controllers.registry import genome_of
-from conevo.errors import EnvironmentFailure
+from conevo.errors import EnvironmentFailure, UsageError
 from conevo.evolution.inheritance import breed_from, hand_on
-from conevo.evolution.protocol import Layout, Method, State
+from conevo.evolution.protocol import Layout, Method, Progress, State
 from conevo.reading import DamagedFile
-from conevo.runs import checkpoint
 from conevo.runs.champions import Team
 from conevo.runs.config import RunConfig
 from conevo.runs.evaluation import Evaluate, make_evaluator
@@ -70,12 +69,26 @@ def price_of(config: RunConfig, ancestor: State | Team | None = None) -> Price:
 
 
 def _first(method: Method, layout: Layout, seed: int, ancestor: State | Team | None) -> State:
-    """Return generation 0 of random populations, of an ancestor's, or bred from its team."""
+    """Return generation 0 of random populations, of an ancestor's, or bred from its team.
+
+    Raises:
+        UsageError: it cannot be kept, its header is not of this run, or the ancestor does not fit.
+    """
+    from conevo.runs.checkpoint import refuse_unkept
+
     if ancestor is None:
-        return method.init(layout, seed)
-    if isinstance(ancestor, Team):
-        return breed_from(method, layout, seed, ancestor.genes, ancestor.active)
-    return hand_on(method, layout, seed, ancestor)
+        state = method.init(layout, seed)
+    elif isinstance(ancestor, Team):
+        state = breed_from(method, layout, seed, ancestor.genes, ancestor.active)
+    else:
+        state = hand_on(method, layout, seed, ancestor)
+    refuse_unkept(state, method.title)
+    progress = getattr(state, "progress", None)
+    if not isinstance(progress, Progress):
+        raise UsageError(f"the state of {method.title} has no progress, made by Progress.first")
+    if problem := progress.problem(Progress.first(layout, seed)):
+        raise UsageError(f"the first state of {method.title} has a progress with another {problem}")
+    return state
 
 
 def check_memory(config: RunConfig, layout: Layout) -> None:
@@ -172,7 +185,6 @@ class Lab:
         layout, seed = self.layout, self.config.run.seed
         check_memory(self.config, layout)
         state = _first(self.method, layout, seed, ancestor)
-        checkpoint.refuse_unkept(state, self.method.title)
         check_budget(self.method, state, self.config.run.budget_evaluations)
         self.world.scenarios([seed])  # says so now if there is no room for what belongs in it
         return state
@@ -183,8 +195,10 @@ def refuse_other_state(state: State, blank: State, path: Path) -> None:
 
     It begins a generation, and has the types, the dimensions and the seed of the first one.
     """
+    from conevo.runs.checkpoint import difference
+
     problem = (
-        checkpoint.difference(state, blank)
+        difference(state, blank)
         or state.progress.problem(blank.progress)
         or getattr(state, "problem", lambda _: "")(blank)
     )

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from conevo.errors import UsageError
-from conevo.evolution.protocol import Method, Progress, Scores, State
+from conevo.evolution.protocol import Method, Progress, Scores, State, Trials
 from conevo.runs.evaluation import Evaluate, Portrait, describe
 from conevo.runs.settings import RunSettings
 from conevo.terms import counted
@@ -76,10 +76,48 @@ def price(method: Method, state: State) -> int:
     ask and tell are pure, so it can be priced with empty scores.
     """
     while state.progress.generation == 0:
-        trials = method.ask(state)
+        trials = _asked(method, state)
         empty = np.zeros(trials.teams.shape[:2])
-        state = method.tell(state, trials, Scores(fitness=empty, specialization=empty))
+        state = _told(method, state, trials, Scores(fitness=empty, specialization=empty))
     return int(state.progress.team_evaluations)
+
+
+def _asked(method: Method, state: State) -> Trials:
+    """Return what a method asks for.
+
+    Raises:
+        UsageError: that cannot be evaluated.
+    """
+    trials = method.ask(state)
+    if not isinstance(trials, Trials):
+        raise UsageError(f"{method.title}: ask must return Trials, not {type(trials).__name__}")
+    if problem := trials.problem(state.progress):
+        raise UsageError(f"{method.title}: what ask returns cannot be evaluated: {problem}")
+    return trials
+
+
+def _told(method: Method, state: State, trials: Trials, scores: Scores) -> State:
+    """Return a method's next state.
+
+    Raises:
+        UsageError: its header does not follow from the state before.
+    """
+    told = method.tell(state, trials, scores)
+    before, after = state.progress, getattr(told, "progress", None)
+    if not isinstance(after, Progress):
+        raise UsageError(f"{method.title}: tell must return a state, not {type(told).__name__}")
+    made, counted = len(trials.teams), after.team_evaluations - before.team_evaluations
+    if counted != made:
+        raise UsageError(
+            f"{method.title}: tell counts {counted} team evaluations, {made} were made "
+            f"(Progress.counted counts them)"
+        )
+    if after.root != before.root or after.generation - before.generation not in (0, 1):
+        raise UsageError(
+            f"{method.title}: tell may end a generation and keeps the root, but generation "
+            f"{before.generation} of {before.root} became {after.generation} of {after.root}"
+        )
+    return told
 
 
 def check_budget(method: Method, state: State, budget: int) -> None:
@@ -113,7 +151,7 @@ def _run_generation(
     portrait: Portrait | None = None
     epochs = 0
     while state.progress.generation == generation:
-        trials = method.ask(state)
+        trials = _asked(method, state)
         n_teams = len(trials.teams)
         if budget and state.progress.team_evaluations + n_teams > budget:
             return None
@@ -122,7 +160,7 @@ def _run_generation(
         evaluation = evaluate(trials)
         if trials.portrait:
             portrait = describe(evaluation.outcome, castes)
-        state = method.tell(state, trials, evaluation.scores)
+        state = _told(method, state, trials, evaluation.scores)
     if portrait is None:
         raise UsageError(
             f"{method.title} has finished generation {generation} without a portrait: "

@@ -6,7 +6,7 @@ is what an earlier one did not write. None stands for a number that was not fini
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Literal, NotRequired
 
 from annotated_types import Ge, Le, MinLen
@@ -23,6 +23,7 @@ __all__ = [
     "ShapingText",
     "Testing",
     "contradiction",
+    "own_numbers",
 ]
 
 Count = Annotated[int, Ge(0), Le(2**63 - 1)]
@@ -140,7 +141,7 @@ class Extension(TypedDict):
 
 
 class Generation(TypedDict):
-    """A line of ``generations.jsonl``."""
+    """A line of ``generations.jsonl``; a method may add numbers of its own."""
 
     generation: Count
     team_evaluations: Count
@@ -157,6 +158,18 @@ class Generation(TypedDict):
     recombinations: Count
     n_hidden: Annotated[list[Count], MinLen(1)]
     n_nonfinite: Count
+
+
+def own_numbers(records: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Return the names that a method has given numbers of its own in the lines of a log."""
+    known = {*Generation.__annotations__, "type_c_evaluations", "number", "stage", "task"}
+    others = dict.fromkeys(name for one in records for name in one if name not in known)
+    return [name for name in others if all(_is_number(one.get(name)) for one in records)]
+
+
+def _is_number(value: Any) -> bool:
+    """Whether a value is null or a number that is no longer than those of a log are."""
+    return value is None or (isinstance(value, (int, float)) and not abs(value) > 2**63)
 
 
 class Spread(TypedDict):
