@@ -333,8 +333,8 @@ def fake(method: str, fitness: float | None, validated: float | None = None) -> 
         one = {"generation": 0, "selection": {"fitness": fitness, "performance": {}}}
         about = {"chosen": 0, "finalists": [one | {"validation": part}]}
         result = {"champion": part, "validation": about}
-    config = SimpleNamespace(method=method)
-    return SimpleNamespace(config=config, champion=champion, path="here", test_result=result)
+    about: dict[str, Any] = {"champion": champion, "path": "here", "test_result": result}
+    return SimpleNamespace(config=SimpleNamespace(method=method), generations=list, **about)
 
 
 def test_the_fittest_run_of_each_method() -> None:

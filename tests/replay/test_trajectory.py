@@ -263,7 +263,7 @@ def test_a_header_cannot_ask_for_more_than_the_file_has(tmp_path):
             head, {"descr": "|u1", "fortran_order": False, "shape": (2**40,)}
         )
         archive.writestr("about.npy", head.getvalue())
-    assert "whose size is not that of its header" in refused(tmp_path / "bad.npz", out.getvalue())
+    assert "not that of its header" in refused(tmp_path / "bad.npz", out.getvalue())
 
 
 def test_a_small_file_cannot_unpack_to_a_huge_one(tmp_path, monkeypatch):

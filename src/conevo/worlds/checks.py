@@ -18,10 +18,12 @@ from conevo.errors import ConevoError, EnvironmentFailure, UsageError
 from conevo.outside import line_of
 from conevo.parameters import wrong_values
 from conevo.rng import fold, stream
+from conevo.worlds import own_checks
 from conevo.worlds.contract import faults, scenario_faults
 from conevo.worlds.protocol import World
 from conevo.worlds.registry import WorldEntry, resolve
 from conevo.worlds.rollout import Rollout
+from conevo.worlds.simulators import has_own_simulator, simulator
 from conevo.worlds.trial import Trial
 
 __all__ = ["Finding", "findings", "mixed_teams", "random_teams"]
@@ -71,7 +73,8 @@ def findings(path: str) -> Iterator[Finding]:
 
 def _all(entry: WorldEntry, environment: str) -> Iterator[Finding]:
     is_sound = True
-    for group in (_declared, _drawn, _stepped, _rolled_out):
+    groups = (_declared, _drawn, _stepped, _rolled_out)
+    for group in (_declared, _own) if has_own_simulator(entry.world_class) else groups:
         for finding in group(entry, environment):
             is_sound = is_sound and finding.status != "problem"
             yield finding
@@ -98,12 +101,16 @@ def _declared(entry: WorldEntry, environment: str) -> Iterator[Finding]:
     for name in entry.environments:
         built = entry.build(name, entry.params_class())
         if name == environment:
-            fine = "names, controller, phases, state, scene"
+            is_own = has_own_simulator(built)
+            fine = "names, controller" if is_own else "names, controller, phases, state, scene"
             yield from _topic("structure", _of_structure(built), fine)
 
 
 def _of_structure(built: World) -> Iterator[str]:
-    found = list(faults(built, built.simulation()))
+    if has_own_simulator(built):
+        found = list(own_checks.of_declarations(built))
+    else:
+        found = list(faults(built, built.simulation()))
     yield from found
     if not found:
         try:
@@ -132,6 +139,18 @@ def _of_parameters(params_class: Any) -> Iterator[str]:
             why = error.__cause__
             several = wrong_values(why, "world") if isinstance(why, ValidationError) else [error]
             yield from map(str, several)
+
+
+def _own(entry: WorldEntry, environment: str) -> Iterator[Finding]:
+    """Check a world's own simulator."""
+    a_world = _shorter(entry, environment)
+    fine = "the same for the same key"
+    yield from _topic("scenarios", own_checks.of_scenarios(a_world, KEYS), fine)
+    teams = mixed_teams(a_world)
+    fine = "the same again, alone and in rounds; all finite"
+    yield from _topic("evaluate", own_checks.of_play(a_world, teams, KEYS[:2]), fine)
+    yield from _topic("record", own_checks.of_record(a_world, teams, KEYS), "equals evaluate")
+    yield from _of_random_teams(entry.build(environment, entry.params_class()))
 
 
 def _drawn(entry: WorldEntry, environment: str) -> Iterator[Finding]:
@@ -256,7 +275,8 @@ def _of_record(a_world: World) -> Iterator[str]:
 def _of_random_teams(a_world: World) -> Iterator[Finding]:
     epochs = TEAM_STEPS // a_world.params.iterations // 2
     n = int(min(RANDOM_TEAMS, max(10, epochs)))
-    out = Rollout(a_world).evaluate(*random_teams(a_world, n), a_world.scenarios(KEYS[:2]))
+    played = simulator(a_world, controller(world=a_world))
+    out = played.evaluate(*random_teams(a_world, n), a_world.scenarios(KEYS[:2]))
     for name, values in (("fitness", out.fitness), *out.performance.items()):
         if bad := int((~np.isfinite(values)).sum()):
             share = f"{bad} of {values.size} values"

@@ -10,7 +10,15 @@ from conevo.errors import UsageError, unknown_name
 from conevo.worlds.measures import measures_of
 from conevo.worlds.protocol import Simulation, World
 
-__all__ = ["PHASES", "TEAM_PHASE", "faults", "refuse_faults", "scenario_faults", "sizes_of"]
+__all__ = [
+    "PHASES",
+    "TEAM_PHASE",
+    "faults",
+    "faults_of_names",
+    "refuse_faults",
+    "scenario_faults",
+    "sizes_of",
+]
 
 
 @wp.struct
@@ -62,7 +70,7 @@ def sizes_of(world: World, simulation: Simulation) -> dict[str, int]:
 
 def faults(world: World, simulation: Simulation) -> Iterator[str]:
     """Yield what is wrong with a world's names, controller, phases and structs."""
-    yield from _of_names(world)
+    yield from faults_of_names(world)
     yield from _of_phases(simulation)
     if _is_struct(simulation.state):
         yield from _of_state(world, simulation)
@@ -81,7 +89,8 @@ def _is_struct(kind: Any) -> bool:
     return isinstance(kind, STRUCT)
 
 
-def _of_names(world: World) -> Iterator[str]:
+def faults_of_names(world: World) -> Iterator[str]:
+    """Yield what is wrong with the names of inputs, outputs, actions, castes and heuristics."""
     for what in ("inputs", "outputs", "actions", "castes", "heuristics"):
         names: Any = getattr(world, what)
         if not (isinstance(names, tuple) and names and all(isinstance(n, str) for n in names)):
