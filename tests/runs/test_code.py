@@ -59,7 +59,8 @@ def test_the_digest_is_of_all_that_decides_results_and_of_nothing_else(package: 
 
 
 def test_whatever_decides_results_counts() -> None:
-    find = "import sys, conevo.runs.lab, conevo.runs.testing; print(*sys.modules)"
+    parts = "conevo.runs.lab, conevo.runs.testing, conevo.worlds.rollout"
+    find = f"import sys, {parts}; print(*sys.modules)"
     loaded = subprocess.run(
         [sys.executable, "-c", find], text=True, capture_output=True, check=True
     ).stdout.split()

@@ -347,7 +347,9 @@ def test_an_error_of_its_own_is_named_with_its_line(
     code, _, err = say(capsys, *words)
     assert code == 2
     assert re.fullmatch(
-        r"conevo: error: .*mine\.py:\d+: ZeroDivisionError: division by zero\n", err
+        r"conevo: error: .*mine\.py:\d+: in tell: ZeroDivisionError: division by zero; \S+ keeps "
+        r"its copy of that file as it is: correct yours, and start another run\n",
+        err,
     )
 
 

@@ -310,7 +310,7 @@ LATER = {
     "raises": (
         "        shape = (self",
         f"{SOME}self.fail()\n        shape = (self",
-        "{file}:{line}: in scenarios: ValueError: boom; r keeps its copy of the world's file as it "
+        "{file}:{line}: in scenarios: ValueError: boom; r keeps its copy of that file as it "
         "is: correct yours, and start another run",
     ),
     "returns nothing": (

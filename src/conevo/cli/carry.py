@@ -146,8 +146,8 @@ def carry_on(
         if isinstance(error, ConevoError) or not (line := line_of(error)):
             raise
         raise UsageError(
-            f"{line}; {found.path} keeps its copy of the world's file as it is: correct yours, and "
-            f"start another run"
+            f"{line}; {found.path} keeps its copy of that file as it is: correct yours, and start "
+            f"another run"
         ) from error
     if found.status != "finished":
         click.echo(f"time limit reached after {_done(found)}; continue with: {advice}", err=True)
