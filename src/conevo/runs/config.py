@@ -36,7 +36,6 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from importlib import resources
@@ -72,6 +71,7 @@ NAMES = {
     "method": "cone",
     "preset": "desk",
 }  # the keys of [run] that choose components
+LEAST, MOST = 1e-18, 1e18  # sizes of numbers whose squares a kernel can hold
 ANY = "any"  # the table of a preset for worlds without one of their own
 
 
@@ -484,8 +484,9 @@ def _build(section: str, part: Any, layers: Iterable[Layer]) -> Any:
 
 def _check(name: str, hint: Any, given: _Value) -> Any:
     """Return the value as the type asks for it, or say what is allowed."""
-    problem = "must be finite"
-    if not isinstance(given.value, float) or math.isfinite(given.value):
+    problem = f"must be finite, and 0 or between {LEAST:g} and {MOST:g} in size"
+    number = given.value if isinstance(given.value, float) else 0.0
+    if number == 0 or LEAST <= abs(number) <= MOST:
         try:
             return TypeAdapter(hint).validate_python(given.value, strict=True)
         except ValidationError as error:
