@@ -26,6 +26,7 @@ from conevo.errors import UsageError, shown, unknown_name
 __all__ = ["WrongValue", "checked", "parameters", "refuse_unknown", "wrong_values"]
 
 Part = TypeVar("Part")
+LEAST, MOST = 1e-18, 1e18  # sizes of numbers whose squares the 32 bits of a kernel can hold
 CONFIG = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, validate_default=True)
 
 
@@ -49,8 +50,8 @@ class WrongValue(UsageError):
 def parameters(section: str) -> Callable[[type[Part]], type[Part]]:
     """Make a class a frozen dataclass that holds only values which its fields allow.
 
-    Types are strict (but a whole number is a number) and numbers finite. ``UsageError`` names the
-    first unknown key or wrong value.
+    Types are strict (but a whole number is a number), numbers finite, and 0 or of a size that a
+    kernel can square. ``UsageError`` names the first unknown key or wrong value.
 
     Args:
         section: table of a configuration that the fields are keys of, "world".
@@ -87,6 +88,10 @@ def _refusing(part: type[Any], section: str) -> type[Any]:
             validate(self, **values)
         except ValidationError as error:
             raise wrong_values(error, section)[0] from error
+        for key, value in values.items():
+            if isinstance(value, float) and not (value == 0 or LEAST <= abs(value) <= MOST):
+                problem = f"must be 0, or between {LEAST:g} and {MOST:g} in size"
+                raise WrongValue(key, f"{section}.{key} = {shown(value)}", problem)
 
     part.__init__ = __init__
     return part

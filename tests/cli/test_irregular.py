@@ -9,7 +9,7 @@ import pytest
 
 from conevo.errors import UsageError, unknown_name
 from conevo.runs.shaping import start_shaping
-from runs.tiny import tiny_settings
+from runs.tiny import evolve_tiny, tiny_settings
 
 KINDS = {
     "directory": (lambda path: path.mkdir(), "Is a directory"),
@@ -74,3 +74,34 @@ def test_the_nearest_name_is_that_with_the_nearest_number() -> None:
         assert f"did you mean {near!r}?" in str(unknown_name("environment", wrong, names))
     with pytest.raises(UsageError, match=r"did you mean 'cone-3'\?"):
         raise unknown_name("method", "cone-4", ["cone", "cone-1", "cone-2", "cone-3"])
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_whatever_is_in_the_place_of_a_seal_is_named(say, tmp_path: Path, kind: str) -> None:
+    """It is neither taken for a run that goes on, nor replaced by a seal."""
+    make, reason = KINDS[kind]
+    run = evolve_tiny(tmp_path / "run")
+    (run.path / "DONE").unlink()
+    make(run.path / "DONE")
+    for words in (["show", "run"], ["resume", "run", "--generations", "9"]):
+        said = say(*words)
+        assert said.code in (2, 3)
+        assert said.err.startswith(f"conevo: error: cannot read run/DONE: {reason}")
+    assert run.done()[0] == 5
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("run", "rover/complex-1", "--from", ""),
+        ("run", "rover/complex-1", "--from-champion", ""),
+        ("run", "rover/complex-1", "--method", ""),
+        ("campaign", "start", "rover-simple", "--out", ""),
+        ("report", "some", "--out", ""),
+    ],
+)
+def test_an_option_that_is_empty_is_not_one_that_was_left_out(say, words: tuple[str, ...]) -> None:
+    said = say(*words)
+    assert said.code == 2
+    assert said.err == f"conevo: error: {words[-2]} is empty: give a value, or leave it out\n"
+    assert not Path("runs").exists()

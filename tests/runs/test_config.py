@@ -177,6 +177,8 @@ BAD = [
     ({"overrides": {"run.generations": True}}, ["run.generations = True", "valid integer"]),
     ({"overrides": {"run.credit": "me"}}, ["run.credit = 'me'", "'robot' or 'team'"]),
     ({"overrides": {"run.target": float("nan")}}, ["run.target = nan", "must be a finite number"]),
+    ({"overrides": {"world.energy": 1e308}}, ["world.energy = 1e+308", "1e-18 and 1e+18"]),
+    ({"overrides": {"world.min_distance": 1e-320}}, ["world.min_distance", "1e-18 and 1e+18"]),
     ({"overrides": {"world.low_range": 3.0}}, ["world.low_range = 3.0", "must be less than"]),
     ({"overrides": {"world.low_accuracy": "x"}}, ["world.low_accuracy = 'x'", "valid number"]),
     ({"overrides": {"controller.max_hidden": 4}}, ["max_hidden", "n_hidden"]),

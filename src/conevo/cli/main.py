@@ -14,7 +14,7 @@ import time
 from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import click
 
@@ -42,6 +42,27 @@ IN_A_ROW = 2.0  # seconds between two interrupts that count as one
 MODULES = {"list": "listing", "shape-prey": "shape_prey"}
 
 
+class Text(click.types.StringParamType):
+    """A text that is not empty: what is given as "$RUN", of no such variable, is a mistake."""
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> str | Any:
+        """Return the text."""
+        if value == "" and param is not None:
+            raise UsageError(f"{param.opts[0]} is empty: give a value, or leave it out")
+        return super().convert(value, param, ctx)
+
+
+def _refuse_empty(command: click.Command) -> None:
+    """Let every option of a verb that takes a text refuse an empty one."""
+    for parameter in command.params:
+        if isinstance(parameter, click.Option) and parameter.type is click.STRING:
+            parameter.type = Text()
+    for one in getattr(command, "commands", {}).values():
+        _refuse_empty(one)
+
+
 class Verbs(click.Group):
     """A group that knows its verbs without loading them."""
 
@@ -55,6 +76,7 @@ class Verbs(click.Group):
             raise unknown_name("command", cmd_name, VERBS)
         module = import_module(f"conevo.cli.{MODULES.get(cmd_name, cmd_name)}")
         command: click.Command = getattr(module, MODULES.get(cmd_name, cmd_name))
+        _refuse_empty(command)
         return command
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:

@@ -181,7 +181,7 @@ class Directory:
     @property
     def is_finished(self) -> bool:
         """Whether it is sealed."""
-        return (self.path / SEAL).is_file()
+        return is_there(self.path / SEAL)  # whatever is in its place is looked at when it is read
 
     def seal(self) -> None:
         """Close the directory: write the digests of all files."""
