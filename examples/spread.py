@@ -15,7 +15,8 @@ Nothing here is Warp: the epoch is numpy, for all teams and scenarios at once. A
 ``forward`` turns what agents sense into what they do. So any environment can be evolved in that has
 states, inputs and outputs; the methods, runs, campaigns and reports are those of the package.
 
-The widest gap is 1: an agent in each corner. Clones, who all do the same, do not find it; CONE does.
+The widest gap is 1: an agent in each corner. Clones, who all do the same, do not find it; CONE
+does.
 
 Version history:
 

@@ -80,7 +80,8 @@ def test_the_example_keeps_its_promises(capsys: pytest.CaptureFixture[str]) -> N
 
 MISTAKES = {
     "rounds": ("[part]", "[0 * part]", "evaluate(rounds=2) gives other results"),
-    "batch": ("= starts.copy(), ", "= starts + np.float32(len(starts) / 1000), ", "than among others"),
+    "batch": ("= starts.copy(), ", "= starts + np.float32(len(starts) / 1000), ",
+              "than among others"),
     "again": ("= starts.copy(), ", "= starts + np.random.default_rng().random(), ",
               "when it is called again"),
     "shape": ("fitness=fitness.reshape(n, e, r)", "fitness=fitness.reshape(n, r, e)",
