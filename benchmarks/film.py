@@ -35,9 +35,9 @@ epoch, path, size, teams = Path(sys.argv[1]), Path(sys.argv[2]), *map(int, sys.a
 began = time.perf_counter()
 from conevo.replay.film import frames_of, write_film
 from conevo.replay.picture import Painter
-from conevo.replay.stages import stage_of
+from conevo.replay.playback import playback_of
 from conevo.replay.trajectory import Trajectory
-painter = Painter([stage_of(Trajectory.load(epoch))] * teams, size)
+painter = Painter([playback_of(Trajectory.load(epoch))] * teams, size)
 frames = frames_of(painter.iterations, path.suffix[1:])
 write_film(painter, path, frames)
 wall = time.perf_counter() - began

@@ -19,8 +19,8 @@ from pathlib import Path
 from typing import Any
 
 from conevo.replay.page import replay_page
+from conevo.replay.playback import playback_of
 from conevo.replay.recording import record
-from conevo.replay.stages import stage_of
 from conevo.replay.trajectory import Trajectory
 from conevo.runs.run import Run
 from machine import machine, spread, table
@@ -94,7 +94,7 @@ def main() -> None:
     assert isinstance(trajectory, Trajectory)
     print(machine("conevo", "playwright"), "\n")
     with tempfile.TemporaryDirectory() as folder, sync_playwright() as playwright:
-        pages = {"crowd": replay_page([crowd()]), "rover": replay_page([stage_of(trajectory)])}
+        pages = {"crowd": replay_page([crowd()]), "rover": replay_page([playback_of(trajectory)])}
         paths = {name: Path(folder) / f"{name}.html" for name in pages}
         for name, page in pages.items():
             paths[name].write_text(page, encoding="utf-8")

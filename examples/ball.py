@@ -37,6 +37,7 @@ from conevo.kernels.outputs import highest
 from conevo.kernels.random import uniform
 from conevo.kernels.steps import steered_step
 from conevo.parameters import parameters
+from conevo.playback.drawn import Area, Drawn, Objects, Signal
 from conevo.rng import stream
 from conevo.worlds.protocol import Scenarios, Simulation, kernel_params
 from conevo.worlds.registry import WorldEntry
@@ -207,6 +208,12 @@ class BallWorld:
     castes: ClassVar[tuple[str, ...]] = actions
     performance: ClassVar[tuple[str, ...]] = ("gain",)
     heuristics: ClassVar[tuple[str, ...]] = ("pusher",)
+    drawn: ClassVar[Drawn] = Drawn(
+        objects=(Objects("ball", "ball[0]", "ball[1]", size=0.02),),
+        areas=(Area("goal", "places[-1, 0]", "places[-1, 1]", radius=0.03),),
+        signals=(Signal("begins to push", "action"),),
+        colours={"rest": "#9a9aa5", "push": "#d55e00"},
+    )
 
     @property
     def n_robots(self) -> int:

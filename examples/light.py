@@ -12,9 +12,7 @@ controller     6-4-4 simple recurrent network (2 sensors, 4 context units)
 performance    ``nearness`` to the light at the end, mean over the team
 =============  ==========================================================
 
-Version history:
-
-- v1: first version.
+Version history: v1, the first version.
 """
 
 from collections.abc import Sequence
@@ -31,6 +29,7 @@ from conevo.kernels.outputs import highest
 from conevo.kernels.random import uniform
 from conevo.kernels.steps import steered_step
 from conevo.parameters import parameters
+from conevo.playback.drawn import Area, Drawn
 from conevo.rng import stream
 from conevo.worlds.protocol import Scenarios, Simulation, kernel_params
 from conevo.worlds.registry import WorldEntry
@@ -163,6 +162,7 @@ class LightWorld:
     castes: ClassVar[tuple[str, ...]] = actions
     performance: ClassVar[tuple[str, ...]] = ("nearness",)
     heuristics: ClassVar[tuple[str, ...]] = ("idler",)
+    drawn: ClassVar[Drawn] = Drawn(areas=(Area("light", "places[-1, 0]", "places[-1, 1]", 0.02),))
 
     @property
     def n_robots(self) -> int:

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from conevo import palette
-from conevo.replay.channel import Channel
-from conevo.replay.stage import Backdrop, BodyKind, Kind, PlanRow, Ring, Robot, Stage, Things
+from conevo.playback.channel import Channel
+from conevo.playback.schema import Backdrop, BodyKind, Kind, PlanRow, Playback, Ring, Robot, Things
 
 T = 40
 SIZE = 240
@@ -16,11 +16,11 @@ ACTIONS = (Kind("low", palette.ORANGE), Kind("move", palette.BLUE))
 CASTES = (Kind("mover", palette.GREEN), Kind("non-specialized", palette.FAINT))
 
 
-def stage(**changes):
+def playback(**changes):
     """Two robots in a square of 10 by 10: one stays and looks, the other moves to the right."""
     t = np.arange(T)
     action = np.stack([np.where(t < 30, 0, -1), np.ones(T, int)], axis=1)
-    made = Stage(
+    made = Playback(
         title="somewhere",
         subtitle="CONE, seed 1",
         facts=(),

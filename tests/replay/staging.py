@@ -1,8 +1,8 @@
-"""Trajectories with changes made by hand, and what a stage of them says."""
+"""Trajectories with changes made by hand, and what a playback of them says."""
 
 from dataclasses import replace
 
-from conevo.replay.channel import Channel
+from conevo.playback.channel import Channel
 from replay.epochs import TASKS
 
 GACC, LIGHT = TASKS[3], TASKS[4]
@@ -24,17 +24,17 @@ def changed(trajectory, **arrays):
     return replace(trajectory, channels=channels)
 
 
-def told(stage, kind=None):
+def told(playback, kind=None):
     """The events of a kind, as (t, text, robots)."""
     return [
         (event.t, event.text, event.robots)
-        for event in stage.events
-        if kind in (None, stage.event_kinds[event.kind].name)
+        for event in playback.events
+        if kind in (None, playback.event_kinds[event.kind].name)
     ]
 
 
 def parts_of(thing):
-    """Everything in a stage, at any depth."""
+    """Everything in a playback, at any depth."""
     yield thing
     if isinstance(thing, tuple):
         for one in thing:

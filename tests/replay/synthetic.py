@@ -1,4 +1,4 @@
-"""Stages that no world made: every part of a stage once, and crowds of any size."""
+"""Playbacks that no world made: every part of a playback once, and crowds of any size."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from conevo import palette
-from conevo.replay.channel import Channel
-from conevo.replay.stage import (
+from conevo.playback.channel import Channel
+from conevo.playback.schema import (
     Backdrop,
     BodyKind,
     Curve,
@@ -18,10 +18,10 @@ from conevo.replay.stage import (
     Gauge,
     Kind,
     PlanRow,
+    Playback,
     Ring,
     Robot,
     SensorGroup,
-    Stage,
     Things,
 )
 from conevo.rng import stream
@@ -40,8 +40,8 @@ BOUNDS = (-2.0, 1.0, 10.0, 7.0)
 ROCKS_X, ROCKS_Y = (1.0, 4.0, 7.0), (6.5, 6.5, 6.5)
 
 
-def made_up(title: str = "Made-up team", shift: float = 0.0, **changes: Any) -> Stage:
-    """Return a stage in which everything is known: four robots drive along parallel lines.
+def made_up(title: str = "Made-up team", shift: float = 0.0, **changes: Any) -> Playback:
+    """Return a playback in which everything is known: four robots drive along parallel lines.
 
     shift: added to all their places and activations, so that another team has other numbers.
     """
@@ -53,7 +53,7 @@ def made_up(title: str = "Made-up team", shift: float = 0.0, **changes: Any) -> 
     action[100:120, 3] = -1
     held = np.full((T, R), -1)
     held[HELD, 0] = 1
-    stage = Stage(
+    playback = Playback(
         title=title,
         subtitle="made-up world",
         facts=(("run", "none"), ("performance", "12.5")),
@@ -126,7 +126,7 @@ def made_up(title: str = "Made-up team", shift: float = 0.0, **changes: Any) -> 
         gauges=(Gauge("demand for A", Channel.of(np.linspace(0, 2, T)), 2.0, palette.BLUE),),
         measures=(Curve("value", Channel.of(np.linspace(0, 12.5, T))),),
     )
-    return replace(stage, **changes)
+    return replace(playback, **changes)
 
 
 def _wave(n: int, shift: float) -> npt.NDArray[np.float64]:
@@ -172,8 +172,8 @@ def _rocks() -> Things:
     )
 
 
-def crowd(robots: int = 30, rocks: int = 2000, iterations: int = 2500) -> Stage:
-    """Return a stage as full as a large rover epoch: everybody moves, half the rocks fade."""
+def crowd(robots: int = 30, rocks: int = 2000, iterations: int = 2500) -> Playback:
+    """Return a playback as full as a large rover epoch: everybody moves, half the rocks fade."""
     rng = stream(6, "crowd")
     steps = rng.uniform(-0.004, 0.004, (2, iterations, robots)).cumsum(axis=1)
     x, y = 0.5 + 0.5 * np.sin(steps + rng.uniform(0, 6, (2, 1, robots)))
@@ -235,35 +235,36 @@ def crowd(robots: int = 30, rocks: int = 2000, iterations: int = 2500) -> Stage:
     )
 
 
-def renamed(stage: Stage, text: str) -> Stage:
-    """Return a stage with a text in every place in which a stage has one."""
+def renamed(playback: Playback, text: str) -> Playback:
+    """Return a playback with a text in every place in which a playback has one."""
 
     def kinds(given: tuple[Kind, ...]) -> tuple[Kind, ...]:
         return tuple(replace(kind, name=text) for kind in given)
 
     return replace(
-        stage,
+        playback,
         title=text,
         subtitle=text,
-        facts=tuple((text, text) for _ in stage.facts),
+        facts=tuple((text, text) for _ in playback.facts),
         unit=text,
-        actions=kinds(stage.actions),
-        castes=kinds(stage.castes),
-        robots=tuple(replace(robot, heuristic=text) for robot in stage.robots),
-        body_kinds=tuple(replace(kind, name=text) for kind in stage.body_kinds),
+        actions=kinds(playback.actions),
+        castes=kinds(playback.castes),
+        robots=tuple(replace(robot, heuristic=text) for robot in playback.robots),
+        body_kinds=tuple(replace(kind, name=text) for kind in playback.body_kinds),
         sensor_groups=tuple(
-            replace(group, name=text, names=(text,) * group.count) for group in stage.sensor_groups
+            replace(group, name=text, names=(text,) * group.count)
+            for group in playback.sensor_groups
         ),
-        output_names=(text,) * len(stage.output_names),
-        backdrop=tuple(replace(part, label=text) for part in stage.backdrop),
+        output_names=(text,) * len(playback.output_names),
+        backdrop=tuple(replace(part, label=text) for part in playback.backdrop),
         things=tuple(
             replace(some, name=text, kinds=kinds(some.kinds), states=kinds(some.states))
-            for some in stage.things
+            for some in playback.things
         ),
-        rings=tuple(replace(ring, name=text) for ring in stage.rings),
-        events=tuple(replace(event, text=text) for event in stage.events),
-        event_kinds=kinds(stage.event_kinds),
-        plan=tuple(replace(row, name=text) for row in stage.plan),
-        gauges=tuple(replace(gauge, name=text) for gauge in stage.gauges),
-        measures=tuple(replace(measure, name=text) for measure in stage.measures),
+        rings=tuple(replace(ring, name=text) for ring in playback.rings),
+        events=tuple(replace(event, text=text) for event in playback.events),
+        event_kinds=kinds(playback.event_kinds),
+        plan=tuple(replace(row, name=text) for row in playback.plan),
+        gauges=tuple(replace(gauge, name=text) for gauge in playback.gauges),
+        measures=tuple(replace(measure, name=text) for measure in playback.measures),
     )

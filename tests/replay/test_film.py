@@ -18,7 +18,7 @@ from conevo.replay import film
 from conevo.replay.drawing.panel import PAGE, Panel
 from conevo.replay.drawing.planes import RGB
 from conevo.replay.picture import Painter
-from replay.filmed import GONE, SIZE, T, near, rgb, stage
+from replay.filmed import GONE, SIZE, T, near, playback, rgb
 
 needs_ffmpeg = pytest.mark.skipif(film.find_ffmpeg() is None, reason="there is no ffmpeg")
 
@@ -76,7 +76,7 @@ def test_ffmpeg_of_the_machine_comes_first(monkeypatch, tmp_path):
 
 def test_a_gif_read_again_shows_every_frame_for_its_time(tmp_path):
     path = tmp_path / "new" / "epoch.gif"
-    painter = Painter([stage()], SIZE)
+    painter = Painter([playback()], SIZE)
     frames = [0, 1, 1, GONE, GONE + 4, 39]
     told = []
     film.write_gif(painter, path, frames, 20, lambda done, total: told.append((done, total)))
@@ -95,9 +95,9 @@ def test_a_gif_read_again_shows_every_frame_for_its_time(tmp_path):
 
 def test_colours_of_a_gif_do_not_flicker(tmp_path):
     path = tmp_path / "epoch.gif"
-    painter = Painter([stage(rings=())], SIZE)
+    painter = Painter([playback(rings=())], SIZE)
     film.write_gif(painter, path, list(range(0, T, 4)))
-    panel = Panel(stage(), SIZE, RGB, "action", alone=True)
+    panel = Panel(playback(), SIZE, RGB, "action", alone=True)
     x0, y0, x1, _ = panel.world
     scale = (x1 - x0) / 10
     colours = {"robot": set(), "ground": set(), "page": set()}
@@ -115,7 +115,7 @@ def test_colours_of_a_gif_do_not_flicker(tmp_path):
 
 
 def test_a_gif_is_no_faster_than_gifs_can_be(tmp_path):
-    film.write_gif(Painter([stage()], SIZE), tmp_path / "a.gif", [0, 1], fps=100)
+    film.write_gif(Painter([playback()], SIZE), tmp_path / "a.gif", [0, 1], fps=100)
     with Image.open(tmp_path / "a.gif") as gif:
         assert gif.info["duration"] == 20
 
@@ -135,7 +135,7 @@ def decoded(path, size):
 @needs_ffmpeg
 def test_an_mp4_read_again_shows_the_frames(tmp_path):
     path = tmp_path / "epoch.mp4"
-    painter = Painter([stage()], SIZE)
+    painter = Painter([playback()], SIZE)
     frames = film.frames_of(T, every=2)
     told = []
     film.write_film(painter, path, frames, 25, lambda done, total: told.append((done, total)))
@@ -145,7 +145,7 @@ def test_an_mp4_read_again_shows_the_frames(tmp_path):
     assert "h264" in said
     assert "yuv420p(tv, bt709" in said
     assert "25 fps" in said
-    panel = Panel(stage(), SIZE, RGB, "action", alone=True)
+    panel = Panel(playback(), SIZE, RGB, "action", alone=True)
     x0, _, x1, y1 = panel.world
     scale = (x1 - x0) / 10
     for k, t in enumerate(frames):
@@ -161,7 +161,7 @@ def test_an_mp4_read_again_shows_the_frames(tmp_path):
 @needs_ffmpeg
 def test_the_same_film_has_the_same_bytes(tmp_path):
     for name in ("a.mp4", "b.mp4"):
-        film.write_mp4(Painter([stage()], SIZE), tmp_path / name, range(0, T, 3))
+        film.write_mp4(Painter([playback()], SIZE), tmp_path / name, range(0, T, 3))
     assert (tmp_path / "a.mp4").read_bytes() == (tmp_path / "b.mp4").read_bytes()
 
 
@@ -187,7 +187,7 @@ def failing(monkeypatch, tmp_path, script):
 def test_an_ffmpeg_that_fails_is_one_line_and_no_file(monkeypatch, tmp_path, script):
     path = failing(monkeypatch, tmp_path, script)
     with pytest.raises(EnvironmentFailure, match=r"could not write [^[]*No space left") as caught:
-        film.write_mp4(Painter([stage()], SIZE), path, range(T))
+        film.write_mp4(Painter([playback()], SIZE), path, range(T))
     assert "\n" not in str(caught.value)
     assert list(path.parent.iterdir()) == []
 
@@ -206,7 +206,7 @@ def test_an_interrupt_ends_ffmpeg_and_leaves_nothing(monkeypatch, tmp_path):
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        film.write_mp4(Painter([stage()], SIZE), path, range(T), progress=interrupt)
+        film.write_mp4(Painter([playback()], SIZE), path, range(T), progress=interrupt)
     assert list(path.parent.iterdir()) == []
     with pytest.raises(ProcessLookupError):
         os.kill(int((tmp_path / "pid").read_text()), signal.SIG_DFL)
@@ -215,14 +215,14 @@ def test_an_interrupt_ends_ffmpeg_and_leaves_nothing(monkeypatch, tmp_path):
 def test_without_ffmpeg_it_is_said_what_helps(monkeypatch, tmp_path):
     monkeypatch.setattr(film, "find_ffmpeg", lambda: None)
     with pytest.raises(UsageError, match=r"conevo\[video\].*--gif"):
-        film.write_mp4(Painter([stage()], SIZE), tmp_path / "a.mp4", [0])
+        film.write_mp4(Painter([playback()], SIZE), tmp_path / "a.mp4", [0])
 
 
 # --- all files ------------------------------------------------------------------------------------
 
 
 def test_a_poster_is_the_frame(tmp_path):
-    painter = Painter([stage()], SIZE)
+    painter = Painter([playback()], SIZE)
     film.write_poster(painter, tmp_path / "a.png", 7)
     with Image.open(tmp_path / "a.png") as poster:
         assert poster.convert("RGB").tobytes() == painter.frame(7).tobytes()
@@ -233,7 +233,7 @@ def test_nothing_is_written_over(monkeypatch, tmp_path, ending):
     monkeypatch.setattr(film, "find_ffmpeg", lambda: shutil.which("true"))
     path = tmp_path / f"a.{ending}"
     path.write_bytes(b"mine")
-    painter = Painter([stage()], SIZE)
+    painter = Painter([playback()], SIZE)
     poster = ending == "png"
     write = partial(film.write_poster, t=0) if poster else partial(film.write_film, frames=[0])
     with pytest.raises(UsageError, match="exists"):
@@ -249,18 +249,18 @@ def test_an_interrupted_gif_leaves_nothing(tmp_path):
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        film.write_gif(Painter([stage()], SIZE), tmp_path / "a.gif", [0, 1], progress=interrupt)
+        film.write_gif(Painter([playback()], SIZE), tmp_path / "a.gif", [0, 1], progress=interrupt)
     assert list(tmp_path.iterdir()) == []
 
 
 def test_a_place_that_cannot_be_written_is_one_line(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(EnvironmentFailure, match=r"cannot write .*a\.gif"):
-        film.write_gif(Painter([stage()], SIZE), tmp_path / "file" / "a.gif", [0])
+        film.write_gif(Painter([playback()], SIZE), tmp_path / "file" / "a.gif", [0])
 
 
 def test_a_film_without_frames_is_refused(tmp_path):
     for write in (film.write_gif, film.write_mp4):
         with pytest.raises(UsageError):
-            write(Painter([stage()], SIZE), tmp_path / "a.gif", [])
+            write(Painter([playback()], SIZE), tmp_path / "a.gif", [])
     assert list(tmp_path.iterdir()) == []

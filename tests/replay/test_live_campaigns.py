@@ -5,7 +5,7 @@ import pytest
 
 from conevo.campaigns.campaign import Campaign
 from conevo.replay.live.watched import Watched
-from conevo.replay.stages import rover
+from conevo.worlds.rover import drawn as rover
 from replay.followed import append, at_work, record, write_campaign, write_run
 
 

@@ -9,14 +9,14 @@ from PIL import Image
 
 from conevo import palette
 from conevo.errors import UsageError
-from conevo.replay.channel import Channel
+from conevo.playback.channel import Channel
+from conevo.playback.schema import Backdrop, BodyKind, Kind, Ring, Things
 from conevo.replay.drawing.panel import PAGE, Panel
 from conevo.replay.drawing.planes import RGB, YUV, Planes, disc_mask, even
 from conevo.replay.drawing.scene import Scene
 from conevo.replay.drawing.strip import Strip
 from conevo.replay.picture import Painter
-from conevo.replay.stage import Backdrop, BodyKind, Kind, Ring, Things
-from replay.filmed import BUILT, GONE, SIZE, T, mixed, near, rgb, stage
+from replay.filmed import BUILT, GONE, SIZE, T, mixed, near, playback, rgb
 
 
 def world(made, t, colour_by="action", colours=RGB):
@@ -34,7 +34,7 @@ def pixel(made, t, x, y, colour_by="action"):
 
 
 def test_robots_have_the_colour_of_what_they_do_where_they_are():
-    made = stage()
+    made = playback()
     assert pixel(made, 0, 3, 7) == rgb(palette.ORANGE)
     assert pixel(made, 35, 3, 7) == rgb(palette.FAINT)
     assert pixel(made, 0, 2, 2) == rgb(palette.BLUE)
@@ -46,7 +46,7 @@ def test_a_trail_of_120_positions_stays_behind():
     x = 1.0 + 0.05 * np.arange(t)  # 1.2 px in an iteration
     both = {"x": Channel.of(np.stack([x, x], axis=1)), "y": Channel.of(np.tile([2.0, 5.0], (t, 1)))}
     action = Channel.of(np.ones((t, 2), int))
-    made = stage(iterations=t, action=action, things=(), plan=(), **both)
+    made = playback(iterations=t, action=action, things=(), plan=(), **both)
     # Between two rows of pixels: each has half of a line 1.4 px wide, at opacity 0.4.
     line = mixed(palette.BLUE, palette.GROUND, 0.28)
     for x in (2.6, 5.0, 7.5):
@@ -56,12 +56,12 @@ def test_a_trail_of_120_positions_stays_behind():
 
 
 def test_robots_have_the_colour_of_their_caste_if_wanted():
-    assert pixel(stage(), 0, 3, 7, "caste") == rgb(palette.FAINT)
-    assert pixel(stage(), 0, 2, 2, "caste") == rgb(palette.GREEN)
+    assert pixel(playback(), 0, 3, 7, "caste") == rgb(palette.FAINT)
+    assert pixel(playback(), 0, 2, 2, "caste") == rgb(palette.GREEN)
 
 
 def test_rocks_fade_from_the_iteration_in_which_they_are_detected():
-    made = stage()
+    made = playback()
     assert pixel(made, GONE - 1, 6, 8) == rgb(palette.VERMILION)
     shown = [pixel(made, t, 6, 8)[2] for t in range(GONE, GONE + 12)]
     assert all(a <= b for a, b in pairwise(shown))
@@ -74,7 +74,7 @@ def test_rocks_fade_from_the_iteration_in_which_they_are_detected():
 
 @pytest.mark.parametrize("age", [0, 9])
 def test_a_ring_widens_where_something_was_detected(age):
-    made = stage(rings=())
+    made = playback(rings=())
     bare = np.asarray(world(replace(made, things=()), GONE + age).picture())
     changed = np.argwhere((np.asarray(world(made, GONE + age).picture()) != bare).any(axis=-1))
     around = changed[np.abs(changed - (48, 144)).max(axis=1) < 36]
@@ -82,21 +82,21 @@ def test_a_ring_widens_where_something_was_detected(age):
 
 
 def test_what_stands_still_is_there_below_everything():
-    assert pixel(stage(), 0, 5, 0.2) == rgb("#ddccbb")
-    assert pixel(stage(), 0, 9, 4) == rgb(palette.GROUND)
+    assert pixel(playback(), 0, 5, 0.2) == rgb("#ddccbb")
+    assert pixel(playback(), 0, 9, 4) == rgb(palette.GROUND)
 
 
 def test_a_raster_is_drawn_with_its_first_row_at_the_bottom():
     cells = Channel.of(np.array([[1, 0], [0, 0]], np.uint8))
     part = Backdrop("raster", (0.0, 0.0, 10.0, 10.0), fill="#ddccbb", cells=cells)
-    made = stage(backdrop=(part,), rings=(), things=())
+    made = playback(backdrop=(part,), rings=(), things=())
     assert pixel(made, 0, 4.8, 4.8) == rgb("#ddccbb")
     assert pixel(made, 0, 4.8, 5.2) == rgb(palette.GROUND)
     assert pixel(made, 0, 5.2, 4.8) == rgb(palette.GROUND)
 
 
 def test_rings_are_filled_faintly_for_the_actions_that_have_one():
-    made = stage()
+    made = playback()
     assert near(pixel(made, 0, 3, 6), mixed(palette.ORANGE, palette.GROUND, 0.1))
     assert pixel(made, 35, 3, 6) == rgb(palette.GROUND)
     assert pixel(made, 0, 2, 3) == rgb(palette.GROUND)
@@ -104,7 +104,7 @@ def test_rings_are_filled_faintly_for_the_actions_that_have_one():
 
 def test_headings_point_counter_clockwise_from_the_right():
     heading = Channel.of(np.full((T, 2), np.pi / 2))
-    made = stage(heading=heading, body_kinds=(BodyKind("robot", 1.0),), rings=())
+    made = playback(heading=heading, body_kinds=(BodyKind("robot", 1.0),), rings=())
     # Between two columns of pixels: each has half of a line 1.3 px wide.
     assert near(pixel(made, 0, 3, 7.5), mixed(palette.INK, palette.ORANGE, 0.65), by=25)
     for x, y in ((3, 6.5), (2.5, 7), (3.5, 7)):
@@ -114,7 +114,7 @@ def test_headings_point_counter_clockwise_from_the_right():
 def test_others_are_kites_of_their_own_colour():
     others = (BodyKind("robot", 0.3), BodyKind("prey", 1.0, "square", palette.PURPLE))
     at = {name: Channel.of(np.full((T, 3), value)) for name, value in (("x", 5.0), ("y", 5.0))}
-    made = stage(body_kinds=others, body=(0, 0, 1), rings=(), **at)
+    made = playback(body_kinds=others, body=(0, 0, 1), rings=(), **at)
     assert pixel(made, 0, 5.6, 5) == rgb(palette.PURPLE)
     assert pixel(made, 0, 5.65, 5.65) == rgb(palette.GROUND)
     assert pixel(made, 0, 5, 5) == rgb(palette.ORANGE)  # the team lies above, its first on top
@@ -133,7 +133,7 @@ def test_what_is_held_lies_above_its_robot_with_a_rim():
         states=(Kind("lying", ""), Kind("held", palette.PURPLE)),
     )
     held = np.where(np.arange(T)[:, None] >= 5, [[0, -1]], -1)
-    made = stage(things=(things,), held=Channel.of(held), plan=())
+    made = playback(things=(things,), held=Channel.of(held), plan=())
     assert pixel(made, 4, 3, 7) == rgb(palette.ORANGE)
     assert pixel(made, 5, 3, 7) == rgb(palette.YELLOW)
     assert near(pixel(made, 5, 3.2, 7), rgb(palette.PURPLE), by=40)
@@ -141,8 +141,8 @@ def test_what_is_held_lies_above_its_robot_with_a_rim():
 
 def test_nothing_is_drawn_outside_the_world():
     edge = {name: Channel.of(np.full((T, 2), 9.99)) for name in ("x", "y")}
-    frames = [np.asarray(Painter([stage(**edge)], SIZE).frame(t)) for t in (0, 9)]
-    panel = Panel(stage(**edge), SIZE, RGB, "action", alone=True)
+    frames = [np.asarray(Painter([playback(**edge)], SIZE).frame(t)) for t in (0, 9)]
+    panel = Panel(playback(**edge), SIZE, RGB, "action", alone=True)
     x0, y0, x1, y1 = panel.world
     for frame in frames:
         border = frame[y0 - 1, x0 - 1 : x1 + 1]
@@ -155,7 +155,7 @@ def test_nothing_is_drawn_outside_the_world():
 
 
 def test_the_timeline_shows_every_action_robots_ordered_by_caste():
-    strip = Strip(stage(), RGB, 212, SIZE)
+    strip = Strip(playback(), RGB, 212, SIZE)
     page = Planes.of(Image.new("RGB", (212, strip.height), PAGE), RGB)
     strip.paint(page, 0, 0, T - 1)
     picture = page.picture()
@@ -170,7 +170,7 @@ def test_the_timeline_shows_every_action_robots_ordered_by_caste():
 
 def test_a_robot_that_switches_all_the_time_never_looks_like_one_that_does_not():
     action = np.stack([np.arange(T) % 2, np.ones(T, int)], axis=1)
-    strip = Strip(stage(action=Channel.of(action)), RGB, 32, SIZE)  # two iterations to a column
+    strip = Strip(playback(action=Channel.of(action)), RGB, 32, SIZE)  # two iterations to a column
     page = Planes.of(Image.new("RGB", (32, strip.height), PAGE), RGB)
     strip.paint(page, 0, 0, T - 1)
     rows = np.asarray(page.picture())[:, 12:30]
@@ -181,7 +181,7 @@ def test_a_robot_that_switches_all_the_time_never_looks_like_one_that_does_not()
 
 
 def test_the_playhead_stands_where_time_is_and_what_is_to_come_is_pale():
-    strip = Strip(stage(), RGB, 212, SIZE)
+    strip = Strip(playback(), RGB, 212, SIZE)
     assert [strip.head(t) for t in (9, 19, 39)] == [60, 110, 210]
     page = Planes.of(Image.new("RGB", (220, strip.height), PAGE), RGB)
     strip.paint(page, 4, 0, 19)
@@ -193,23 +193,23 @@ def test_the_playhead_stands_where_time_is_and_what_is_to_come_is_pale():
 
 
 def test_the_playhead_is_in_the_frame():
-    panel = Panel(stage(), SIZE, RGB, "action", alone=True)
-    frame = Painter([stage()], SIZE).frame(19)
+    panel = Panel(playback(), SIZE, RGB, "action", alone=True)
+    frame = Painter([playback()], SIZE).frame(19)
     x, y = panel.strip_at
     assert frame.getpixel((x + panel.strip.head(19), y + 1)) == rgb(palette.INK)
 
 
 def test_the_plan_fills_as_it_is_built():
-    painter = Painter([stage(rings=())], SIZE)
+    painter = Painter([playback(rings=())], SIZE)
     frames = [np.asarray(painter.frame(t)) for t in (BUILT - 1, BUILT)]
-    x = Panel(stage(), SIZE, RGB, "action", alone=True).world[2] + 4
+    x = Panel(playback(), SIZE, RGB, "action", alone=True).world[2] + 4
     count = [(f[:, x:] == rgb(palette.VERMILION)).all(axis=-1).sum() for f in frames]
     assert count[1] - count[0] == 10 * 10  # one of two parts
 
 
 def test_numbers_move_with_time():
-    painter = Painter([stage()], SIZE)
-    panel = Panel(stage(), SIZE, RGB, "action", alone=True)
+    painter = Painter([playback()], SIZE)
+    panel = Panel(playback(), SIZE, RGB, "action", alone=True)
     left, top = panel.world[2], panel.world[1]
     number = [np.asarray(painter.frame(t))[top : top + 16, left + 2 :] for t in (3, 4)]
     assert (number[0] != number[1]).any()
@@ -220,17 +220,17 @@ def test_numbers_move_with_time():
 
 @pytest.mark.parametrize("colour_by", ["action", "caste"])
 def test_a_frame_does_not_depend_on_those_before(colour_by):
-    painter = Painter([stage(), stage(subtitle="MESP")], SIZE, colour_by)
+    painter = Painter([playback(), playback(subtitle="MESP")], SIZE, colour_by)
     for t in (0, 30, GONE, 12, GONE - 1, 39, GONE + 3, 0, 21):
-        fresh = Painter([stage(), stage(subtitle="MESP")], SIZE, colour_by)
+        fresh = Painter([playback(), playback(subtitle="MESP")], SIZE, colour_by)
         assert painter.frame(t).tobytes() == fresh.frame(t).tobytes()
         assert painter.video(t) == fresh.video(t)
 
 
 def test_two_teams_stand_side_by_side_each_under_its_name():
-    other = stage(x=Channel.of(np.full((T, 2), 8.0)), subtitle="MESP")
-    painter = Painter([stage(), other], SIZE)
-    panel = Panel(stage(), SIZE, RGB, "action", alone=False)
+    other = playback(x=Channel.of(np.full((T, 2), 8.0)), subtitle="MESP")
+    painter = Painter([playback(), other], SIZE)
+    panel = Panel(playback(), SIZE, RGB, "action", alone=False)
     assert painter.size[0] == 2 * panel.size[0]
     frame = painter.frame(0)
     x0, y0, x1, y1 = panel.world
@@ -244,9 +244,9 @@ def test_two_teams_stand_side_by_side_each_under_its_name():
 
 def test_a_shorter_epoch_stays_at_its_end():
     t = 10
-    cut = {name: Channel.of(getattr(stage(), name).values[:t]) for name in ("x", "y", "action")}
-    short = stage(iterations=t, things=(), plan=(), **cut)
-    painter = Painter([short, stage()], SIZE)
+    cut = {name: Channel.of(getattr(playback(), name).values[:t]) for name in ("x", "y", "action")}
+    short = playback(iterations=t, things=(), plan=(), **cut)
+    painter = Painter([short, playback()], SIZE)
     assert painter.iterations == T
     half = (0, 0, painter.size[0] // 2, painter.size[1])
     assert painter.frame(9).crop(half) == painter.frame(T - 1).crop(half)
@@ -254,7 +254,7 @@ def test_a_shorter_epoch_stays_at_its_end():
 
 
 def test_video_holds_the_same_picture():
-    painter = Painter([stage()], SIZE)
+    painter = Painter([playback()], SIZE)
     width, height = painter.size
     assert (width % 2, height % 2) == (0, 0)
     planes = np.frombuffer(painter.video(10), np.uint8)
@@ -291,7 +291,7 @@ def test_masks_are_where_they_are_said_to_be():
 
 @pytest.mark.parametrize("size", [121, 333])
 def test_any_size_and_shape_of_world_fits(size):
-    made = stage(bounds=(-5.0, 0.0, 15.0, 10.0))
+    made = playback(bounds=(-5.0, 0.0, 15.0, 10.0))
     painter = Painter([made], size)
     panel = Panel(made, even(size), RGB, "action", alone=True)
     x0, y0, x1, y1 = panel.world
@@ -300,8 +300,8 @@ def test_any_size_and_shape_of_world_fits(size):
 
 
 def test_a_single_iteration_and_a_hostile_range_can_be_drawn():
-    one = {name: Channel.of(getattr(stage(), name).values[:1]) for name in ("x", "y", "action")}
-    made = stage(
+    one = {name: Channel.of(getattr(playback(), name).values[:1]) for name in ("x", "y", "action")}
+    made = playback(
         iterations=1,
         things=(),
         plan=(),
@@ -317,11 +317,11 @@ def test_a_single_iteration_and_a_hostile_range_can_be_drawn():
     ("call", "said"),
     [
         (lambda: Painter([]), "one or two teams"),
-        (lambda: Painter([stage()] * 3), "one or two teams"),
-        (lambda: Painter([stage()], 40), "size 40"),
-        (lambda: Painter([stage()], colour_by="mood"), "not by mood"),
-        (lambda: Painter([stage()], SIZE).frame(T), "no iteration 40"),
-        (lambda: Painter([stage()], SIZE).frame(-1), "no iteration -1"),
+        (lambda: Painter([playback()] * 3), "one or two teams"),
+        (lambda: Painter([playback()], 40), "size 40"),
+        (lambda: Painter([playback()], colour_by="mood"), "not by mood"),
+        (lambda: Painter([playback()], SIZE).frame(T), "no iteration 40"),
+        (lambda: Painter([playback()], SIZE).frame(-1), "no iteration -1"),
     ],
 )
 def test_what_cannot_be_painted_is_said(call, said):

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from conevo.errors import EnvironmentFailure, UsageError
-from conevo.replay.channel import Channel
+from conevo.playback.channel import Channel
 from conevo.replay.trajectory import Trajectory
 from conevo.rng import fold
 from conevo.worlds.registry import world

@@ -7,7 +7,7 @@ import pytest
 from PIL import Image
 
 from conevo.replay.page import replay_page
-from conevo.replay.stages import stage_of
+from conevo.replay.playback import playback_of
 from conevo.replay.trajectory import Trajectory
 from replay.eventful import WORLDS, played
 from replay.synthetic import DETECTED, T, made_up
@@ -46,12 +46,12 @@ def test_the_page_of_an_epoch_loads_and_shows_it(tab, epoch, tmp_path):
         "action",
     )
     assert (first["selected"], first["teams"]) == (None, 1)
-    assert tab.title().startswith(epoch.stage.title)
+    assert tab.title().startswith(epoch.playback.title)
     text = tab.inner_text("body")
-    assert epoch.stage.title in text
-    assert epoch.stage.subtitle in text
+    assert epoch.playback.title in text
+    assert epoch.playback.subtitle in text
     assert not tab.get_by_role("alert").is_visible()
-    for kind in epoch.stage.actions:
+    for kind in epoch.playback.actions:
         assert kind.name in tab.inner_text("#legend")
     for world in (0, 100, 239):
         seek(tab, world)
@@ -68,7 +68,7 @@ def test_a_page_in_a_string_loads_too(tab):
 
 def test_the_same_epoch_gives_the_same_page(epoch):
     again = Trajectory(played(epoch.name).about, played(epoch.name).channels)
-    assert replay_page([stage_of(again)]) == epoch.page
+    assert replay_page([playback_of(again)]) == epoch.page
 
 
 # --- time -----------------------------------------------------------------------------------------

@@ -128,8 +128,8 @@ def test_a_click_beside_all_robots_deselects(team):
 
 def test_robots_have_the_colour_of_their_action_or_caste(tab, epoch, tmp_path):
     open_page(tab, epoch.page, tmp_path / "replay.html")
-    about, stage = epoch.about, epoch.stage
-    colours = {kind.name: kind.colour for kind in (*stage.actions, *stage.castes)}
+    about, playback = epoch.about, epoch.playback
+    colours = {kind.name: kind.colour for kind in (*playback.actions, *playback.castes)}
     for t in (30, 200):
         seek(tab, t)
         x, y = (epoch.channels[name][t] for name in ("x", "y"))
@@ -196,8 +196,8 @@ def test_a_trail_follows_its_robot(team):
     seek(team, T - 1)
     if not state(team)["trails"]:
         team.check("#trails")
-    stage = made_up()
-    behind = at_world(team, stage.x.values[T - 30, 2], stage.y.values[T - 30, 2])
+    playback = made_up()
+    behind = at_world(team, playback.x.values[T - 30, 2], playback.y.values[T - 30, 2])
     with_trail = patch(team, *behind)
     team.uncheck("#trails")
     assert not state(team)["trails"]
@@ -206,24 +206,24 @@ def test_a_trail_follows_its_robot(team):
 
 def test_nothing_is_lost_of_the_numbers_of_everybody(tab, tmp_path):
     """Every value of a made-up team at a few iterations, small and large ones."""
-    stage = made_up()
-    large = tuple(replace(one, fitness=98765.4321 * 10**k) for k, one in enumerate(stage.robots))
-    stage = replace(stage, robots=large)
-    open_page(tab, replay_page([stage]), tmp_path / "large.html")
+    playback = made_up()
+    large = tuple(replace(one, fitness=98765.4321 * 10**k) for k, one in enumerate(playback.robots))
+    playback = replace(playback, robots=large)
+    open_page(tab, replay_page([playback]), tmp_path / "large.html")
     for t in (0, 77, T - 1):
         seek(tab, t)
         for robot in range(R):
             tab.evaluate("r => conevo.select(0, r)", robot)
             said = shown(tab)
             number, tolerance = number_in(said["field"]["fitness"])
-            assert number == pytest.approx(stage.robots[robot].fitness, abs=tolerance)
+            assert number == pytest.approx(playback.robots[robot].fitness, abs=tolerance)
             for name, channel in (
-                ("sensor", stage.sensors),
-                ("hidden", stage.hidden),
-                ("output", stage.outputs),
+                ("sensor", playback.sensors),
+                ("hidden", playback.hidden),
+                ("output", playback.outputs),
             ):
                 values = channel.values[t, robot]
-                slots = stage.robots[robot].neurons if name == "hidden" else range(len(values))
+                slots = playback.robots[robot].neurons if name == "hidden" else range(len(values))
                 assert set(said[name]) == {str(k) for k in slots}
                 for k in slots:
                     value = values[k]
@@ -235,9 +235,9 @@ def test_nothing_is_lost_of_the_numbers_of_everybody(tab, tmp_path):
 
 
 def test_a_detected_rock_fades(team):
-    stage = made_up()
-    high = stage.things[1].kinds[1].colour
-    low = stage.things[1].kinds[0].colour
+    playback = made_up()
+    high = playback.things[1].kinds[1].colour
+    low = playback.things[1].kinds[0].colour
 
     def rocks(t):
         seek(team, t)
@@ -268,13 +268,13 @@ def distance(one, other):
 
 def test_a_carried_object_moves_with_its_robot(team):
     colour = made_up().things[0].kinds[1].colour
-    stage = made_up()
+    playback = made_up()
     for t in (0, HELD[0], HELD[30], T - 1):
         seek(team, t)
-        at = [float(c.values[t, 1]) for c in (stage.things[0].x, stage.things[0].y)]
+        at = [float(c.values[t, 1]) for c in (playback.things[0].x, playback.things[0].y)]
         assert patch(team, *at_world(team, *at)).count(colour) >= 4, t
     seek(team, HELD[30])
-    left = [float(c.values[0, 1]) for c in (stage.things[0].x, stage.things[0].y)]
+    left = [float(c.values[0, 1]) for c in (playback.things[0].x, playback.things[0].y)]
     assert colour not in patch(team, *at_world(team, *left))
     team.evaluate("conevo.select(0, 0)")
     assert re.search(r"\d|B", shown(team)["field"]["holding"])
@@ -284,7 +284,7 @@ def test_a_carried_object_moves_with_its_robot(team):
 
 def test_events_jump(tab, epoch, tmp_path):
     open_page(tab, epoch.page, tmp_path / "replay.html")
-    events = epoch.stage.events
+    events = epoch.playback.events
     assert len(events) >= 2
     listed = tab.eval_on_selector_all(
         "#events-0 [data-event]", "all => all.map((one) => [+one.dataset.event, +one.dataset.t])"
@@ -318,10 +318,10 @@ def test_events_can_be_filtered(team):
 def test_the_timeline_shows_and_jumps_to_what_robots_did(tab, epoch, tmp_path):
     open_page(tab, epoch.page, tmp_path / "replay.html")
     action = epoch.channels["action"][:, : epoch.n].astype(int)
-    check_timeline(tab, epoch.stage, action, 0)
+    check_timeline(tab, epoch.playback, action, 0)
 
 
-def check_timeline(tab, stage, action, team):
+def check_timeline(tab, playback, action, team):
     """In a robot's row, where an iteration is, its action has its colour; a click there jumps."""
     length, n = action.shape
     seek(tab, length - 1)
@@ -335,7 +335,7 @@ def check_timeline(tab, stage, action, team):
     for (robot, t), (x, y) in zip(cells, places, strict=True):
         if is_wide or len(set(action[t - 1 : t + 2, robot])) == 1:
             kind = action[t, robot]
-            colour = stage.actions[kind].colour if kind >= 0 else palette.FAINT
+            colour = playback.actions[kind].colour if kind >= 0 else palette.FAINT
             assert hexadecimal(picture[int(y), int(x)]) == colour, (robot, t)
     robots, times = np.array(cells).T
     assert np.polyfit(times, places[:, 0], 1)[0] == pytest.approx(box["width"] / length, rel=0.02)
@@ -364,7 +364,7 @@ def cells_at(tab, team, cells):
 def test_two_teams_side_by_side(tab, tmp_path):
     """Of the same scenario; both follow the same time, and each says what its own file says."""
     teams = [Epoch("rover", tmp_path, seed) for seed in (2, 3)]
-    open_page(tab, replay_page([team.stage for team in teams]), tmp_path / "both.html")
+    open_page(tab, replay_page([team.playback for team in teams]), tmp_path / "both.html")
     assert state(tab)["teams"] == 2
     left, right = (inside(tab, f"#world-{k}") for k in range(2))
     assert left["x"] + left["width"] <= right["x"]
@@ -379,10 +379,10 @@ def test_two_teams_side_by_side(tab, tmp_path):
                 assert state(tab)["selected"] == {"team": k, "robot": robot}
                 check_panel(team, t, robot, shown(tab, k))
                 action = int(team.at("action", t, robot))
-                assert team.stage.actions[action].colour in patch(tab, *where(tab, robot, k))
+                assert team.playback.actions[action].colour in patch(tab, *where(tab, robot, k))
     for k, team in enumerate(teams):
-        check_timeline(tab, team.stage, team.channels["action"].astype(int), k)
+        check_timeline(tab, team.playback, team.channels["action"].astype(int), k)
         seek(tab, 0)
         tab.locator(f"#events-{k} [data-event]").first.click()
-        assert state(tab)["t"] == team.stage.events[0].t
+        assert state(tab)["t"] == team.playback.events[0].t
     tab.screenshot(path=tmp_path / "both.png")

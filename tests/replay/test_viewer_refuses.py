@@ -11,9 +11,9 @@ from typing import Any
 
 import pytest
 
-from conevo.replay.channel import Channel
+from conevo.playback.channel import Channel
+from conevo.playback.schema import Event, Playback
 from conevo.replay.page import replay_page
-from conevo.replay.stage import Event, Stage
 from replay.synthetic import T, crowd, made_up, renamed
 from replay.viewing import inside, open_page, overflow, state, until
 
@@ -36,12 +36,12 @@ HOSTILE = {
 
 @pytest.mark.parametrize("text", HOSTILE.values(), ids=HOSTILE)
 def test_hostile_names_stay_text(tab, tmp_path, text):
-    """In every place of a stage that holds text; nothing is run, nothing added, all is shown."""
+    """In every place of a playback that holds text; nothing is run, nothing added, all is shown."""
     elements = "() => [...document.querySelectorAll('*')].map((e) => e.localName).sort().join()"
     counts = []
     for name in ("robot", text):
-        stage = renamed(made_up(), name)
-        open_page(tab, replay_page([stage]), tmp_path / "hostile.html")
+        playback = renamed(made_up(), name)
+        open_page(tab, replay_page([playback]), tmp_path / "hostile.html")
         assert tab.get_attribute("body", "data-ready") == "yes"
         for robot in (0, 1):
             tab.evaluate("robot => conevo.select(0, robot)", robot)
@@ -166,15 +166,15 @@ DAMAGE = {
     "disc without radius": put([1, 2], *ONE, "backdrop", 1, "numbers"),
     "raster without cells": put(None, *ONE, "backdrop", 2, "cells"),
 }
-OPTIONAL = {field.name for field in fields(Stage) if field.default is None}
+OPTIONAL = {field.name for field in fields(Playback) if field.default is None}
 DAMAGE |= {
     f"without {field.name}": drop(*ONE, field.name)
-    for field in fields(Stage)
+    for field in fields(Playback)
     if field.name not in OPTIONAL
 }
 
 
-LISTS = {field.name for field in fields(Stage) if field.default == ()} | {"facts"}
+LISTS = {field.name for field in fields(Playback) if field.default == ()} | {"facts"}
 
 
 def refused(tab, page: str) -> str:
@@ -251,7 +251,7 @@ def test_a_page_without_data_gets_one_line(tab):
 
 
 def test_what_may_be_missing_may_be_missing(tab, tmp_path):
-    """The least stage that there is: robots, where they are, what they do."""
+    """The least playback that there is: robots, where they are, what they do."""
     bare = replace(
         made_up(),
         **dict.fromkeys(OPTIONAL),
@@ -293,12 +293,12 @@ def test_extremes_are_shown(tab, tmp_path):
         crowd(robots=64, rocks=5000, iterations=400),
         events=tuple(Event(k % 400, k % 2, f"event {k}", (k % 64,)) for k in range(3000)),
     )
-    for stage in (one, huge, many):
-        open_page(tab, replay_page([stage]), tmp_path / "extreme.html")
+    for playback in (one, huge, many):
+        open_page(tab, replay_page([playback]), tmp_path / "extreme.html")
         assert tab.get_attribute("body", "data-ready") == "yes", tab.inner_text("body")
         tab.evaluate("conevo.select(0, 0)")
         tab.keyboard.press("End")
-        assert state(tab)["t"] == stage.iterations - 1
+        assert state(tab)["t"] == playback.iterations - 1
         tab.evaluate("conevo.play()")
         until(tab, "() => conevo.state().t >= 0")
         tab.evaluate("conevo.pause()")

@@ -13,7 +13,7 @@ import pytest
 from PIL import Image
 
 from conevo.replay.page import replay_page
-from conevo.replay.stages import stage_of
+from conevo.replay.playback import playback_of
 from conevo.replay.trajectory import Trajectory
 from replay.eventful import numbers, played
 from replay.synthetic import made_up
@@ -26,15 +26,15 @@ PLACE = "([team, robot]) => conevo.place(team, robot)"
 
 
 class Epoch:
-    """A world's epoch: what its file says, its stage, its page."""
+    """A world's epoch: what its file says, its playback, its page."""
 
     def __init__(self, name: str, folder: Path, seed: int = 2) -> None:
         self.name = name
         path = folder / f"{name}-{seed}.npz"
         played(name, seed).save(path)
         self.about, self.channels = numbers(path)
-        self.stage = stage_of(Trajectory.load(path))
-        self.page = replay_page([self.stage])
+        self.playback = playback_of(Trajectory.load(path))
+        self.page = replay_page([self.playback])
         self.n = self.about["n_robots"]
 
     def at(self, channel, t, robot):
@@ -103,9 +103,9 @@ def seek(tab, t):
 
 def at_world(tab, x, y):
     """Where a place of the made-up world is drawn: robots 0 and 3 tell how it lies."""
-    stage, t = made_up(), state(tab)["t"]
+    playback, t = made_up(), state(tab)["t"]
     places = np.array([where(tab, 0), where(tab, 3)])
-    here = np.array([[c.values[t, r] for c in (stage.x, stage.y)] for r in (0, 3)])
+    here = np.array([[c.values[t, r] for c in (playback.x, playback.y)] for r in (0, 3)])
     scale = (places[1] - places[0]) / (here[1] - here[0])
     assert scale[0] == pytest.approx(-scale[1], rel=1e-3)  # y points up, both axes alike
     return places[0] + scale * (np.array([x, y]) - here[0])

@@ -59,7 +59,7 @@ def film(
 
     Try: conevo film runs/first --gif
     """
-    from conevo.cli.seeing import REPLAYS, bar, name_of, stages, trajectories
+    from conevo.cli.seeing import REPLAYS, bar, name_of, playbacks, trajectories
     from conevo.replay.film import SIZES, choose_format, frames_of, write_film, write_poster
     from conevo.replay.picture import Painter
     from conevo.runs.durable import refuse_file
@@ -78,7 +78,7 @@ def film(
     name = "-".join([name_of(seen), *(f"{k}-{v}" for k, v in asked.items() if v is not None)])
     path = Path(out) if out else REPLAYS / f"{name}.{kind}"
     refuse_file(path)
-    painter = Painter(stages(seen, what, which["beside"]), size or SIZES[kind], colour)
+    painter = Painter(playbacks(seen, what, which["beside"]), size or SIZES[kind], colour)
     if poster is not None:
         write_poster(painter, path, poster)
     else:

@@ -27,12 +27,12 @@ def replay(what: str, out: str | None, keep: str | None, no_browser: bool, **whi
 
     Try: conevo replay runs/first
     """
-    from conevo.cli.seeing import REPLAYS, name_of, stages, trajectories
+    from conevo.cli.seeing import REPLAYS, name_of, playbacks, trajectories
     from conevo.replay.page import replay_page
     from conevo.runs.durable import write_new
 
     seen = trajectories(what, **which)
-    page = replay_page(stages(seen, what, which["beside"])).encode()
+    page = replay_page(playbacks(seen, what, which["beside"])).encode()
     path = Path(out) if out else REPLAYS / f"{name_of(seen)}.html"
     files = {path: page}
     if keep is not None:

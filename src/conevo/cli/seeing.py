@@ -14,10 +14,10 @@ import click
 from conevo.errors import UsageError
 
 if TYPE_CHECKING:
-    from conevo.replay.stage import Stage
+    from conevo.playback.schema import Playback
     from conevo.replay.trajectory import Trajectory
 
-__all__ = ["REPLAYS", "bar", "epoch_options", "name_of", "stages", "trajectories"]
+__all__ = ["REPLAYS", "bar", "epoch_options", "name_of", "playbacks", "trajectories"]
 
 REPLAYS = Path("replays")  # where pages and films are put unless told otherwise
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -97,18 +97,18 @@ def _trajectory(
         return record(run, generation, epoch or 0, threads=threads, like=like, progress=progress)
 
 
-def stages(seen: list[Trajectory], *names: str | None) -> list[Stage]:
+def playbacks(seen: list[Trajectory], *names: str | None) -> list[Playback]:
     """Return what is to be drawn of trajectories; ``names`` are those that they were asked for by.
 
     Raises:
         UsageError: one is damaged; it is named.
     """
-    from conevo.replay.stages import stage_of
+    from conevo.replay.playback import playback_of
 
     found = []
     for one, name in zip(seen, names, strict=False):
         try:
-            found.append(stage_of(one))
+            found.append(playback_of(one))
         except UsageError as error:
             raise UsageError(f"{name}: {error}") from error
     return found

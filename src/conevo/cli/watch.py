@@ -60,8 +60,8 @@ def _watched(what: str | None) -> Watched:
 def _champion_page(path: Path, generation: int) -> str:
     """Return the replay of a run's champion; made again when ``generation`` is another one."""
     from conevo.replay.page import replay_page
+    from conevo.replay.playback import playback_of
     from conevo.replay.recording import record
-    from conevo.replay.stages import stage_of
     from conevo.runs.run import Run
 
-    return replay_page([stage_of(record(Run(path)))])
+    return replay_page([playback_of(record(Run(path)))])

@@ -10,7 +10,7 @@ from importlib import resources
 from importlib.metadata import version
 
 from conevo.errors import UsageError
-from conevo.replay.stage import Pool, Stage
+from conevo.playback.schema import Playback, Pool
 
 __all__ = ["FORMAT", "replay_page"]
 
@@ -20,24 +20,24 @@ PLACE = "<!-- conevo:data -->"  # in the viewer's page, where the data go
 _ESCAPED = {ord(sign): f"\\u{ord(sign):04x}" for sign in "<>&\u2028\u2029"}
 
 
-def replay_page(stages: Sequence[Stage]) -> str:
-    """Return the viewer with the data of its teams; the same stages always give the same page.
+def replay_page(playbacks: Sequence[Playback]) -> str:
+    """Return the viewer with the data of its teams; the same playbacks always give the same page.
 
     Args:
-        stages: one team, or two in the same scenario, side by side.
+        playbacks: one team, or two in the same scenario, side by side.
 
     Raises:
         UsageError: two teams whose epochs are not equally long.
     """
-    if not 1 <= len(stages) <= 2:
-        raise ValueError(f"a page shows one team or two, not {len(stages)}")
-    lengths = sorted({stage.iterations for stage in stages})
+    if not 1 <= len(playbacks) <= 2:
+        raise ValueError(f"a page shows one team or two, not {len(playbacks)}")
+    lengths = sorted({playback.iterations for playback in playbacks})
     if len(lengths) > 1:
         raise UsageError(
             f"epochs of {lengths[0]} and {lengths[1]} iterations cannot be shown side by side"
         )
     pool = Pool()
-    teams = [pool.plain(stage) for stage in stages]
+    teams = [pool.plain(playback) for playback in playbacks]
     about = {"format": FORMAT, "conevo": version("conevo"), "teams": teams}
     text = json.dumps(about, allow_nan=False, separators=(",", ":")).translate(_ESCAPED)
     data = base64.b64encode(zlib.compress(pool.data, 9)).decode()

@@ -10,9 +10,9 @@ from collections.abc import Sequence
 from PIL import Image
 
 from conevo.errors import UsageError
+from conevo.playback.schema import Playback
 from conevo.replay.drawing.panel import PAGE, Panel
 from conevo.replay.drawing.planes import RGB, YUV, Colours, Planes, even
-from conevo.replay.stage import Stage
 
 __all__ = ["Painter"]
 
@@ -25,7 +25,7 @@ class Painter:
     A frame is a function of its number alone: painting others before changes no bit of it.
 
     Args:
-        stages: one or two; an epoch that is shorter than the other stays at its end.
+        playbacks: one or two; an epoch that is shorter than the other stays at its end.
         size: of the longer side of each world, px; all else follows from it.
         colour_by: "action" or "caste".
 
@@ -33,17 +33,19 @@ class Painter:
         size: (width, height) of a frame in px, both even.
 
     Raises:
-        UsageError: no stage or more than two, a size that is out of range, an unknown colouring.
+        UsageError: no playback or more than two, a size that is out of range, an unknown colouring.
     """
 
-    def __init__(self, stages: Sequence[Stage], size: int = 720, colour_by: str = "action") -> None:
-        if not 1 <= len(stages) <= 2:
-            raise UsageError(f"a film shows one or two teams, not {len(stages)}")
+    def __init__(
+        self, playbacks: Sequence[Playback], size: int = 720, colour_by: str = "action"
+    ) -> None:
+        if not 1 <= len(playbacks) <= 2:
+            raise UsageError(f"a film shows one or two teams, not {len(playbacks)}")
         if not _SIZES[0] <= size <= _SIZES[1]:
             raise UsageError(f"size {size} is not between {_SIZES[0]} and {_SIZES[1]}")
         if colour_by not in ("action", "caste"):
             raise UsageError(f"robots are coloured by action or by caste, not by {colour_by}")
-        self._stages, self._px, self._colour_by = tuple(stages), even(size), colour_by
+        self._playbacks, self._px, self._colour_by = tuple(playbacks), even(size), colour_by
         self._panels: dict[Colours, list[Panel]] = {}
         self._pages: dict[Colours, Planes] = {}
         sizes = [panel.size for panel in self._panels_in(RGB)]
@@ -52,7 +54,7 @@ class Painter:
     @property
     def iterations(self) -> int:
         """How many frames there are: the iterations of the longer epoch."""
-        return max(stage.iterations for stage in self._stages)
+        return max(playback.iterations for playback in self._playbacks)
 
     def frame(self, t: int) -> Image.Image:
         """Return the picture after iteration t, from 0, in mode "RGB".
@@ -75,16 +77,17 @@ class Painter:
         page = self._pages[colours].copy()
         x = 0
         for panel in panels:
-            panel.paint(page, x, min(t, panel.stage.iterations - 1))
+            panel.paint(page, x, min(t, panel.playback.iterations - 1))
             x += panel.size[0]
         return page
 
     def _panels_in(self, colours: Colours) -> list[Panel]:
         """Return the panels that paint into such planes, made when they are first needed."""
         if colours not in self._panels:
-            alone = len(self._stages) == 1
+            alone = len(self._playbacks) == 1
             self._panels[colours] = [
-                Panel(stage, self._px, colours, self._colour_by, alone) for stage in self._stages
+                Panel(playback, self._px, colours, self._colour_by, alone)
+                for playback in self._playbacks
             ]
         return self._panels[colours]
 

@@ -13,13 +13,16 @@ import numpy.typing as npt
 from conevo.analysis.fittest import equip
 from conevo.controllers.protocol import Controller
 from conevo.errors import UsageError
-from conevo.replay.channel import Channel
-from conevo.replay.trajectory import FORMAT, About, Trajectory
+from conevo.playback.about import About
+from conevo.playback.channel import Channel
+from conevo.playback.drawn import Drawn
+from conevo.replay.trajectory import FORMAT, Trajectory
 from conevo.rng import fold
 from conevo.runs.evaluation import describe
 from conevo.runs.run import Run
 from conevo.worlds.measures import Measure, measures_of
 from conevo.worlds.protocol import Simulator, World
+from conevo.worlds.registry import inherited
 
 __all__ = ["record", "record_epoch"]
 
@@ -167,6 +170,13 @@ def record_epoch(
         "performance": portrait.performance,
         "units": {one.name: _worth(one) for one in measures_of(world)},
     }
+    if like := inherited(world):
+        about["like"] = like
+    drawn = getattr(world, "drawn", None)
+    if drawn is not None:
+        if not isinstance(drawn, Drawn):
+            raise UsageError(f"world {world.name}: drawn must be a Drawn, not {drawn!r:.60}")
+        about["drawn"] = drawn.plain
     return about, channels
 
 

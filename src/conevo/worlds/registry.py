@@ -13,7 +13,7 @@ from conevo.worlds.measures import measures_of
 if TYPE_CHECKING:
     from conevo.worlds.protocol import World
 
-__all__ = ["WORLDS", "WorldEntry", "resolve", "world"]
+__all__ = ["WORLDS", "WorldEntry", "inherited", "resolve", "world"]
 
 
 @dataclass(frozen=True)
@@ -21,7 +21,9 @@ class WorldEntry:
     """What the registry knows of a world without loading it.
 
     ``module`` holds the classes named ``params_name`` (parameters) and ``world_name`` (built from
-    an environment name and parameters). An entry in a file outside the package leaves it out;
+    an environment name and parameters). ``drawn`` is the module whose ``playback`` tells what is to
+    be drawn of an epoch, without Warp; without it, what the world's class says in its own ``drawn``
+    is (``playback.drawn``). An entry in a file outside the package leaves it out;
     ``worlds.outside`` fills it in, with the file's path, ``files`` (this one first, then the files
     next to it that it imports) and the digest of their texts.
     """
@@ -34,6 +36,7 @@ class WorldEntry:
     params_name: str
     world_name: str
     module: str = ""
+    drawn: str = ""
     file: str = ""
     files: tuple[str, ...] = ()
     digest: str = ""
@@ -90,6 +93,7 @@ WORLDS: dict[str, WorldEntry] = {
                 f"{kind}-{n}" for kind in ("simple", "complex", "extended") for n in range(1, 11)
             ),
             module="conevo.worlds.rover.world",
+            drawn="conevo.worlds.rover.drawn",
             params_name="RoverParams",
             world_name="RoverWorld",
         ),
@@ -100,6 +104,7 @@ WORLDS: dict[str, WorldEntry] = {
             source="Nitschke 2009, chapter 4",
             environments=tuple(f"team-{n}" for n in range(1, 11)),
             module="conevo.worlds.pursuit.world",
+            drawn="conevo.worlds.pursuit.drawn",
             params_name="PursuitParams",
             world_name="PursuitWorld",
         ),
@@ -110,6 +115,7 @@ WORLDS: dict[str, WorldEntry] = {
             source="Nitschke 2009, section 4.3",
             environments=tuple(f"shaping-{n}" for n in range(1, 7)),
             module="conevo.worlds.pursuit.prey",
+            drawn="conevo.worlds.pursuit.drawn",
             params_name="PreyParams",
             world_name="PreyWorld",
         ),
@@ -121,6 +127,7 @@ WORLDS: dict[str, WorldEntry] = {
             environments=tuple(f"simple-{n}" for n in range(1, 11))
             + tuple(f"complex-{n}" for n in range(1, 10)),
             module="conevo.worlds.gacc.world",
+            drawn="conevo.worlds.gacc.drawn",
             params_name="GaccParams",
             world_name="GaccWorld",
         ),
@@ -172,6 +179,15 @@ def _named(name: str) -> WorldEntry:
     if entry is None:
         raise unknown_name("world", name, [*newest, *WORLDS])
     return entry
+
+
+def inherited(world: World) -> str:
+    """Return the name of the world of the package whose class a world's own inherits, or ""."""
+    classes = {(one.__module__, one.__qualname__) for one in type(world).__mro__[1:]}
+    for entry in WORLDS.values():
+        if (entry.module, entry.world_name) in classes:
+            return entry.name
+    return ""
 
 
 def world(path: str, **params: Any) -> World:

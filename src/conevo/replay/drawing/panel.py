@@ -12,10 +12,10 @@ import numpy.typing as npt
 from PIL import Image, ImageDraw, ImageFont
 
 from conevo.palette import FAINT, GROUND, INK, shade
+from conevo.playback.schema import Curve, Kind, PlanRow, Playback
 from conevo.replay.drawing.planes import Colours, Mask, Planes, even
 from conevo.replay.drawing.scene import Scene
 from conevo.replay.drawing.strip import Strip
-from conevo.replay.stage import Curve, Kind, PlanRow, Stage
 
 __all__ = ["PAGE", "Panel"]
 
@@ -41,7 +41,7 @@ class Panel:
     """Paints one team.
 
     Args:
-        stage: to be painted.
+        playback: to be painted.
         size: of the longer side of the world, px.
         colours: planes to paint.
         colour_by: "action" or "caste".
@@ -55,18 +55,18 @@ class Panel:
     """
 
     def __init__(
-        self, stage: Stage, size: int, colours: Colours, colour_by: str, alone: bool
+        self, playback: Playback, size: int, colours: Colours, colour_by: str, alone: bool
     ) -> None:
-        self.stage, self._colour_by = stage, colour_by
+        self.playback, self._colour_by = playback, colour_by
         sizes = (("large", 20, 12), ("text", 14, 10), ("small", 12, 9))
         self._points = {name: max(round(p * size / 720), least) for name, p, least in sizes}
-        x0, y0, x1, y1 = stage.bounds
+        x0, y0, x1, y1 = playback.bounds
         longer = max(x1 - x0, y1 - y0)
         width, height = (max(even(side / longer * size), 2) for side in (x1 - x0, y1 - y0))
         gap = self._gap = even(16 * size / 720)
         left, top = gap, gap + self._line("large") + self._line("text") + even(gap / 2)
         self.world = (left, top, left + width, top + height)
-        self._scene = Scene(stage, width, height, colours, colour_by)
+        self._scene = Scene(playback, width, height, colours, colour_by)
         self._drawings: list[Callable[[Image.Image], None]] = []
         self._changes: list[Callable[[Planes, int, int], None]] = []
         total = width
@@ -76,11 +76,11 @@ class Panel:
             bottom = max(self._say(left + width + gap, top, side), top + height)
         else:
             bottom = self._say(left, top + height + gap // 2, width)
-        self.strip = Strip(stage, colours, total, size)
+        self.strip = Strip(playback, colours, total, size)
         self.strip_at = (left, even(bottom + gap))
         self.size = (total + 2 * gap, self.strip_at[1] + self.strip.height + gap)
-        self._write(left, gap - 2, stage.title, "large", INK, total)
-        self._write(left, gap + self._line("large"), stage.subtitle, "text", _SOFT, total)
+        self._write(left, gap - 2, playback.title, "large", INK, total)
+        self._write(left, gap + self._line("large"), playback.subtitle, "text", _SOFT, total)
 
     def background(self) -> Image.Image:
         """Return what is the same in all frames."""
@@ -101,29 +101,29 @@ class Panel:
     # --- what is said: each returns where it ends -------------------------------------------------
 
     def _say(self, x: int, y: int, width: int) -> int:
-        stage = self.stage
+        playback = self.playback
         y = self._say_readings(x, y, width) + self._gap // 2
         coloured = {self._colour_by: " (their colour)"}
         title = "what robots do" + coloured.get("action", "")
-        y = self._say_robots(title, stage.actions, self._doing(), x, y, width)
-        counts = Counter(robot.caste for robot in stage.robots)
-        castes = [stage.castes[k] for k in sorted(counts)]
+        y = self._say_robots(title, playback.actions, self._doing(), x, y, width)
+        counts = Counter(robot.caste for robot in playback.robots)
+        castes = [playback.castes[k] for k in sorted(counts)]
         numbers = [str(counts[k]) for k in sorted(counts)]
         title = "castes" + coloured.get("caste", "")
         y = self._say_robots(title, castes, numbers, x, y, width)
         y = self._say_things(x, y, width)
-        for row in stage.plan if stage.things else ():
+        for row in playback.plan if playback.things else ():
             y = self._say_plan(row, x, y, width)
         return self._say_gauges(x, y, width)
 
     def _say_readings(self, x: int, y: int, width: int) -> int:
-        stage = self.stage
+        playback = self.playback
         readings: list[tuple[str, Text]] = [
-            (f"iteration of {stage.iterations:,}", lambda t: f"{t:,}")
+            (f"iteration of {playback.iterations:,}", lambda t: f"{t:,}")
         ]
-        if stage.seconds:
-            readings.append(("seconds", lambda t: f"{(t + 1) * stage.seconds:.1f}"))
-        readings += [(measure.name, _reading(measure)) for measure in stage.measures[:2]]
+        if playback.seconds:
+            readings.append(("seconds", lambda t: f"{(t + 1) * playback.seconds:.1f}"))
+        readings += [(measure.name, _reading(measure)) for measure in playback.measures[:2]]
         large = self._line("large")
         height = large + self._line("small") + self._gap // 4
         places, bottom = self._cells(x, y, width, len(readings), 170, height)
@@ -134,8 +134,8 @@ class Panel:
 
     def _doing(self) -> list[Text]:
         """Return how many robots execute each action in frame t, as texts."""
-        actions = self.stage.action.values
-        return [_at((actions == k).sum(axis=1)) for k in range(len(self.stage.actions))]
+        actions = self.playback.action.values
+        return [_at((actions == k).sum(axis=1)) for k in range(len(self.playback.actions))]
 
     def _say_robots(
         self,
@@ -158,13 +158,13 @@ class Panel:
 
     def _say_things(self, x: int, y: int, width: int) -> int:
         """Name what else is to be seen."""
-        stage = self.stage
+        playback = self.playback
         keys = [
             _Key(kind.name, kind.colour or INK, "kite")
-            for n, kind in enumerate(stage.body_kinds)
-            if kind.shape == "square" and n in stage.body
+            for n, kind in enumerate(playback.body_kinds)
+            if kind.shape == "square" and n in playback.body
         ]
-        for things in stage.things:
+        for things in playback.things:
             keys += [
                 _Key(k.name, k.colour, things.shape) for k in things.kinds if k.colour != GROUND
             ]
@@ -172,7 +172,7 @@ class Panel:
             for rim in rims:
                 names = [state.name for state in things.states if state.colour == rim]
                 keys.append(_Key(", ".join(names), GROUND, things.shape, rim))
-        for part in stage.backdrop:
+        for part in playback.backdrop:
             if part.label and part.fill:
                 shape = "disc" if part.shape == "disc" else "square"
                 keys.append(_Key(part.label, part.fill, shape, part.line))
@@ -189,7 +189,7 @@ class Panel:
         side = max(min(even(self._points["text"]), width // max(len(row.parts), 1) // 2 * 2 - 2), 2)
         for n, (kind, built) in enumerate(zip(row.parts, row.built, strict=True)):
             left = even(x) + n * (side + 2)
-            colour = self.stage.things[0].kinds[kind].colour
+            colour = self.playback.things[0].kinds[kind].colour
             self._draw_box(shade(colour, 0.8), shade(colour, 0.4), left, y, side, side)
             self._change_box(colour, left, y, side, side, partial(_is_built, built))
         return y + side + self._gap // 4
@@ -197,7 +197,7 @@ class Panel:
     def _say_gauges(self, x: int, y: int, width: int) -> int:
         y = even(y + self._gap // 4)
         label, height = even(6 * self._points["text"]), even(self._points["text"] / 2)
-        for gauge in self.stage.gauges:
+        for gauge in self.playback.gauges:
             self._write(x, y, gauge.name, "small", _SOFT, label - 4)
             left, top, long = even(x + label), even(y + 4), (min(width, 320) - label) // 2 * 2
             self._draw_box("#ececea", "#ececea", left, top, long, height)

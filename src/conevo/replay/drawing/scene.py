@@ -1,4 +1,4 @@
-"""The world of a stage as films show it, frame by frame."""
+"""The world of a playback as films show it, frame by frame."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy.typing as npt
 from PIL import Image, ImageDraw
 
 from conevo.palette import FAINT, GROUND, INK
+from conevo.playback.schema import Playback, Things
 from conevo.replay.drawing.planes import (
     Colours,
     Mask,
@@ -20,7 +21,6 @@ from conevo.replay.drawing.planes import (
     square_mask,
 )
 from conevo.replay.drawing.trails import Trails
-from conevo.replay.stage import Stage, Things
 
 __all__ = ["Scene", "colours_of"]
 
@@ -31,46 +31,48 @@ _SETTLED = 0.12  # opacity of what has been gone for long
 _ORDINARY, _FADING, _FAINT = range(3)
 
 
-def colours_of(stage: Stage, colour_by: str) -> list[list[str]]:
+def colours_of(playback: Playback, colour_by: str) -> list[list[str]]:
     """Return the colours [T][R] that robots have, by "action" or by "caste"."""
     if colour_by == "caste":
-        own = [stage.castes[robot.caste].colour for robot in stage.robots]
-        return [own] * stage.iterations
-    known = [*(action.colour for action in stage.actions), FAINT]  # -1 is the last
-    return [[known[a] for a in row] for row in stage.action.values.tolist()]
+        own = [playback.castes[robot.caste].colour for robot in playback.robots]
+        return [own] * playback.iterations
+    known = [*(action.colour for action in playback.actions), FAINT]  # -1 is the last
+    return [[known[a] for a in row] for row in playback.action.values.tolist()]
 
 
 class Scene:
-    """Paints the world of a stage.
+    """Paints the world of a playback.
 
     Order: backdrop, what stands still, trails, what moves, rings, bodies, what robots hold.
 
     Args:
-        stage: to be painted.
+        playback: to be painted.
         width: of the picture in px, even.
-        height: in px, even; both follow from the stage's bounds.
+        height: in px, even; both follow from the playback's bounds.
         colours: planes to paint.
         colour_by: "action" or "caste".
     """
 
     def __init__(
-        self, stage: Stage, width: int, height: int, colours: Colours, colour_by: str
+        self, playback: Playback, width: int, height: int, colours: Colours, colour_by: str
     ) -> None:
-        self.stage = stage
+        self.playback = playback
         self._size = (width, height)
-        x0, y0, x1, y1 = stage.bounds
+        x0, y0, x1, y1 = playback.bounds
         self._scale = max(width, height) / max(x1 - x0, y1 - y0)
-        self._own = colours_of(stage, colour_by)
-        self._others = [stage.body_kinds[k].colour or INK for k in stage.body[len(stage.robots) :]]
-        self._places = self._pixels(stage.x.values, stage.y.values)  # [T, B, 2]
-        self._heading = stage.heading.values if stage.heading is not None else None
-        self._action = stage.action.values
-        self._held = stage.held.values if stage.held is not None else None
+        self._own = colours_of(playback, colour_by)
+        self._others = [
+            playback.body_kinds[k].colour or INK for k in playback.body[len(playback.robots) :]
+        ]
+        self._places = self._pixels(playback.x.values, playback.y.values)  # [T, B, 2]
+        self._heading = playback.heading.values if playback.heading is not None else None
+        self._action = playback.action.values
+        self._held = playback.held.values if playback.held is not None else None
         self._groups = [
             _Group(
                 things, self._pixels(things.x.values, things.y.values), self._length(things.size)
             )
-            for things in stage.things
+            for things in playback.things
         ]
         floor = Planes.of(self._floor(), colours)
         still = [group for group in self._groups if group.stands]
@@ -91,7 +93,7 @@ class Scene:
 
     def _pixels(self, x: Floats, y: Floats) -> Floats:
         """Return places in px [..., 2] from the upper left corner, at most a world outside."""
-        left, top = self.stage.bounds[0], self.stage.bounds[3]
+        left, top = self.playback.bounds[0], self.playback.bounds[3]
         places = np.stack([(x - left) * self._scale, (top - y) * self._scale], axis=-1)
         longer = max(self._size)
         return places.clip(-longer, 2 * longer)
@@ -106,7 +108,7 @@ class Scene:
         size = (self._size[0] * sharper, self._size[1] * sharper)
         image = Image.new("RGB", size, GROUND)
         draw = ImageDraw.Draw(image)
-        for part in self.stage.backdrop:
+        for part in self.playback.backdrop:
             fill, line = part.fill or None, part.line or None
             if part.shape == "disc":
                 ((x, y),) = self._pixels(*np.array(part.numbers[:2])[:, None]) * sharper
@@ -128,21 +130,21 @@ class Scene:
         return image.reduce(sharper)
 
     def _paint_rings(self, planes: Planes, t: int) -> None:
-        for ring in self.stage.rings:
+        for ring in self.playback.rings:
             if ring.when != "action" or ring.of != "robots":
                 continue
             for r, a in enumerate(self._action[t].tolist()):
                 radius = self._length(ring.radius[a]) if a >= 0 else 0.0
                 if radius > 0:
-                    colour = self.stage.actions[a].colour
+                    colour = self.playback.actions[a].colour
                     x, y = self._places[t, r]
                     planes.paint(colour, *ring_mask(x, y, radius, 1.2, line=0.4, fill=0.1))
 
     def _paint_bodies(self, planes: Planes, colours: list[str], t: int) -> None:
-        kinds = self.stage.body_kinds
+        kinds = self.playback.body_kinds
         # The team's robots come last, above all others.
         for b in reversed(range(len(colours))):
-            kind = kinds[self.stage.body[b]]
+            kind = kinds[self.playback.body[b]]
             radius = max(self._length(kind.radius), _LEAST_RADIUS)
             heading = None if self._heading is None else float(self._heading[t, b])
             x, y = self._places[t, b]

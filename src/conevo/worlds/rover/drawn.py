@@ -1,4 +1,4 @@
-"""The stage of the multi-rover world: canals, red rocks, rovers, and what they detect."""
+"""The playback of the multi-rover world: canals, red rocks, rovers, and what they detect."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ import numpy as np
 
 from conevo import palette
 from conevo.palette import INK
-from conevo.replay.channel import Channel
-from conevo.replay.stage import Backdrop, BodyKind, Curve, Event, Kind, Ring, Stage, Things
-from conevo.replay.stages.parts import Parts, begun, octants
-from conevo.replay.stages.words import enumerated
+from conevo.playback.channel import Channel
+from conevo.playback.parts import Parts, begun, octants
+from conevo.playback.schema import Backdrop, BodyKind, Curve, Event, Kind, Playback, Ring, Things
+from conevo.playback.words import enumerated
 from conevo.worlds.rover import rocks
 
-__all__ = ["stage"]
+__all__ = ["playback"]
 
 ACTIONS = palette.ACTIONS["rover"]
 OUTPUTS = ("low", "med", "hi", "move: dx", "move: dy")
@@ -27,12 +27,12 @@ ROCK = 0.002  # half a side; sites are 0.005 apart
 LANDER = 0.012  # Choice: radius; the lander only records
 
 
-def stage(parts: Parts) -> Stage:
-    """Return the stage of an epoch of ``rover-v1``."""
+def playback(parts: Parts) -> Playback:
+    """Return the playback of an epoch of ``rover-v1``."""
     t, r = parts.t, parts.r
     ranges = tuple(parts.param(f"{name}_range") for name in ("low", "med", "hi"))
     near = parts.param("rover_sensor_range")
-    return Stage(
+    return Playback(
         **begun(parts, ACTIONS, ACTIONS, OUTPUTS),
         unit="sides",
         seconds=0.0,

@@ -1,4 +1,4 @@
-"""Stages: what they say of an epoch is what happened in it, in all worlds."""
+"""Playbacks: what they say of an epoch is what happened in it, in all worlds."""
 
 import dataclasses
 import json
@@ -12,9 +12,14 @@ import pytest
 from conevo import palette
 from conevo.errors import UsageError
 from conevo.kernels import khepera
-from conevo.replay.stage import Kind, Pool
-from conevo.replay.stages import building, checked, gacc, pursuit, rover, stage_of
-from conevo.replay.stages.words import enumerated, number
+from conevo.playback.check import checked
+from conevo.playback.schema import Kind, Pool
+from conevo.playback.words import enumerated, number
+from conevo.replay.playback import playback_of
+from conevo.worlds.gacc import building
+from conevo.worlds.gacc import drawn as gacc
+from conevo.worlds.pursuit import drawn as pursuit
+from conevo.worlds.rover import drawn as rover
 from oracles.gacc_scene import octant
 from replay.epochs import TASKS, epoch, renamed
 from replay.eventful import played
@@ -28,86 +33,86 @@ GACC, LIGHT = TASKS[3], TASKS[4]
 
 @pytest.mark.parametrize("task", TASKS)
 @pytest.mark.parametrize("is_heuristic", [False, True])
-def test_a_stage_shows_what_was_recorded(task, is_heuristic):
+def test_a_playback_shows_what_was_recorded(task, is_heuristic):
     trajectory = epoch(task, is_heuristic=is_heuristic)
-    about, stage = trajectory.about, stage_of(trajectory)
+    about, playback = trajectory.about, playback_of(trajectory)
     t, r = about["iterations"], about["n_robots"]
     for name in ("x", "y", "action", "heading", "energy", "held"):
-        shown = getattr(stage, name)
+        shown = getattr(playback, name)
         if name in trajectory.channels:
             n = shown.codes.shape[1]
             assert np.array_equal(shown.values, values(trajectory, name)[:, :n]), name
         else:
             assert shown is None
-    assert np.array_equal(stage.sensors.values, values(trajectory, "sensors"))
+    assert np.array_equal(playback.sensors.values, values(trajectory, "sensors"))
     for name in ("hidden", "outputs"):
         if all(about["heuristic"]):
-            assert getattr(stage, name) is None
+            assert getattr(playback, name) is None
         else:
-            assert np.array_equal(getattr(stage, name).values, values(trajectory, name))
-    assert [kind.name for kind in stage.actions] == about["actions"]
-    castes = [stage.castes[robot.caste].name for robot in stage.robots]
+            assert np.array_equal(getattr(playback, name).values, values(trajectory, name))
+    assert [kind.name for kind in playback.actions] == about["actions"]
+    castes = [playback.castes[robot.caste].name for robot in playback.robots]
     assert castes == about["labels"]
-    assert stage.castes[-1] == Kind("non-specialized", palette.FAINT)
-    assert {kind.name for kind in stage.castes} == {*about["castes"], "non-specialized"}
+    assert playback.castes[-1] == Kind("non-specialized", palette.FAINT)
+    assert {kind.name for kind in playback.castes} == {*about["castes"], "non-specialized"}
     for name in ("specialization", "fitness", "heuristic"):
-        assert [getattr(robot, name) for robot in stage.robots] == about[name]
-    assert [list(robot.neurons) for robot in stage.robots] == about["neurons"]
-    assert (stage.iterations, len(stage.robots)) == (t, r)
-    assert sorted(stage.events, key=lambda event: event.t) == list(stage.events)
-    x0, y0, x1, y1 = stage.bounds
-    assert (stage.x.values >= x0).all()
-    assert (stage.x.values <= x1).all()
-    assert (stage.y.values >= y0).all()
-    assert (stage.y.values <= y1).all()
+        assert [getattr(robot, name) for robot in playback.robots] == about[name]
+    assert [list(robot.neurons) for robot in playback.robots] == about["neurons"]
+    assert (playback.iterations, len(playback.robots)) == (t, r)
+    assert sorted(playback.events, key=lambda event: event.t) == list(playback.events)
+    x0, y0, x1, y1 = playback.bounds
+    assert (playback.x.values >= x0).all()
+    assert (playback.x.values <= x1).all()
+    assert (playback.y.values >= y0).all()
+    assert (playback.y.values <= y1).all()
 
 
 @pytest.mark.parametrize("task", TASKS)
-def test_a_stage_becomes_json_and_every_sensor_has_a_name(task):
-    stage, pool = stage_of(epoch(task)), Pool()
-    text = json.dumps(pool.plain(stage), allow_nan=False)
-    assert json.loads(text)["title"] == stage.title
-    assert checked(stage) == stage
-    groups = [range(g.first, g.first + g.count) for g in stage.sensor_groups]
-    assert [k for group in groups for k in group] == list(range(stage.sensors.codes.shape[2]))
-    assert all(len(set(g.names)) == g.count for g in stage.sensor_groups)
+def test_a_playback_becomes_json_and_every_sensor_has_a_name(task):
+    playback, pool = playback_of(epoch(task)), Pool()
+    text = json.dumps(pool.plain(playback), allow_nan=False)
+    assert json.loads(text)["title"] == playback.title
+    assert checked(playback) == playback
+    groups = [range(g.first, g.first + g.count) for g in playback.sensor_groups]
+    assert [k for group in groups for k in group] == list(range(playback.sensors.codes.shape[2]))
+    assert all(len(set(g.names)) == g.count for g in playback.sensor_groups)
 
 
 def test_a_team_of_heuristic_robots_has_no_activations():
     trajectory = epoch(TASKS[0])
     r = trajectory.about["n_robots"]
-    stage = stage_of(renamed(trajectory, heuristic=["low"] * r, neurons=[[]] * r))
-    assert stage.hidden is stage.outputs is None
-    assert np.array_equal(stage.sensors.values, trajectory.channels["sensors"].values)
-    assert dict(stage.facts)["heuristic robots"] == f"{r} low"
-    assert "hidden neurons" not in dict(stage.facts)
+    playback = playback_of(renamed(trajectory, heuristic=["low"] * r, neurons=[[]] * r))
+    assert playback.hidden is playback.outputs is None
+    assert np.array_equal(playback.sensors.values, trajectory.channels["sensors"].values)
+    assert dict(playback.facts)["heuristic robots"] == f"{r} low"
+    assert "hidden neurons" not in dict(playback.facts)
 
 
 def test_words():
     of_a_run = {"method": "mesp", "label": "here", "seed": 4, "generation": 12, "epoch": 2}
-    stage = stage_of(renamed(epoch(TASKS[0]), **of_a_run))
-    assert stage.title == "rover/complex-5"
-    assert stage.subtitle == "Multi-Agent ESP, seed 4, fittest team of generation 12, epoch 2"
-    facts = dict(stage.facts)
+    playback = playback_of(renamed(epoch(TASKS[0]), **of_a_run))
+    assert playback.title == "rover/complex-5"
+    assert playback.subtitle == "Multi-Agent ESP, seed 4, fittest team of generation 12, epoch 2"
+    facts = dict(playback.facts)
     performance = epoch(TASKS[0]).about["performance"]
     assert facts["value"] == f"{performance['value']:.0f} points"
     assert facts["area"] == f"{performance['area']:.3g} share of the square"
     hunt = epoch(next(task for task in TASKS if task.startswith("pursuit")))
     collisions = hunt.about["performance"]["collisions"]
-    assert dict(stage_of(hunt).facts)["collisions"] == (
+    assert dict(playback_of(hunt).facts)["collisions"] == (
         f"{number(collisions)} refused moves (smaller is better)"
     )
     about = {k: v for k, v in epoch(TASKS[0]).about.items() if k != "units"}  # conevo 0.1.0
     old = dataclasses.replace(epoch(TASKS[0]), about=about)
-    assert dict(stage_of(old).facts)["value"] == f"{performance['value']:.0f}"
+    assert dict(playback_of(old).facts)["value"] == f"{performance['value']:.0f}"
     assert (facts["run"], facts["method"], facts["seed"]) == ("here", "Multi-Agent ESP", "4")
     assert facts["hidden neurons"] == "10 to 11"  # one has a hole among its neurons
     mean = np.mean(epoch(TASKS[0]).about["fitness"])
     assert facts["team fitness (mean)"] == number(mean)
     caste, n = Counter(epoch(TASKS[0]).about["labels"]).most_common(1)[0]
     assert facts["castes"].startswith(f"{n} {caste}")
-    assert stage_of(epoch(TASKS[0])).subtitle == "a team of no run"
-    unknown = stage_of(renamed(epoch(TASKS[0]), **(of_a_run | {"method": "mine"})))
+    assert playback_of(epoch(TASKS[0])).subtitle == "a team of no run"
+    unknown = playback_of(renamed(epoch(TASKS[0]), **(of_a_run | {"method": "mine"})))
     assert unknown.subtitle.startswith("mine, seed 4, ")
     assert [number(v) for v in (0.0, 3.0, 0.12345, 1234.56, 12.345, -0.5, 1e6)] == [
         "0", "3", "0.123", "1,235", "12.3", "-0.5", "1,000,000",
@@ -188,7 +193,9 @@ def bearing(group, k):
 
 
 def test_octants_are_where_the_world_has_them():
-    for group in stage_of(epoch(TASKS[0])).sensor_groups + stage_of(epoch(GACC)).sensor_groups[:3]:
+    for group in (
+        playback_of(epoch(TASKS[0])).sensor_groups + playback_of(epoch(GACC)).sensor_groups[:3]
+    ):
         assert not group.turns
         for k in range(8):
             for off in (-0.99, 0.0, 0.99):
@@ -202,10 +209,10 @@ def test_octants_are_where_the_world_has_them():
 
 @pytest.mark.parametrize(("task", "group"), [(TASKS[0], 0), (GACC, 1)])
 def test_a_robot_that_is_sensed_stands_in_the_wedge(task, group):
-    stage = stage_of(played(task.partition("/")[0]))
-    g = stage.sensor_groups[group]
-    at = np.stack([stage.x.values, stage.y.values], axis=-1)
-    sensed = stage.sensors.values[1:, :, g.first : g.first + 8]
+    playback = playback_of(played(task.partition("/")[0]))
+    g = playback.sensor_groups[group]
+    at = np.stack([playback.x.values, playback.y.values], axis=-1)
+    sensed = playback.sensors.values[1:, :, g.first : g.first + 8]
     seen = np.argwhere(sensed > 1e-3)
     assert len(seen) > 20
     for t, i, k in seen[:200].tolist():
@@ -217,7 +224,7 @@ def test_a_robot_that_is_sensed_stands_in_the_wedge(task, group):
 
 def test_khepera_sensors_are_the_kernels():
     assert float(khepera.RADIUS) == pursuit.RADIUS
-    infrared, light = stage_of(epoch("pursuit/team-7")).sensor_groups
+    infrared, light = playback_of(epoch("pursuit/team-7")).sensor_groups
     for k in range(8):
         way = khepera.LOOK_X[k], khepera.LOOK_Y[k]
         assert (math.cos(light.angles[k]), math.sin(light.angles[k])) == pytest.approx(way)
@@ -231,16 +238,16 @@ def test_khepera_sensors_are_the_kernels():
 
 
 def test_the_prey_shines_into_the_wedge():
-    stage = stage_of(played("pursuit"))
-    r, light = len(stage.robots), stage.sensor_groups[1]
-    at = np.stack([stage.x.values, stage.y.values], axis=-1)
-    readings = stage.sensors.values[1:, :, light.first : light.first + 8]
+    playback = playback_of(played("pursuit"))
+    r, light = len(playback.robots), playback.sensor_groups[1]
+    at = np.stack([playback.x.values, playback.y.values], axis=-1)
+    readings = playback.sensors.values[1:, :, light.first : light.first + 8]
     seen = np.argwhere(readings.max(axis=2) > 0.2)
     assert len(seen) > 20
     for t, i in seen.tolist():
         way = at[t, r] - at[t, i]
         k = readings[t, i].argmax()
-        looks = stage.heading.values[t, i] + light.angles[k]
+        looks = playback.heading.values[t, i] + light.angles[k]
         off = np.angle(np.exp(1j * (np.arctan2(way[1], way[0]) - looks)))
         wide = math.asin(min(2 * pursuit.RADIUS / np.hypot(*way), 1.0))
         assert abs(off) < light.half + wide + 0.05
@@ -251,13 +258,18 @@ def test_the_prey_shines_into_the_wedge():
 
 
 def test_a_world_outside_the_package():
-    stage = stage_of(epoch(LIGHT))
-    assert stage.title == "light/dark-1"
-    assert stage.bounds == (0, 0, 1, 1)
-    assert [kind.colour for kind in stage.actions] == [palette.BLUE, palette.ORANGE]
-    assert stage.castes[:2] == stage.actions
-    assert stage.things == stage.backdrop == stage.events == stage.rings == ()
-    (measure,) = stage.measures
+    playback = playback_of(epoch(LIGHT))
+    assert playback.title == "light/dark-1"
+    assert playback.bounds == (0, 0, 1, 1)
+    assert [kind.colour for kind in playback.actions] == [palette.BLUE, palette.ORANGE]
+    assert playback.castes[:2] == playback.actions
+    assert playback.things == playback.events == playback.rings == ()
+    (light,) = playback.backdrop
+    assert light.label == "light"
+    x, y = values(epoch(LIGHT), "scene/places")[-1]
+    assert light.numbers == pytest.approx((x, y, 0.02))
+    assert playback.output_names == ("rest", "move", "dx", "dy")
+    (measure,) = playback.measures
     assert measure.name == "nearness"
     ended = epoch(LIGHT).about["performance"]["nearness"]
     assert measure.values.values[-1] == pytest.approx(ended, abs=1e-4)
@@ -266,7 +278,7 @@ def test_a_world_outside_the_package():
 @pytest.mark.parametrize("missing", [("x",), ("y", "action"), ("x", "y", "action")])
 def test_a_world_that_cannot_be_drawn(missing):
     with pytest.raises(UsageError) as error:
-        stage_of(changed(epoch(LIGHT), **dict.fromkeys(missing)))
+        playback_of(changed(epoch(LIGHT), **dict.fromkeys(missing)))
     text = str(error.value)
     assert text.startswith("world light-v1 cannot be drawn")
     assert f"does not record {', '.join(missing)} of every robot" in text
@@ -278,16 +290,18 @@ def test_a_world_of_any_size_with_castes_of_its_own():
     x = np.linspace(-3, 17, 600).reshape(200, 3)
     other = changed(trajectory, x=x, heading=x, energy=x)
     castes = ["rest", "non-specialized", "walker"]
-    stage = stage_of(renamed(other, castes=castes, labels=["walker", "rest", "non-specialized"]))
+    playback = playback_of(
+        renamed(other, castes=castes, labels=["walker", "rest", "non-specialized"])
+    )
     y = values(trajectory, "y")
-    assert stage.bounds == pytest.approx((-4, y.min() - 1, 18, y.max() + 1))
-    assert np.allclose(stage.heading.values, x, atol=1e-3)
-    assert np.allclose(stage.energy.values, x, atol=1e-3)
-    assert [one.name for one in stage.castes] == ["rest", "walker", "non-specialized"]
-    assert [robot.caste for robot in stage.robots] == [1, 0, 2]
-    assert stage.castes[0].colour == stage.actions[0].colour
-    assert len({one.colour for one in (*stage.castes, *stage.actions)}) == 4
+    assert playback.bounds == pytest.approx((-4, y.min() - 1, 18, y.max() + 1))
+    assert np.allclose(playback.heading.values, x, atol=1e-3)
+    assert np.allclose(playback.energy.values, x, atol=1e-3)
+    assert [one.name for one in playback.castes] == ["rest", "walker", "non-specialized"]
+    assert [robot.caste for robot in playback.robots] == [1, 0, 2]
+    assert playback.castes[0].colour == playback.actions[0].colour
+    assert len({one.colour for one in (*playback.castes, *playback.actions)}) == 4
     half = changed(trajectory, x=np.linspace(-1, 0.5, 600).reshape(200, 3))
-    assert stage_of(half).bounds[0] < -1
+    assert playback_of(half).bounds[0] < -1
     standing = changed(trajectory, x=np.full((200, 3), 5.0), y=np.full((200, 3), 5.0))
-    assert stage_of(standing).bounds == (4.5, 4.5, 5.5, 5.5)
+    assert playback_of(standing).bounds == (4.5, 4.5, 5.5, 5.5)

@@ -1,4 +1,4 @@
-"""The stage of gathering and collective construction: objects, home area, what is being built."""
+"""The playback of gathering and construction: objects, home area, what is being built."""
 
 from __future__ import annotations
 
@@ -6,24 +6,24 @@ from collections import Counter
 
 from conevo import palette
 from conevo.palette import BLUE, FAINT, INK, VERMILION
-from conevo.replay.channel import Channel
-from conevo.replay.stage import (
+from conevo.playback.channel import Channel
+from conevo.playback.parts import Parts, begun, columns, octants
+from conevo.playback.schema import (
     Backdrop,
     BodyKind,
     Curve,
     Gauge,
     Kind,
     PlanRow,
+    Playback,
     Ring,
     SensorGroup,
-    Stage,
     Things,
 )
-from conevo.replay.stages.building import EVENT_KINDS, Building
-from conevo.replay.stages.parts import Parts, begun, columns, octants
+from conevo.worlds.gacc.building import EVENT_KINDS, Building
 from conevo.worlds.gacc.plans import TYPES, plan
 
-__all__ = ["stage"]
+__all__ = ["playback"]
 
 ACTIONS, CASTES = palette.ACTIONS["gacc"], palette.CASTES["gacc"]
 OUTPUTS = (
@@ -45,13 +45,13 @@ OBJECT = 0.006  # Choice: half a side of an object, which is a point as well
 HOME_REACH = 0.12  # Choice: home is sensed from everywhere; its sensors are drawn this long
 
 
-def stage(parts: Parts) -> Stage:
-    """Return the stage of an epoch of ``gacc-v1``."""
+def playback(parts: Parts) -> Playback:
+    """Return the playback of an epoch of ``gacc-v1``."""
     t, r = parts.t, parts.r
     objects, building = _objects(parts), Building(parts)
     see, near = parts.param("object_range"), parts.param("robot_range")
     grip = parts.param("grip_distance")
-    return Stage(
+    return Playback(
         **begun(parts, ACTIONS, CASTES, OUTPUTS),
         unit="sides",
         seconds=0.0,

@@ -8,9 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 from conevo.palette import BLUE, FAINT, GREEN, INK, ORANGE, VERMILION
-from conevo.replay.stage import Event, Kind
-from conevo.replay.stages.parts import Parts
-from conevo.replay.stages.words import enumerated
+from conevo.playback.parts import Parts
+from conevo.playback.schema import Event, Kind
+from conevo.playback.words import enumerated
 from conevo.terms import counted
 from conevo.worlds.gacc.plans import TYPES
 

@@ -1,4 +1,4 @@
-"""Stages of each world: detections, captures, objects built in, told and counted right."""
+"""Playbacks of each world: detections, captures, objects built in, told and counted right."""
 
 import math
 from collections import Counter
@@ -6,9 +6,9 @@ from collections import Counter
 import numpy as np
 import pytest
 
+from conevo.playback.words import enumerated
+from conevo.replay.playback import playback_of
 from conevo.replay.recording import record_epoch
-from conevo.replay.stages import stage_of
-from conevo.replay.stages.words import enumerated
 from conevo.replay.trajectory import Trajectory
 from conevo.worlds.gacc.plans import plan
 from conevo.worlds.rollout import Rollout
@@ -26,14 +26,14 @@ GACC, LIGHT = TASKS[3], TASKS[4]
 
 def test_rover_detections():
     trajectory = played("rover")
-    stage, t = stage_of(trajectory), trajectory.about["iterations"]
+    playback, t = playback_of(trajectory), trajectory.about["iterations"]
     detected, kind = values(trajectory, "detected"), values(trajectory, "scene/rock_type")
     worth = np.array(rocks.VALUES)[kind]
     found = np.flatnonzero(detected < t)
     assert len(found) > 20
-    assert len({int(detected[k]) for k in found}) == len(stage.events)
+    assert len({int(detected[k]) for k in found}) == len(playback.events)
     letters = Counter()
-    for event in stage.events:
+    for event in playback.events:
         text, _, by = event.text.partition(" by ")
         for word in text.split(", "):
             n, _, letter = word.rpartition(" ")
@@ -44,7 +44,7 @@ def test_rover_detections():
         before = values(trajectory, "value")[event.t - 1].round() if event.t else 0 * paid
         assert event.robots == tuple(i for i in range(len(paid)) if paid[i] > before[i])
     assert letters == Counter(rocks.TYPES[kind[k]] for k in found)
-    value, area = stage.measures
+    value, area = playback.measures
     assert value.name == "value recorded by the lander"
     assert area.name == "share of area covered"
     covered = trajectory.about["performance"]["area"]
@@ -54,7 +54,7 @@ def test_rover_detections():
         assert value.values.values[s] == worth[detected < s].sum()
     assert value.values.values[-1] == trajectory.about["performance"]["value"]
     assert value.values.values[-1] + worth[detected == t - 1].sum() == worth[found].sum()
-    (things,) = stage.things
+    (things,) = playback.things
     assert things.gone.values.tolist() == [min(int(d), t) for d in detected]
     names = [f"red rock {one}, worth {n}" for one, n in zip("ABCD", (1, 2, 3, 4), strict=True)]
     assert [one.name for one in things.kinds] == names
@@ -63,7 +63,7 @@ def test_rover_detections():
 
 def test_rocks_of_one_type_are_one_kind():
     trajectory = epoch("rover/simple-1", 20)
-    (things,) = stage_of(trajectory).things
+    (things,) = playback_of(trajectory).things
     assert [kind.name for kind in things.kinds] == ["red rock E, worth 1"]
     assert set(things.kind.values.tolist()) == {0}
 
@@ -80,31 +80,31 @@ def test_words_for_detections():
     value[60:, [3, 7]] += 5
     value[70:, 1] += 8.0
     value[70:, [2, 9]] += 16
-    stage = stage_of(changed(trajectory, detected=never, value=value))
-    assert told(stage) == [
+    playback = playback_of(changed(trajectory, detected=never, value=value))
+    assert told(playback) == [
         (60, "A, A, C by rovers 3 and 7", (3, 7)),
         (70, "8 B by rovers 1, 2 and 9", (1, 2, 9)),
         (199, "D", ()),
     ]
-    recorded = stage.measures[0].values.values
+    recorded = playback.measures[0].values.values
     assert recorded[[60, 61, 70, 71, 199]].tolist() == [0, 5, 5, 21, 21]
 
 
 def test_rover_surroundings():
     trajectory = epoch(TASKS[0])
-    stage = stage_of(trajectory)
-    canals, lander = stage.backdrop
+    playback = playback_of(trajectory)
+    canals, lander = playback.backdrop
     assert np.array_equal(canals.cells.values, values(trajectory, "scene/canal"))
     x, y = values(trajectory, "scene/lander")
     assert lander.numbers[:2] == (x, y)
-    things = stage.things[0]
+    things = playback.things[0]
     row, column = ((v.values * 200).astype(int) for v in (things.y, things.x))
     assert canals.cells.values[row, column].all()  # row 0 at the bottom, rocks in canals
-    ranges, near = stage.rings
+    ranges, near = playback.rings
     assert (ranges.radius, ranges.when) == ((0.07, 0.05, 0.03, 0.0), "action")
     assert (near.radius, near.when) == ((0.02,) * 4, "selected")
-    assert [group.reach for group in stage.sensor_groups] == [0.02, 0.07]
-    assert stage.output_names == ("low", "med", "hi", "move: dx", "move: dy")
+    assert [group.reach for group in playback.sensor_groups] == [0.02, 0.07]
+    assert playback.output_names == ("low", "med", "hi", "move: dx", "move: dy")
 
 
 # --- predators and prey ---------------------------------------------------------------------------
@@ -113,35 +113,35 @@ def test_rover_surroundings():
 @pytest.mark.parametrize("task", ["pursuit", "pursuit/team-7", "prey/shaping-3"])
 def test_who_is_in_the_arena(task):
     trajectory = played(task) if task == "pursuit" else epoch(task)
-    stage = stage_of(trajectory)
+    playback = playback_of(trajectory)
     n, r = int(values(trajectory, "scene/n_bodies")), trajectory.about["n_robots"]
     team, other = ("prey", "predator") if "prey/" in task else ("predator", "prey")
-    assert [stage.body_kinds[k].name for k in stage.body] == [team] * r + [other] * (n - r)
-    assert stage.x.codes.shape[1] == n
-    walls, *obstacles = stage.backdrop
-    assert walls.numbers == stage.bounds == (0, 0, 100, 100)
+    assert [playback.body_kinds[k].name for k in playback.body] == [team] * r + [other] * (n - r)
+    assert playback.x.codes.shape[1] == n
+    walls, *obstacles = playback.backdrop
+    assert walls.numbers == playback.bounds == (0, 0, 100, 100)
     count = int(values(trajectory, "scene/n_obstacles"))
     x, y = values(trajectory, "scene/obstacle_x"), values(trajectory, "scene/obstacle_y")
     assert [one.numbers for one in obstacles] == [(x[k], y[k], 2.75) for k in range(count)]
-    at = np.stack([stage.x.values, stage.y.values], axis=-1)
+    at = np.stack([playback.x.values, playback.y.values], axis=-1)
     for one in obstacles:
         assert np.hypot(*(at - one.numbers[:2]).T).min() > 2 * 2.75 - 0.01
-    assert stage.seconds == 0.1
+    assert playback.seconds == 0.1
     kinds = ("infrared",) if team == "prey" else ("infrared", "light")
-    assert tuple(group.name for group in stage.sensor_groups) == kinds
-    assert stage.rings[0].radius == (2.75 + 22,) * 5
+    assert tuple(group.name for group in playback.sensor_groups) == kinds
+    assert playback.rings[0].radius == (2.75 + 22,) * 5
 
 
 def test_captures():
     trajectory = played("pursuit")
-    stage = stage_of(trajectory)
+    playback = playback_of(trajectory)
     captured = values(trajectory, "captured")[:, 0]
     performance = trajectory.about["performance"]
-    begins, ends = told(stage, "capture begins"), told(stage, "capture ends")
+    begins, ends = told(playback, "capture begins"), told(playback, "capture ends")
     assert len(begins) == performance["captures"] > 1
     assert begins[0][0] == performance["first_capture"]
     assert len(begins) - len(ends) == captured[-1]
-    (measure,) = stage.measures
+    (measure,) = playback.measures
     assert measure.values.values[-1] == performance["capture_time"] == captured.sum()
     assert measure.values.values.tolist() == np.cumsum(captured).tolist()
     at = np.stack([values(trajectory, "x"), values(trajectory, "y")], axis=-1)
@@ -152,10 +152,10 @@ def test_captures():
         assert robots == tuple(i for i in range(5) if gaps[i] <= 22.01)
         assert len(robots) >= 2
         assert text == f"the prey is captured by {enumerated('predator', robots)}"
-    (halo,) = stage.things
+    (halo,) = playback.things
     assert halo.state.values[:, 0].tolist() == captured.tolist()
-    assert np.array_equal(halo.x.values[:, 0], stage.x.values[:, 5])
-    assert np.array_equal(halo.y.values[:, 0], stage.y.values[:, 5])
+    assert np.array_equal(halo.x.values[:, 0], playback.x.values[:, 5])
+    assert np.array_equal(halo.y.values[:, 0], playback.y.values[:, 5])
 
 
 def test_words_for_captures_and_collisions():
@@ -165,8 +165,8 @@ def test_words_for_captures_and_collisions():
     x[:, :], y[:, :] = [10, 30, 60, 20, 80], 50  # predator 2 is off by 27.5 - 7.5 from prey 1
     captured[3:6, 0] = captured[9:, 1] = 1
     collided[0:4, 1] = collided[7, 1] = collided[8, 2] = collided[5:, 4] = 1
-    stage = stage_of(changed(trajectory, x=x, y=y, captured=captured, collided=collided))
-    assert told(stage) == [
+    playback = playback_of(changed(trajectory, x=x, y=y, captured=captured, collided=collided))
+    assert told(playback) == [
         (0, "predator 1 collides", (1,)),
         (3, "prey 0 is captured by predators 0 and 1", (0, 1)),
         (6, "prey 0 is free again after 3 iterations (0.3 s)", ()),
@@ -174,7 +174,7 @@ def test_words_for_captures_and_collisions():
         (8, "predator 2 collides", (2,)),
         (9, "prey 1 is captured by predator 2", (2,)),
     ]
-    assert stage.measures[0].values.values[[2, 5, 8, 199]].tolist() == [0, 3, 3, 194]
+    assert playback.measures[0].values.values[[2, 5, 8, 199]].tolist() == [0, 3, 3, 194]
 
 
 @pytest.mark.parametrize(("gap", "is_near"), [(21.9, True), (22.0, True), (22.1, False)])
@@ -188,28 +188,28 @@ def test_in_light_range_is_from_rim_to_rim(gap, is_near):
     captured[20, 0] = 1
     x[:, 1:3] = 10 + 5.5 + gap + 12
     y[:, 2] = 60
-    stage = stage_of(changed(trajectory, x=x, y=y, captured=captured))
-    (begin,) = told(stage, "capture begins")
+    playback = playback_of(changed(trajectory, x=x, y=y, captured=captured))
+    (begin,) = told(playback, "capture begins")
     assert begin[2] == ((0, 1, 2) if is_near else (1, 2))
 
 
 def test_a_capture_that_lasts_one_iteration():
     captured = np.zeros((200, 2), int)
     captured[0, 1] = 1
-    stage = stage_of(changed(epoch("pursuit/team-7"), captured=captured))
+    playback = playback_of(changed(epoch("pursuit/team-7"), captured=captured))
     ends = [(1, "prey 1 is free again after 1 iteration (0.1 s)", ())]
-    assert told(stage, "capture ends") == ends
+    assert told(playback, "capture ends") == ends
 
 
 @pytest.mark.parametrize("seed", [3, 4, 5])
 def test_the_path_and_the_end_of_prey(seed):
     trajectory = epoch("prey/shaping-6", 200, seed)
-    stage, r = stage_of(trajectory), trajectory.about["n_robots"]
-    (path,) = stage.measures
+    playback, r = playback_of(trajectory), trajectory.about["n_robots"]
+    (path,) = playback.measures
     performance = trajectory.about["performance"]
     assert path.values.values[-1] == pytest.approx(performance["path"], abs=0.05)
-    assert len(stage.events) == round(performance["collided"] * r)
-    for event in stage.events:
+    assert len(playback.events) == round(performance["collided"] * r)
+    for event in playback.events:
         (i,) = event.robots
         action = values(trajectory, "action")[:, i]
         assert (action[: event.t + 1] >= 0).all()
@@ -234,11 +234,11 @@ class Scene:
 
 
 def staged(*args, **how):
-    """The stage of a gathering by hand."""
+    """The playback of a gathering by hand."""
     a_world, (genes, slots, scenarios, heuristic), _ = gathering(*args, **how)
     rollout = Rollout(Scene(a_world, scenarios), n_threads=1)
     about, channels = record_epoch(rollout, genes, slots, 7, heuristic)
-    return stage_of(Trajectory(about, channels))
+    return playback_of(Trajectory(about, channels))
 
 
 EAST = (0.0055, 0.0)
@@ -246,19 +246,19 @@ EAST = (0.0055, 0.0)
 
 def test_carried_home_and_built_in():
     """Robot 0 grips outside and carries the object over the border; robot 1 comes and helps."""
-    stage = staged(
+    playback = staged(
         [(0.385, 0.5, ["grip A", EAST]), (0.425, 0.5, IDLE)],
         [(0.39, 0.5, "A")],
         ["AB"],
         iterations=7,
     )
-    assert told(stage) == [
+    assert told(playback) == [
         (0, "robot 0 grips A", (0,)),
         (3, "robot 0 is home with A and waits for help", (0,)),
         (5, "A is part 1 of complex object 1, by robots 0 and 1", (0, 1)),
     ]
-    assert stage.measures[0].values.values.tolist() == [0] * 5 + [1] * 2
-    (row,) = stage.plan
+    assert playback.measures[0].values.values.tolist() == [0] * 5 + [1] * 2
+    (row,) = playback.plan
     assert row.parts == (0, 1, *[2] * 8)
     assert row.built == (5, *[7] * 9)
     assert row.is_ordered
@@ -268,25 +268,25 @@ AROUND = [(0.5 + 0.01 * math.cos(a), 0.5 + 0.01 * math.sin(a), IDLE) for a in ra
 
 
 def test_waited_for_in_vain():
-    stage = staged(AROUND[:3], [(0.5, 0.5, "C")], ["C"], iterations=8)
-    assert told(stage) == [
+    playback = staged(AROUND[:3], [(0.5, 0.5, "C")], ["C"], iterations=8)
+    assert told(playback) == [
         (0, "robots 0, 1 and 2 grip C in the home area", (0, 1, 2)),
         *((5, f"robot {i} lets go of C after waiting for 5 iterations", (i,)) for i in range(3)),
     ]
-    assert set(stage.things[0].state.values.ravel()) == {0, 4, 6}
+    assert set(playback.things[0].state.values.ravel()) == {0, 4, 6}
 
 
 def test_help_comes_one_after_the_other():
     """Robot 1 is three iterations away; robot 0 gives up before anybody else comes."""
     robots = [(0.5, 0.5, IDLE), (0.508, 0.47, IDLE)]
-    stage = staged(robots, [(0.5, 0.515, "B")], ["B"], iterations=14)
-    assert told(stage) == [
+    playback = staged(robots, [(0.5, 0.515, "B")], ["B"], iterations=14)
+    assert told(playback) == [
         (0, "robot 0 grips B in the home area", (0,)),
         (3, "robot 1 helps robot 0 with B", (1,)),
         (5, "robot 0 lets go of B after waiting for 5 iterations", (0,)),
         (8, "robot 1 lets go of B after waiting for 5 iterations", (1,)),
     ]
-    assert [one.name for one in stage.event_kinds][:4] == [
+    assert [one.name for one in playback.event_kinds][:4] == [
         "grip",
         "let go",
         "wait for help",
@@ -296,8 +296,8 @@ def test_help_comes_one_after_the_other():
 
 def test_what_is_not_needed_now_is_let_go():
     robots = [(0.5, 0.5, IDLE), (0.508, 0.47, IDLE)]
-    stage = staged(robots, [(0.5, 0.515, "A")], ["BA"], iterations=5)
-    assert told(stage) == [
+    playback = staged(robots, [(0.5, 0.515, "A")], ["BA"], iterations=5)
+    assert told(playback) == [
         (0, "robot 0 grips A in the home area", (0,)),
         (3, "robot 0 lets go of A, which is not needed now", (0,)),
     ]
@@ -305,16 +305,16 @@ def test_what_is_not_needed_now_is_let_go():
 
 def test_a_grip_outside_with_another_setting_lets_go_without_a_reason():
     robots = [(0.2, 0.2, ["grip B", EAST, "grip C"]), (0.8, 0.2, IDLE)]
-    stage = staged(robots, [(0.205, 0.2, "B")], ["B"], iterations=4)
-    assert told(stage) == [(0, "robot 0 grips B", (0,)), (2, "robot 0 lets go of B", (0,))]
-    assert (stage.held.values[:, 0] >= 0).tolist() == [True, True, False, False]
+    playback = staged(robots, [(0.205, 0.2, "B")], ["B"], iterations=4)
+    assert told(playback) == [(0, "robot 0 grips B", (0,)), (2, "robot 0 lets go of B", (0,))]
+    assert (playback.held.values[:, 0] >= 0).tolist() == [True, True, False, False]
 
 
 def test_objects_built_in_at_once_have_their_own_builders():
     """Both pairs grip an A in the first iteration; all four are paid for it."""
     robots = [(0.45, 0.49, IDLE), (0.55, 0.49, IDLE), (0.45, 0.51, IDLE), (0.55, 0.51, IDLE)]
-    stage = staged(robots, [(0.45, 0.5, "A"), (0.55, 0.5, "A")], ["AA"], iterations=3)
-    assert told(stage) == [
+    playback = staged(robots, [(0.45, 0.5, "A"), (0.55, 0.5, "A")], ["AA"], iterations=3)
+    assert told(playback) == [
         (0, "A is part 1 of complex object 1, by robots 0 and 2", (0, 2)),
         (0, "A is part 2 of complex object 1, by robots 1 and 3", (1, 3)),
     ]
@@ -323,8 +323,8 @@ def test_objects_built_in_at_once_have_their_own_builders():
 def test_objects_of_two_types_built_in_at_once():
     robots = [(0.45, 0.49, IDLE), (0.45, 0.51, IDLE)]
     robots += [(0.55, 0.49, IDLE), (0.55, 0.51, IDLE), (0.56, 0.5, IDLE)]
-    stage = staged(robots, [(0.45, 0.5, "A"), (0.55, 0.5, "B")], ["AB"], iterations=3)
-    assert told(stage) == [
+    playback = staged(robots, [(0.45, 0.5, "A"), (0.55, 0.5, "B")], ["AB"], iterations=3)
+    assert told(playback) == [
         (0, "A is part 1 of complex object 1, by robots 0 and 1", (0, 1)),
         (0, "B is part 2 of complex object 1, by robots 2, 3 and 4", (2, 3, 4)),
     ]
@@ -333,10 +333,10 @@ def test_objects_of_two_types_built_in_at_once():
 def test_the_last_part_completes():
     robots = [(0.499, 0.5, IDLE), (0.501, 0.5, IDLE)]
     objects = [(0.5, 0.5015 + 0.0015 * k, "A") for k in range(10)]
-    stage = staged(robots, objects, ["A" * 10], iterations=12)
-    assert stage.plan[0].built == tuple(range(10))
-    assert told(stage, "completion") == [(9, "complex object 1 is complete", (0, 1))]
-    demand = stage.gauges[0]
+    playback = staged(robots, objects, ["A" * 10], iterations=12)
+    assert playback.plan[0].built == tuple(range(10))
+    assert told(playback, "completion") == [(9, "complex object 1 is complete", (0, 1))]
+    demand = playback.gauges[0]
     assert (demand.name, demand.most) == ("demand A", 1.0)
     assert demand.values.values[1] == pytest.approx(1 / 8, abs=1e-4)
 
@@ -344,8 +344,8 @@ def test_the_last_part_completes():
 def test_what_has_no_order_is_shown_as_it_came():
     robots = [(0.5, 0.49, IDLE), (0.5, 0.51, IDLE)]
     two = [(0.505, 0.5, "A"), (0.515, 0.5, "A")]
-    stage = staged(robots, two, ["CABAB"], ordered="d", iterations=4)
-    (row,) = stage.plan
+    playback = staged(robots, two, ["CABAB"], ordered="d", iterations=4)
+    (row,) = playback.plan
     assert not row.is_ordered
     assert row.parts == (0, 0, 1, 1, *[2] * 6)  # what is left in the order of types
     assert row.built == (0, 1, *[4] * 8)
@@ -354,68 +354,68 @@ def test_what_has_no_order_is_shown_as_it_came():
 @pytest.mark.parametrize("seed", range(2, 6))
 def test_gathering_adds_up(seed):
     trajectory = played("gacc", seed, 400)
-    stage = stage_of(trajectory)
+    playback = playback_of(trajectory)
     performance = trajectory.about["performance"]
     t = trajectory.about["iterations"]
-    (measure,) = stage.measures
+    (measure,) = playback.measures
     assert measure.values.values[-1] == performance["delivered"]
-    built = [when for row in stage.plan for when in row.built if when < t]
+    built = [when for row in playback.plan for when in row.built if when < t]
     assert len(built) == performance["delivered"]
-    assert sorted(built) == [when for when, _, _ in told(stage, "delivery")]
-    assert len(told(stage, "completion")) == performance["completed"]
-    kinds = [kind for row in stage.plan for kind in row.parts]
+    assert sorted(built) == [when for when, _, _ in told(playback, "delivery")]
+    assert len(told(playback, "completion")) == performance["completed"]
+    kinds = [kind for row in playback.plan for kind in row.parts]
     assert sorted(kinds) == sorted(plan("complex-5").parts.ravel())
-    paid = Counter(i for _, _, robots in told(stage, "delivery") for i in robots)
+    paid = Counter(i for _, _, robots in told(playback, "delivery") for i in robots)
     fitness = trajectory.about["fitness"]
     assert [paid[i] for i in range(len(fitness))] == fitness
-    things = stage.things[0]
+    things = playback.things[0]
     assert np.array_equal(things.state.values, values(trajectory, "life"))
     assert np.array_equal(things.x.values, values(trajectory, "object_x"))
     assert things.kind.values.tolist() == values(trajectory, "scene/object_type").tolist()
     assert values(trajectory, "demand").max() <= 1.0
-    assert [gauge.most for gauge in stage.gauges] == [1.0] * 3
+    assert [gauge.most for gauge in playback.gauges] == [1.0] * 3
 
 
 def test_who_grips_and_lets_go_is_told_of_every_change():
     trajectory = played("gacc", 3, 400)
-    stage, held = stage_of(trajectory), values(trajectory, "held")
+    playback, held = playback_of(trajectory), values(trajectory, "held")
     before = np.vstack([np.full_like(held[:1], -1), held[:-1]])
     grips = {(t, i) for t, i in np.argwhere((held >= 0) & (held != before)).tolist()}
     told_grips = {
-        (t, i) for kind in ("grip", "help") for t, _, robots in told(stage, kind) for i in robots
+        (t, i) for kind in ("grip", "help") for t, _, robots in told(playback, kind) for i in robots
     }
     assert told_grips == grips
     gone = {(t, i) for t, i in np.argwhere((before >= 0) & (held != before)).tolist()}
-    built = {(t, i) for t, _, robots in told(stage, "delivery") for i in robots}
-    assert {(t, i) for t, _, robots in told(stage, "let go") for i in robots} == gone - built
+    built = {(t, i) for t, _, robots in told(playback, "delivery") for i in robots}
+    assert {(t, i) for t, _, robots in told(playback, "let go") for i in robots} == gone - built
 
 
 def test_gathering_surroundings():
     trajectory = epoch(GACC)
-    stage = stage_of(trajectory)
-    home, zone, *obstacles = stage.backdrop
+    playback = playback_of(trajectory)
+    home, zone, *obstacles = playback.backdrop
     assert home.numbers == pytest.approx((0.15, 0.15, 0.85, 0.85))
     assert zone.numbers == pytest.approx((0.47, 0.47, 0.53, 0.53))
     sides = [values(trajectory, f"scene/{name}") for name in ("left", "bottom", "right", "top")]
     assert [one.numbers for one in obstacles] == [
         tuple(side[k] for side in sides) for k in range(10)
     ]
-    see, grip, near = stage.rings
+    see, grip, near = playback.rings
     assert see.radius == (0.05,) * 3 + (0.0,) * 4
     assert grip.radius == (0.0,) * 4 + (0.05,) * 3
     assert near.radius == (0.05,) * 7
-    assert [group.reach for group in stage.sensor_groups] == [0.05, 0.05, 0.12, 0.0]
-    assert stage.sensor_groups[3].names == ("A", "B", "C")
-    assert stage.sensor_groups[3].angles == ()
-    assert len(stage.output_names) == 8
-    assert stage.output_names[5] == "grip A"
+    assert [group.reach for group in playback.sensor_groups] == [0.05, 0.05, 0.12, 0.0]
+    assert playback.sensor_groups[3].names == ("A", "B", "C")
+    assert playback.sensor_groups[3].angles == ()
+    assert len(playback.output_names) == 8
+    assert playback.output_names[5] == "grip A"
 
 
 def test_home_is_sensed_where_it_is():
-    stage = stage_of(epoch(GACC))
-    group = stage.sensor_groups[2]
-    at = np.stack([stage.x.values, stage.y.values], axis=-1)[:-1]
-    k = stage.sensors.values[1:, :, group.first : group.first + 8].argmax(axis=2)
+    playback = playback_of(epoch(GACC))
+    group = playback.sensor_groups[2]
+    at = np.stack([playback.x.values, playback.y.values], axis=-1)[:-1]
+    k = playback.sensors.values[1:, :, group.first : group.first + 8].argmax(axis=2)
     way = 0.5 - at
     off = np.arctan2(way[..., 1], way[..., 0]) - np.array(group.angles)[k]
     assert (np.abs(np.angle(np.exp(1j * off))) <= group.half + 1e-3).all()

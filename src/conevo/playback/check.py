@@ -1,4 +1,4 @@
-"""One look over a whole stage, so that whoever draws it can trust every number in it."""
+"""One look over a whole playback, so that whoever draws it can trust every number in it."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from collections.abc import Iterable
 from dataclasses import fields, is_dataclass, replace
 from typing import Any
 
-from conevo.replay.channel import Channel
-from conevo.replay.stage import Backdrop, Event, Kind, Stage, Things
-from conevo.replay.stages.refusals import DAMAGE, refusal
+from conevo.playback.channel import Channel
+from conevo.playback.refusals import DAMAGE, refusal
+from conevo.playback.schema import Backdrop, Event, Kind, Playback, Things
 
 __all__ = ["MOST_EVENTS", "checked"]
 
@@ -22,8 +22,8 @@ _SHAPES = {"rect": 4, "disc": 3, "raster": 4}
 _COLOUR = re.compile(r"#[0-9a-f]{6}")
 
 
-def checked(stage: Stage) -> Stage:
-    """Return a stage whose parts fit together, its events in order of time.
+def checked(playback: Playback) -> Playback:
+    """Return a playback whose parts fit together, its events in order of time.
 
     Choice: of more than 5,000 events the rarest kinds are kept, and of the kind that does not fit
     any more the first ones; a fact says so.
@@ -32,20 +32,20 @@ def checked(stage: Stage) -> Stage:
         UsageError: something does not fit.
     """
     try:
-        _check_texts(stage)
-        words = (*stage.output_names, *(word for fact in stage.facts for word in fact))
+        _check_texts(playback)
+        words = (*playback.output_names, *(word for fact in playback.facts for word in fact))
         _require(all(isinstance(word, str) for word in words), "a word is none")
-        _check_team(stage)
-        _check_activations(stage)
-        for backdrop in stage.backdrop:
+        _check_team(playback)
+        _check_activations(playback)
+        for backdrop in playback.backdrop:
             _check_backdrop(backdrop)
-        for things in stage.things:
-            _check_things(things, stage.iterations)
-        _check_surroundings(stage)
-        _check_events(stage)
+        for things in playback.things:
+            _check_things(things, playback.iterations)
+        _check_surroundings(playback)
+        _check_events(playback)
     except DAMAGE as error:
         raise refusal(error) from error
-    return _with_fewer_events(stage)
+    return _with_fewer_events(playback)
 
 
 def _check_texts(thing: Any) -> None:
@@ -63,46 +63,50 @@ def _check_texts(thing: Any) -> None:
             _check_texts(value)
 
 
-def _check_team(stage: Stage) -> None:
-    t, r, b = stage.iterations, len(stage.robots), len(stage.body)
+def _check_team(playback: Playback) -> None:
+    t, r, b = playback.iterations, len(playback.robots), len(playback.body)
     _require(t >= 1 and 1 <= r <= b, f"{t} iterations, {r} robots, {b} bodies")
-    x0, y0, x1, y1 = stage.bounds
-    _finite("bounds", stage.bounds)
-    _require(x0 < x1 and y0 < y1, f"bounds {stage.bounds}")
-    _require(math.isfinite(stage.seconds) and stage.seconds >= 0, f"seconds {stage.seconds}")
-    _kinds("action", stage.actions)
-    _kinds("caste", stage.castes)
-    _indices("body", stage.body, len(stage.body_kinds))
-    for kind in stage.body_kinds:
+    x0, y0, x1, y1 = playback.bounds
+    _finite("bounds", playback.bounds)
+    _require(x0 < x1 and y0 < y1, f"bounds {playback.bounds}")
+    _require(
+        math.isfinite(playback.seconds) and playback.seconds >= 0, f"seconds {playback.seconds}"
+    )
+    _kinds("action", playback.actions)
+    _kinds("caste", playback.castes)
+    _indices("body", playback.body, len(playback.body_kinds))
+    for kind in playback.body_kinds:
         _require(kind.shape in ("disc", "square"), f"a body is a {kind.shape}")
         _positive("radius of a body", kind.radius)
         _colour(kind.colour, or_none=True)
-    _indices("caste", [robot.caste for robot in stage.robots], len(stage.castes))
-    for robot in stage.robots:
+    _indices("caste", [robot.caste for robot in playback.robots], len(playback.castes))
+    for robot in playback.robots:
         _finite("a robot", (robot.specialization, robot.fitness))
-        if stage.hidden is not None and not robot.heuristic:
-            _indices("neuron", robot.neurons, stage.hidden.codes.shape[2])
-    _channel("x", stage.x, (t, b))
-    _channel("y", stage.y, (t, b))
-    _channel("heading", stage.heading, (t, b))
-    _channel("energy", stage.energy, (t, r))
-    _channel("action", stage.action, (t, r), (-1, len(stage.actions)))
-    if stage.held is not None:
-        n = stage.things[0].kind.codes.size if stage.things else 0
-        _channel("held", stage.held, (t, r), (-1, n))
+        if playback.hidden is not None and not robot.heuristic:
+            _indices("neuron", robot.neurons, playback.hidden.codes.shape[2])
+    _channel("x", playback.x, (t, b))
+    _channel("y", playback.y, (t, b))
+    _channel("heading", playback.heading, (t, b))
+    _channel("energy", playback.energy, (t, r))
+    _channel("action", playback.action, (t, r), (-1, len(playback.actions)))
+    if playback.held is not None:
+        n = playback.things[0].kind.codes.size if playback.things else 0
+        _channel("held", playback.held, (t, r), (-1, n))
 
 
-def _check_activations(stage: Stage) -> None:
-    t, r = stage.iterations, len(stage.robots)
+def _check_activations(playback: Playback) -> None:
+    t, r = playback.iterations, len(playback.robots)
     for name in ("sensors", "hidden", "outputs"):
-        channel: Channel | None = getattr(stage, name)
+        channel: Channel | None = getattr(playback, name)
         if channel is not None:
             _channel(name, channel, (t, r, channel.codes.shape[-1]))
-    if stage.outputs is not None:
-        n = stage.outputs.codes.shape[2]
-        _require(n == len(stage.output_names), f"{n} outputs, {len(stage.output_names)} names")
-    n = stage.sensors.codes.shape[2] if stage.sensors is not None else 0
-    for group in stage.sensor_groups:
+    if playback.outputs is not None:
+        n = playback.outputs.codes.shape[2]
+        _require(
+            n == len(playback.output_names), f"{n} outputs, {len(playback.output_names)} names"
+        )
+    n = playback.sensors.codes.shape[2] if playback.sensors is not None else 0
+    for group in playback.sensor_groups:
         last = group.first + group.count
         _require(0 <= group.first < last <= n, f"{group.name} are {last} of {n} sensors")
         _require(len(group.names) == group.count, f"{group.name} without names")
@@ -144,47 +148,47 @@ def _check_things(things: Things, t: int) -> None:
         _colour(state.colour, or_none=True)
 
 
-def _check_surroundings(stage: Stage) -> None:
-    t = stage.iterations
-    for ring in stage.rings:
-        _require(len(ring.radius) == len(stage.actions), f"{ring.name} of {ring.radius}")
+def _check_surroundings(playback: Playback) -> None:
+    t = playback.iterations
+    for ring in playback.rings:
+        _require(len(ring.radius) == len(playback.actions), f"{ring.name} of {ring.radius}")
         _finite(ring.name, ring.radius)
         _require(min(ring.radius) >= 0, f"{ring.name} of {ring.radius}")
         _require(ring.when in ("action", "selected"), f"{ring.name} when {ring.when}")
         _require(ring.of in ("robots", "others"), f"{ring.name} of {ring.of}")
-    n = len(stage.things[0].kinds) if stage.things else 0
-    for row in stage.plan:
+    n = len(playback.things[0].kinds) if playback.things else 0
+    for row in playback.plan:
         _indices(row.name, row.parts, n)
         _indices(row.name, row.built, t + 1)
         _require(len(row.parts) == len(row.built), f"{row.name} has other parts than built")
-    for gauge in stage.gauges:
+    for gauge in playback.gauges:
         _channel(gauge.name, gauge.values, (t,))
         _positive(gauge.name, gauge.most)
         _colour(gauge.colour)
-    for measure in stage.measures:
+    for measure in playback.measures:
         _channel(measure.name, measure.values, (t,))
 
 
-def _check_events(stage: Stage) -> None:
-    for kind in stage.event_kinds:
+def _check_events(playback: Playback) -> None:
+    for kind in playback.event_kinds:
         _colour(kind.colour)
-    for event in stage.events:
-        _indices("iteration of an event", [event.t], stage.iterations)
-        _indices("kind of an event", [event.kind], len(stage.event_kinds))
-        _indices("robot of an event", event.robots, len(stage.robots))
+    for event in playback.events:
+        _indices("iteration of an event", [event.t], playback.iterations)
+        _indices("kind of an event", [event.kind], len(playback.event_kinds))
+        _indices("robot of an event", event.robots, len(playback.robots))
 
 
-def _with_fewer_events(stage: Stage) -> Stage:
-    """Return a stage with its events in order of time, and no more of them than can be shown."""
-    events = sorted(stage.events, key=lambda event: (event.t, event.kind))
+def _with_fewer_events(playback: Playback) -> Playback:
+    """Return a playback with its events in order of time, and no more of them than can be shown."""
+    events = sorted(playback.events, key=lambda event: (event.t, event.kind))
     if len(events) <= MOST_EVENTS:
-        return replace(stage, events=tuple(events))
+        return replace(playback, events=tuple(events))
     counts = Counter(event.kind for event in events)
     by_rarity = sorted(events, key=lambda event: (counts[event.kind], event.kind))
     kept: set[int] = {id(event) for event in by_rarity[:MOST_EVENTS]}
     shown: list[Event] = [event for event in events if id(event) in kept]
     note = ("events", f"{MOST_EVENTS:,} of {len(events):,} shown, the rarest kinds first")
-    return replace(stage, events=tuple(shown), facts=(*stage.facts, note))
+    return replace(playback, events=tuple(shown), facts=(*playback.facts, note))
 
 
 # --- what can be wrong ----------------------------------------------------------------------------

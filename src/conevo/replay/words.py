@@ -1,4 +1,4 @@
-"""What a stage says in words: whose team this is, what it reached, which robots took part."""
+"""What a playback says in words: whose team this is, what it reached, which robots took part."""
 
 from __future__ import annotations
 
@@ -6,9 +6,10 @@ from collections import Counter
 from collections.abc import Sequence
 
 from conevo.evolution.methods.registry import title_of
-from conevo.replay.trajectory import About
+from conevo.playback.about import About
+from conevo.playback.words import number
 
-__all__ = ["enumerated", "facts", "listed", "number", "subtitle", "title"]
+__all__ = ["facts", "subtitle", "title"]
 
 
 def title(about: About) -> str:
@@ -63,20 +64,3 @@ def _tally(names: Sequence[str]) -> str:
     """Return how many there are of each, most first, equals by name: "7 move, 3 low"."""
     found = sorted(Counter(names).items(), key=lambda one: (-one[1], one[0]))
     return ", ".join(f"{n} {name}" for name, n in found)
-
-
-def number(value: float) -> str:
-    """Return a number as people write it: whole, or with three significant digits."""
-    if float(value).is_integer() or abs(value) >= 1000:
-        return f"{value:,.0f}"
-    return f"{value:.3g}"
-
-
-def listed(words: Sequence[str]) -> str:
-    """Return words in a row: "3", "3 and 7", "3, 7 and 8"."""
-    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
-
-
-def enumerated(name: str, robots: Sequence[int]) -> str:
-    """Return robots by their numbers: "rover 3", "rovers 3 and 7"."""
-    return f"{name}{'s' * (len(robots) != 1)} {listed([str(i) for i in robots])}"

@@ -1,4 +1,4 @@
-"""What all stages are made of: a trajectory's channels, each looked at before it is used."""
+"""What all playbacks are made of: a trajectory's channels, each looked at before it is used."""
 
 from __future__ import annotations
 
@@ -10,11 +10,10 @@ import numpy as np
 import numpy.typing as npt
 
 from conevo.palette import FAINT
-from conevo.replay.channel import Channel
-from conevo.replay.stage import Curve, Kind, Robot, SensorGroup
-from conevo.replay.stages.words import facts, subtitle, title
-from conevo.replay.trajectory import Trajectory
-from conevo.specialization.individual import NON_SPECIALIZED
+from conevo.playback.about import About
+from conevo.playback.channel import Channel
+from conevo.playback.schema import Curve, Kind, Robot, SensorGroup
+from conevo.terms import NON_SPECIALIZED
 
 __all__ = ["Parts", "begun", "columns", "octants"]
 
@@ -25,15 +24,19 @@ _COMPASS = ("ENE", "NNE", "NNW", "WNW", "WSW", "SSW", "SSE", "ESE")
 class Parts:
     """A trajectory, of which every part is checked when it is asked for.
 
+    Args:
+        about: what the trajectory is of.
+        channels: what was recorded, by name.
+
     Attributes:
         about: what the trajectory is of.
         t: iterations.
         r: robots.
     """
 
-    def __init__(self, trajectory: Trajectory) -> None:
-        self.about = trajectory.about
-        self._channels = trajectory.channels
+    def __init__(self, about: About, channels: Mapping[str, Channel]) -> None:
+        self.about = about
+        self._channels = channels
         self.t = self.about["iterations"]
         self.r = self.about["n_robots"]
 
@@ -59,6 +62,17 @@ class Parts:
         actual = list(self._channels[name].codes.shape)
         wanted = ", ".join("any" if n < 0 else str(n) for n in shape)
         raise ValueError(f"{name} is {actual}, not [{wanted}]")
+
+    def any_channel(self, name: str) -> Channel:
+        """Return a channel of whatever shape."""
+        return self._channels[name]
+
+    @property
+    def names(self) -> tuple[frozenset[str], frozenset[str], frozenset[str]]:
+        """Names of what is recorded, of the scenario's arrays, and of the world's parameters."""
+        scene = {name.removeprefix("scene/") for name in self._channels if "scene/" in name}
+        recorded = {name for name in self._channels if "/" not in name}
+        return frozenset(recorded), frozenset(scene), frozenset(self.about["params"])
 
     def floats(self, name: str, *shape: int) -> npt.NDArray[np.float64]:
         """Return the values of a channel of this shape."""
@@ -127,7 +141,9 @@ def columns(channel: Channel) -> list[Channel]:
 def begun(
     parts: Parts, actions: Mapping[str, str], castes: Mapping[str, str], outputs: Sequence[str]
 ) -> dict[str, Any]:
-    """Return what every stage says, as arguments of ``Stage``.
+    """Return what every playback says, as arguments of ``Playback``.
+
+    Whose team it is, title, subtitle and facts, is left to who shows it.
 
     Args:
         parts: of the trajectory.
@@ -141,9 +157,9 @@ def begun(
     known = {**castes, NON_SPECIALIZED: FAINT}
     is_thinking = not all(about["heuristic"])
     return {
-        "title": title(about),
-        "subtitle": subtitle(about),
-        "facts": facts(about),
+        "title": "",
+        "subtitle": "",
+        "facts": (),
         "iterations": t,
         "actions": tuple(Kind(*one) for one in actions.items()),
         "castes": tuple(Kind(*one) for one in known.items()),

@@ -1,4 +1,4 @@
-"""The stage of predators and prey in their arena, of the worlds pursuit-v1 and prey-v1."""
+"""The playback of predators and prey in their arena, of the worlds pursuit-v1 and prey-v1."""
 
 from __future__ import annotations
 
@@ -9,23 +9,23 @@ import numpy.typing as npt
 
 from conevo import palette
 from conevo.palette import FAINT, GREEN, GROUND, INK, shade
-from conevo.replay.channel import Channel
-from conevo.replay.stage import (
+from conevo.playback.channel import Channel
+from conevo.playback.parts import Parts, begun
+from conevo.playback.schema import (
     Backdrop,
     BodyKind,
     Curve,
     Event,
     Kind,
+    Playback,
     Ring,
     SensorGroup,
-    Stage,
     Things,
 )
-from conevo.replay.stages.parts import Parts, begun
-from conevo.replay.stages.words import enumerated
+from conevo.playback.words import enumerated
 from conevo.terms import counted
 
-__all__ = ["stage"]
+__all__ = ["playback"]
 
 ACTIONS = palette.ACTIONS["pursuit"]
 RADIUS = 2.75  # of a Khepera and of an obstacle, cm; as in kernels.khepera, like the next
@@ -39,8 +39,8 @@ EVENT_KINDS = (
 )
 
 
-def stage(parts: Parts) -> Stage:
-    """Return the stage of an epoch of ``pursuit-v1`` or ``prey-v1``."""
+def playback(parts: Parts) -> Playback:
+    """Return the playback of an epoch of ``pursuit-v1`` or ``prey-v1``."""
     t, r = parts.t, parts.r
     is_prey = parts.about["world"] == "prey-v1"
     n = parts.number("scene/n_bodies")
@@ -51,7 +51,7 @@ def stage(parts: Parts) -> Stage:
     team, others = ("prey", "predator") if is_prey else ("predator", "prey")
     captured = None if is_prey else parts.index("captured", 2, t, n - r)
     ranges = "infrared range" if is_prey else "infrared and light range"
-    return Stage(
+    return Playback(
         **begun(parts, ACTIONS, ACTIONS, ("left wheel", "right wheel")),
         unit="cm",
         seconds=SECONDS,

@@ -1,9 +1,9 @@
 """What is to be drawn of an epoch: the one description that the viewer and films share.
 
-A stage knows no world. ``conevo.replay.stages`` makes one of a trajectory; the viewer gets it as
-JSON with the channels beside it. Lengths are in the world's unit, angles in rad counter-clockwise
-from +x, y points up, colours are "#rrggbb". Frame t, from 0 to T - 1, is the state after iteration
-t; actions and sensor values of frame t are those of iteration t.
+A playback knows no world. ``conevo.replay.playback`` makes one of a trajectory; the viewer gets it
+as JSON with the channels next to it. Lengths are in the world's unit, angles in rad counter-
+clockwise from +x, y points up, colours are "#rrggbb". Frame t, from 0 to T - 1, is the state after
+iteration t; actions and sensor values of frame t are those of iteration t.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from conevo.replay.channel import Channel
+from conevo.playback.channel import Channel
 
 __all__ = [
     "Backdrop",
@@ -27,7 +27,7 @@ __all__ = [
     "Ring",
     "Robot",
     "SensorGroup",
-    "Stage",
+    "Playback",
     "Things",
 ]
 
@@ -132,7 +132,7 @@ class SensorGroup:
 class Robot:
     """What is said about a robot over the whole epoch.
 
-    caste: index into the stage's castes. specialization: S. fitness. heuristic: its heuristic
+    caste: index into the playback's castes. specialization: S. fitness. heuristic: its heuristic
     controller, "" for its network. neurons: slots in which it has hidden neurons.
     """
 
@@ -145,7 +145,7 @@ class Robot:
 
 @dataclass(frozen=True)
 class Event:
-    """Something to jump to. kind: index into the stage's event kinds; robots: numbers."""
+    """Something to jump to. kind: index into the playback's event kinds; robots: numbers."""
 
     t: int
     kind: int
@@ -185,7 +185,7 @@ class Curve:
 
 
 @dataclass(frozen=True)
-class Stage:
+class Playback:
     """One team in one epoch, ready to be drawn. R robots come first among the B bodies.
 
     action [T, R]: index into actions, -1 for none. energy [T, R] or None. held [T, R]: number of
@@ -260,7 +260,7 @@ class Pool:
         return b"".join(self._parts)
 
     def plain(self, thing: Any) -> Any:
-        """Return a stage, or a part of one, as JSON has it; its channels are added to the pool."""
+        """Return a playback, or a part of one, as JSON has it; adds its channels to the pool."""
         if isinstance(thing, Channel):
             return self.add(thing)
         if isinstance(thing, tuple):

@@ -1,4 +1,4 @@
-"""Stages of damaged and hostile trajectories: whole or refused in one clear line."""
+"""Playbacks of damaged and hostile trajectories: whole or refused in one clear line."""
 
 import json
 import math
@@ -10,9 +10,11 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from conevo.errors import UsageError
-from conevo.replay.channel import Channel
-from conevo.replay.stage import Event, Kind, Pool, Stage
-from conevo.replay.stages import check, checked, stage_of
+from conevo.playback import check
+from conevo.playback.channel import Channel
+from conevo.playback.check import checked
+from conevo.playback.schema import Event, Kind, Playback, Pool
+from conevo.replay.playback import playback_of
 from conevo.replay.trajectory import Trajectory
 from replay.epochs import TASKS, epoch, renamed
 from replay.staging import changed, parts_of, values
@@ -25,7 +27,7 @@ GACC, LIGHT = TASKS[3], TASKS[4]
 
 def refused(trajectory, match=None):
     with pytest.raises(UsageError, match=match) as error:
-        stage_of(trajectory)
+        playback_of(trajectory)
     assert "\n" not in str(error.value)
 
 
@@ -96,7 +98,7 @@ def test_values_that_nobody_can_draw(low, step):
 def test_a_hostile_name_stays_in_its_line():
     for name in ("two\nlines", "<script>", "x" * 10_000, "\x1b[2J", "rover\u2028v1"):
         with pytest.raises(UsageError) as error:
-            stage_of(renamed(changed(epoch(TASKS[0]), x=None), world=name))
+            playback_of(renamed(changed(epoch(TASKS[0]), x=None), world=name))
         text = str(error.value)
         assert text.isprintable()
         assert len(text) < 500
@@ -190,7 +192,7 @@ def damage(draw, channel):
 @pytest.mark.parametrize("task", TASKS)
 @settings(max_examples=80, deadline=None)
 @given(data=st.data())
-def test_whatever_is_damaged_a_stage_is_whole_or_refused(task, data):
+def test_whatever_is_damaged_a_playback_is_whole_or_refused(task, data):
     trajectory = epoch(task, 40)
     name = data.draw(st.sampled_from(sorted(trajectory.channels)))
     odd = data.draw(damage(trajectory.channels[name]))
@@ -211,7 +213,7 @@ ABOUT = st.one_of(
 @pytest.mark.parametrize("task", TASKS)
 @settings(max_examples=80, deadline=None)
 @given(data=st.data())
-def test_whatever_is_said_a_stage_is_whole_or_refused(task, data):
+def test_whatever_is_said_a_playback_is_whole_or_refused(task, data):
     trajectory = epoch(task, 40)
     key = data.draw(st.sampled_from(sorted(trajectory.about)))
     if key == "params" and data.draw(st.booleans()):
@@ -227,33 +229,33 @@ def assert_whole_or_refused(trajectory):
     """All numbers are finite, all indices in range: told without the code that checks it."""
     refusal = ""
     try:
-        stage = stage_of(trajectory)
+        playback = playback_of(trajectory)
     except UsageError as error:
         refusal = str(error)
     if refusal:
         assert "\n" not in refusal
         return
-    t, r = stage.iterations, len(stage.robots)
-    json.dumps(Pool().plain(stage), allow_nan=False).encode()
-    for one in parts_of(stage):
+    t, r = playback.iterations, len(playback.robots)
+    json.dumps(Pool().plain(playback), allow_nan=False).encode()
+    for one in parts_of(playback):
         if isinstance(one, Channel):
             assert np.isfinite(one.values).all()
         elif isinstance(one, Event):
             assert 0 <= one.t < t
-            assert one.kind < len(stage.event_kinds)
+            assert one.kind < len(playback.event_kinds)
             assert set(one.robots) <= set(range(r))
-    assert stage.x.codes.shape == stage.y.codes.shape == (t, len(stage.body))
-    assert set(np.unique(stage.action.values)) <= set(range(-1, len(stage.actions)))
-    assert {robot.caste for robot in stage.robots} <= set(range(len(stage.castes)))
-    for things in stage.things:
+    assert playback.x.codes.shape == playback.y.codes.shape == (t, len(playback.body))
+    assert set(np.unique(playback.action.values)) <= set(range(-1, len(playback.actions)))
+    assert {robot.caste for robot in playback.robots} <= set(range(len(playback.castes)))
+    for things in playback.things:
         assert set(np.unique(things.kind.values)) <= set(range(len(things.kinds)))
         if things.gone is not None:
             assert set(np.unique(things.gone.values)) <= set(range(t + 1))
         if things.state is not None:
             assert set(np.unique(things.state.values)) <= set(range(len(things.states)))
-    if stage.held is not None:
-        k = stage.things[0].kind.codes.size
-        assert set(np.unique(stage.held.values)) <= set(range(-1, k))
+    if playback.held is not None:
+        k = playback.things[0].kind.codes.size
+        assert set(np.unique(playback.held.values)) <= set(range(-1, k))
 
 
 # --- the check itself -----------------------------------------------------------------------------
@@ -342,15 +344,15 @@ WRONG = {
 
 
 @pytest.mark.parametrize("what", WRONG)
-def test_a_stage_that_does_not_fit_together_is_refused(what):
-    stage = stage_of(epoch(GACC))
+def test_a_playback_that_does_not_fit_together_is_refused(what):
+    playback = playback_of(epoch(GACC))
     with pytest.raises(UsageError, match="the trajectory is damaged: "):
-        checked(replace(stage, **WRONG[what](stage)))
+        checked(replace(playback, **WRONG[what](playback)))
 
 
 def test_what_standing_things_and_discs_must_be():
-    stage = stage_of(epoch(TASKS[0]))
-    canals, lander = stage.backdrop
+    playback = playback_of(epoch(TASKS[0]))
+    canals, lander = playback.backdrop
     for wrong in (
         replace(lander, numbers=(0.5, 0.5, 0.0)),
         replace(lander, line="ink"),
@@ -358,33 +360,33 @@ def test_what_standing_things_and_discs_must_be():
         replace(canals, cells=Channel.of(np.zeros((0, 4)))),
     ):
         with pytest.raises(UsageError, match="damaged"):
-            checked(replace(stage, backdrop=(wrong,)))
+            checked(replace(playback, backdrop=(wrong,)))
 
 
 def test_too_many_events_the_rarest_stay(monkeypatch):
     monkeypatch.setattr(check, "MOST_EVENTS", 10)
-    stage = replace(stage_of(epoch(GACC)), events=())
+    playback = replace(playback_of(epoch(GACC)), events=())
     often = [Event(t, 0, f"often {t}") for t in range(20)]
     rarely = [Event(t, 4, f"rarely {t}") for t in range(0, 18, 3)]
-    few = checked(replace(stage, events=(*often, *rarely)))
+    few = checked(replace(playback, events=(*often, *rarely)))
     assert [event.text for event in few.events] == [
         *("often 0", "rarely 0", "often 1", "often 2", "often 3", "rarely 3"),
         *("rarely 6", "rarely 9", "rarely 12", "rarely 15"),
     ]
     assert few.facts[-1] == ("events", "10 of 26 shown, the rarest kinds first")
-    enough = checked(replace(stage, events=tuple(often[9::-1])))
+    enough = checked(replace(playback, events=tuple(often[9::-1])))
     assert enough.events == tuple(often[:10])
-    assert enough.facts == stage.facts
+    assert enough.facts == playback.facts
 
 
-def test_a_stage_is_the_same_from_a_file(tmp_path):
+def test_a_playback_is_the_same_from_a_file(tmp_path):
     for task in TASKS:
         trajectory = epoch(task)
         path = tmp_path / "epoch.npz"
         path.unlink(missing_ok=True)
         trajectory.save(path)
-        kept, shown = stage_of(Trajectory.load(path)), stage_of(trajectory)
-        assert isinstance(kept, Stage)
+        kept, shown = playback_of(Trajectory.load(path)), playback_of(trajectory)
+        assert isinstance(kept, Playback)
         assert sorted(kept.facts) == sorted(shown.facts)
         one, other = Pool(), Pool()
         plain, wanted = one.plain(replace(kept, facts=())), other.plain(replace(shown, facts=()))

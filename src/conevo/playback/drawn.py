@@ -1,0 +1,129 @@
+"""What a world of one's own says is drawn, next to its robots, in replay and film.
+
+A world's class has it as ``drawn``; it is kept with every recorded epoch, so that drawing one needs
+no code of the world::
+
+    drawn: ClassVar[Drawn] = Drawn(
+        objects=(Objects("ball", "ball[0]", "ball[1]", size=0.02),),
+        areas=(Area("goal", "places[-1, 0]", "places[-1, 1]", 0.03),),
+    )
+
+A text for a number says where the number is kept: an array that ``simulation()`` records, else one
+of the scenario, else a parameter. Indices in brackets pick from it, "places[-1, 0]" or
+"places[4:, 0]"; time, of what is recorded in every iteration, comes first and is not among them.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from functools import cache
+from typing import Any
+
+from conevo.errors import UsageError
+
+__all__ = ["Area", "Drawn", "Objects", "Signal"]
+
+
+@dataclass(frozen=True)
+class Objects:
+    """Things that lie or move in the world.
+
+    name: of them. x, y: where they are. size: radius, or half a side. shape: "disc" or "square".
+    kind: number of each thing's kind, which picks from ``kinds``. state: number of each thing's
+    state in every iteration, which picks from ``states``. gone: the iteration in which each was
+    taken away. Not given: all of one kind, without states, there to the end. colours: of the kinds.
+    """
+
+    name: str
+    x: str
+    y: str
+    size: float = 0.01
+    shape: str = "disc"
+    kind: str = ""
+    kinds: tuple[str, ...] = ()
+    state: str = ""
+    states: tuple[str, ...] = ()
+    gone: str = ""
+    colours: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Area:
+    """What stands still: a goal, a home. x, y: its centre.
+
+    radius: of a disc. width, height: of a rectangle, which has no radius. colour: of its floor.
+    """
+
+    name: str
+    x: float | str
+    y: float | str
+    radius: float | str = 0.0
+    width: float | str = 0.0
+    height: float | str = 0.0
+    colour: str = ""
+
+
+@dataclass(frozen=True)
+class Signal:
+    """Something to jump to: an event for every robot, object or world for which a number rises.
+
+    name: of the event. rises: an array recorded in every iteration, [T] or [T, n]. colour: of its
+    mark.
+    """
+
+    name: str
+    rises: str
+    colour: str = ""
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """What is drawn of a world.
+
+    objects, areas, signals: next to its robots. unit: of lengths, as in "cm". seconds: of an
+    iteration, 0 if that means nothing. bounds: corners x0, y0, x1, y1; none: the unit square if all
+    robots stay in it, else what lies around them. radius: of a robot; 0: a hundredth of the world.
+    colours: "#rrggbb" of actions and castes by name; those left out get one.
+    """
+
+    objects: tuple[Objects, ...] = ()
+    areas: tuple[Area, ...] = ()
+    signals: tuple[Signal, ...] = ()
+    unit: str = ""
+    seconds: float = 0.0
+    bounds: tuple[float, float, float, float] | None = None
+    radius: float = 0.0
+    colours: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def plain(self) -> dict[str, Any]:
+        """It as JSON has it."""
+        found: dict[str, Any] = json.loads(json.dumps(asdict(self)))
+        return found
+
+    @staticmethod
+    def of(plain: Mapping[str, Any], world: str) -> Drawn:
+        """Return what JSON says is drawn of a world.
+
+        Raises:
+            UsageError: it is something else.
+        """
+        from pydantic import ValidationError
+
+        try:
+            found: Drawn = _checker().validate_json(json.dumps(plain), strict=True)
+        except ValidationError as error:
+            first = error.errors()[0]
+            place = "".join(f"[{p}]" if isinstance(p, int) else f".{p}" for p in first["loc"])
+            raise UsageError(f"world {world}: drawn{place}: {first['msg']}") from error
+        return found
+
+
+@cache
+def _checker() -> Any:
+    from pydantic import ConfigDict, TypeAdapter, with_config
+
+    config = ConfigDict(extra="forbid", allow_inf_nan=False)
+    return TypeAdapter(with_config(config)(Drawn))

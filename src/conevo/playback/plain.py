@@ -1,0 +1,113 @@
+"""The playback of a world that the package does not know: robots where they are, what they do."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from conevo.errors import UsageError
+from conevo.palette import several
+from conevo.playback.drawn import Drawn
+from conevo.playback.parts import Parts, begun
+from conevo.playback.refusals import one_line
+from conevo.playback.schema import BodyKind, Playback, SensorGroup
+from conevo.terms import NON_SPECIALIZED
+
+__all__ = ["playback"]
+
+
+def playback(parts: Parts, drawn: Drawn) -> Playback:
+    """Return the playback of an epoch of any world that records x, y and action of its robots.
+
+    A heading and an energy of every robot are shown, too, if they are recorded.
+
+    Args:
+        parts: of the trajectory.
+        drawn: what the world says is drawn: its unit, bounds and colours, and robots' size.
+
+    Raises:
+        UsageError: it does not record what is needed.
+    """
+    about, t, r = parts.about, parts.t, parts.r
+    missing = [name for name in ("x", "y", "action") if not parts.has(name, t, r)]
+    if missing:
+        raise UsageError(
+            f"world {one_line(about['world'])} cannot be drawn: its simulation does not record "
+            f"{', '.join(missing)} of every robot (Simulation.recorded must name x, y and action)"
+        )
+    x, y = parts.channel("x", t, r), parts.channel("y", t, r)
+    low, high = _corners(x.values, y.values)
+    bounds = drawn.bounds or (*low, *high)
+    actions, castes = _colours(about["actions"], about["castes"], drawn.colours)
+    n_outputs = parts.channel("outputs", t, r, -1).codes.shape[2]
+    return Playback(
+        **begun(parts, actions, castes, _outputs(about.get("outputs", []), n_outputs)),
+        unit=drawn.unit,
+        seconds=drawn.seconds,
+        bounds=bounds,
+        # Choice: robots are drawn as large as a hundredth of the world.
+        body_kinds=(BodyKind("robot", drawn.radius or 0.01 * _side(bounds)),),
+        body=(0,) * r,
+        x=x,
+        y=y,
+        heading=parts.channel("heading", t, r) if parts.has("heading", t, r) else None,
+        energy=parts.channel("energy", t, r) if parts.has("energy", t, r) else None,
+        sensor_groups=_sensors(parts),
+        measures=parts.measures(*about["performance"]),
+    )
+
+
+def _corners(
+    x: npt.NDArray[Any], y: npt.NDArray[Any]
+) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Return two corners of the world: the unit square if all robots are in it, else around all."""
+    low, high = np.array([x.min(), y.min()]), np.array([x.max(), y.max()])
+    if low.min() >= 0 and high.max() <= 1:
+        return (0.0, 0.0), (1.0, 1.0)
+    margin = 0.05 * float((high - low).max()) or 0.5
+    (x0, y0), (x1, y1) = (low - margin).tolist(), (high + margin).tolist()
+    return (x0, y0), (x1, y1)
+
+
+def _side(bounds: tuple[float, float, float, float]) -> float:
+    return max(bounds[2] - bounds[0], bounds[3] - bounds[1])
+
+
+def _outputs(names: list[str], n: int) -> list[str]:
+    """Return the names of n outputs; trajectories of conevo 0.1.0 have none."""
+    return names if len(names) == n else [f"output {k}" for k in range(n)]
+
+
+def _colours(
+    actions: list[str], castes: list[str], given: Mapping[str, str]
+) -> tuple[dict[str, str], dict[str, str]]:
+    """Return a colour for every action and caste; a caste named like an action has its colour."""
+    own = [name for name in castes if name not in (*actions, NON_SPECIALIZED)]
+    names = [*actions, *own]
+    free = [c for c in several(len(names) + len(given)) if c not in given.values()]
+    rest = [name for name in names if name not in given]
+    colours = {**given, **dict(zip(rest, free, strict=False))}
+    return (
+        {name: colours[name] for name in actions},
+        {name: colours[name] for name in castes if name != NON_SPECIALIZED},
+    )
+
+
+def _sensors(parts: Parts) -> tuple[SensorGroup, ...]:
+    """Return the sensors by the names they have before their numbers: "light 0", "light 1"."""
+    n = parts.channel("sensors", parts.t, parts.r, -1).codes.shape[2]
+    names = parts.about.get("inputs", [])
+    if len(names) != n:  # of conevo 0.1.0
+        names = [str(k) for k in range(n)]
+    cut = [re.fullmatch(r"(.*\S) (\d+)", name) for name in names]
+    owners = [found[1] if found else "" for found in cut]
+    starts = [k for k in range(n) if k == 0 or owners[k] != owners[k - 1]]
+    groups = []
+    for first, end in zip(starts, [*starts[1:], n], strict=True):
+        own = tuple(found[2] if found else names[k] for k, found in enumerate(cut))[first:end]
+        groups.append(SensorGroup(owners[first] or "sensors", first, end - first, own))
+    return tuple(groups)
