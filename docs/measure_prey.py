@@ -21,8 +21,8 @@ import numpy as np
 
 import conevo
 import pages
-from conevo.runs.evolved_prey import PREY_TASKS
 from conevo.runs.shaping import Shaping, start_shaping
+from conevo.worlds.pursuit.evolved import TASKS as PREY_TASKS
 from conevo.worlds.pursuit.prey_sets import PreySet, load, save
 from pages import Row
 from teams import Numbers, champion, controlled, error, keys_of, play, random_networks

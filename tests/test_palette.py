@@ -4,7 +4,7 @@ from itertools import combinations
 
 from conevo import palette
 from conevo.evolution.methods.registry import METHODS
-from conevo.worlds.registry import WORLDS
+from conevo.worlds.registry import WORLDS, colours_of
 
 
 def test_every_method_of_the_registry_has_a_look_of_its_own() -> None:
@@ -27,9 +27,10 @@ def test_methods_from_elsewhere_never_share_a_look() -> None:
 
 
 def test_castes_have_the_colours_of_a_replay_and_strangers_others() -> None:
-    rover = palette.caste_colours("rover-v1", ["hi", "idle"])
-    assert rover == palette.caste_colours("rover", ["idle"])
+    rover = palette.caste_colours(colours_of("rover-v1"), ["hi", "idle"])
+    assert rover == palette.caste_colours(colours_of("rover"), ["idle"])
     assert list(rover) == ["low", "med", "hi", "move", "idle", "non-specialized"]
     assert len(set(rover.values())) == 6
     for entry in WORLDS.values():
-        assert entry.short_name in palette.CASTES
+        assert set(colours_of(entry.name)) == set(entry.world_class.castes) - {"non-specialized"}
+    assert colours_of("light-v1") == {}

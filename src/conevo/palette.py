@@ -9,22 +9,19 @@ lightness; a method has the same one everywhere, whatever else is drawn with it.
 from __future__ import annotations
 
 import zlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
 from conevo.terms import NON_SPECIALIZED
 
 __all__ = [
-    "ACTIONS",
     "BLUE",
-    "CASTES",
     "FAINT",
     "GREEN",
     "GROUND",
     "INK",
     "METHODS",
     "MOVE",
-    "OBJECTS",
     "ORANGE",
     "PURPLE",
     "SKY",
@@ -113,45 +110,15 @@ def method_looks(names: Iterable[str]) -> dict[str, Look]:
     return looks
 
 
-# Choice: hue is the type of object, lightness what is done: detecting is light, gripping and
-# gathering are as light as the objects themselves, constructing is dark.
-OBJECTS = {"A": ORANGE, "B": SKY, "C": GREEN}
-_DETECT, _GRIP, _CONSTRUCT = 0.5, 0.0, -0.35
-_DRIVING = {"stop": MOVE, "forward": BLUE, "left": YELLOW, "right": SKY, "reverse": VERMILION}
-
-ACTIONS: dict[str, dict[str, str]] = {
-    # Choice: the shorter the range of a setting, and the more accurate, the darker its colour.
-    "rover": {"low": YELLOW, "med": SKY, "hi": BLUE, "move": MOVE},
-    "pursuit": _DRIVING,
-    "prey": _DRIVING,
-    "gacc": {
-        **{f"detect {kind}": shade(hue, _DETECT) for kind, hue in OBJECTS.items()},
-        "move": MOVE,
-        **{f"grip {kind}": shade(hue, _GRIP) for kind, hue in OBJECTS.items()},
-    },
-}
-"""World without version -> action -> colour."""
-
-CASTES: dict[str, dict[str, str]] = ACTIONS | {
-    "gacc": {
-        f"{kind}-{agent}": shade(hue, by)
-        for agent, by in (("detector", _DETECT), ("gatherer", _GRIP), ("constructor", _CONSTRUCT))
-        for kind, hue in OBJECTS.items()
-    }
-}
-"""World without version -> caste -> colour; a caste named like an action has its colour."""
-
-
-def caste_colours(world: str, names: Iterable[str]) -> dict[str, str]:
+def caste_colours(known: Mapping[str, str], names: Iterable[str]) -> dict[str, str]:
     """Return the colour of every caste: of the world's own in its order, then of others by name.
 
     The non-specialized are faint and come last.
 
     Args:
-        world: name, with or without a version.
+        known: colours of the world's own castes.
         names: castes that were seen.
     """
-    known = CASTES.get(world.rpartition("-v")[0] or world, {})
     others = sorted(set(names) - known.keys() - {NON_SPECIALIZED})
     free = [c for c in several(len(others) + len(known)) if c not in known.values()]
     return {**known, **dict(zip(others, free, strict=False)), NON_SPECIALIZED: FAINT}

@@ -114,7 +114,7 @@ def test_json_names_the_stage_of_every_generation(say) -> None:
     assert [stage["test"] for stage in lines[-1]["stages"]] == [
         run.test_result for run in shaping.stages
     ]
-    assert lines[-1]["prey"] is None
+    assert lines[-1]["product"] is None
 
 
 def test_json_of_a_resumed_shaping_goes_on_with_its_numbers(say, tmp_path: Path) -> None:

@@ -16,8 +16,8 @@ from conevo.playback.check import checked
 from conevo.playback.schema import Kind, Pool
 from conevo.playback.words import enumerated, number
 from conevo.replay.playback import playback_of
-from conevo.worlds.gacc import building
 from conevo.worlds.gacc import drawn as gacc
+from conevo.worlds.gacc import drawn_building as building
 from conevo.worlds.pursuit import drawn as pursuit
 from conevo.worlds.rover import drawn as rover
 from oracles.gacc_scene import octant
@@ -168,7 +168,7 @@ def test_colours_can_be_told_apart_by_everybody(vision):
     for stone in stones[:4]:
         assert min(closest([stone, robot], vision) for robot in rovers) > 17
     rims = [state.colour for state in gacc.LIFE if state.colour]
-    assert closest([*dict.fromkeys(rims), *palette.OBJECTS.values()], vision) > 11
+    assert closest([*dict.fromkeys(rims), *gacc.OBJECTS.values()], vision) > 11
     assert closest([look.line for look in palette.METHODS.values()], vision) > 15
     assert closest([look.area for look in palette.METHODS.values()], vision) > 9
     for kinds in (pursuit.EVENT_KINDS, building.EVENT_KINDS):

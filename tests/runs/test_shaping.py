@@ -21,9 +21,9 @@ from conevo.errors import EnvironmentFailure, UsageError
 from conevo.evolution.methods.registry import METHODS
 from conevo.rng import fold
 from conevo.runs.code import last_code
-from conevo.runs.evolved_prey import PREY_TASKS
 from conevo.runs.shaping import Shaping, start_shaping, tasks_up_to
 from conevo.worlds.pursuit import prey_sets
+from conevo.worlds.pursuit.evolved import TASKS as PREY_TASKS
 from runs.crashes import Crash, fail_at
 from runs.tiny import TINY, arrays, content, evolve_tiny, tiny_settings
 
@@ -429,8 +429,8 @@ def shape_prey(path: Path) -> Shaping:
 
 def test_the_six_prey_experiments_leave_a_prey_file(tmp_path: Path) -> None:
     shaping = shape_prey(tmp_path / "prey")
-    assert shaping.prey == shaping.path / "prey.npz"
-    found = prey_sets.load(shaping.prey)
+    assert shaping.product == shaping.path / "prey.npz"
+    found = prey_sets.load(shaping.product)
     third, sixth = shaping.stages[2].champion, shaping.stages[5].champion
     assert third is not None
     assert sixth is not None
@@ -445,9 +445,9 @@ def test_the_six_prey_experiments_leave_a_prey_file(tmp_path: Path) -> None:
     assert found.about["run_ids"] == [run.config.run_id for run in shaping.stages]
     assert found.about["numpy"] == np.__version__
     again = shape_prey(tmp_path / "again")
-    assert (again.path / "prey.npz").read_bytes() == shaping.prey.read_bytes()
-    world = conevo.world("pursuit/team-6", prey=str(shaping.prey))
-    assert world.params.prey_digest == prey_sets.load(shaping.prey).digest  # type: ignore[attr-defined]
+    assert (again.path / "prey.npz").read_bytes() == shaping.product.read_bytes()
+    world = conevo.world("pursuit/team-6", prey=str(shaping.product))
+    assert world.params.prey_digest == prey_sets.load(shaping.product).digest  # type: ignore[attr-defined]
     with pytest.raises(
         UsageError, match=r"stage-1: a team of \(2, .* cannot play prey-v1/shaping-1"
     ):
@@ -458,9 +458,9 @@ def test_a_kill_before_the_prey_file_is_written_is_not_noticed(tmp_path: Path) -
     path = tmp_path / "killed"
     killed_at(r"stage-6/DONE", "shape-prey", *command(path, PREY))
     shaping = Shaping(path)
-    assert (shaping.status, shaping.prey) == ("interrupted", None)
+    assert (shaping.status, shaping.product) == ("interrupted", None)
     shaping.resume(threads=1)
-    assert shaping.prey is not None
+    assert shaping.product is not None
     whole = shape_prey(tmp_path / "whole")
     one, two = (stages_content(p) for p in (path, whole.path))
     assert [one.pop("prey")[:2], two.pop("prey")[:2]] == [b"PK", b"PK"]  # they name other commands

@@ -23,6 +23,6 @@ def shape_prey(**options: Any) -> None:
 
     Try: conevo shape-prey --preset smoke
     """
-    from conevo.runs.evolved_prey import PREY_TASKS
+    from conevo.worlds.pursuit.evolved import TASKS
 
-    Order(**options).shape(PREY_TASKS)
+    Order(**options).shape(TASKS)

@@ -13,6 +13,7 @@ from conevo.runs.code import changes_text
 from conevo.runs.run import Run
 from conevo.runs.shaping import Shaping
 from conevo.terms import S_SCALE, counted, quoted
+from conevo.worlds.registry import product_of
 
 __all__ = ["print_shaping_end", "shaping_text", "span", "stage_summary", "stages_test_text"]
 
@@ -32,7 +33,7 @@ def print_shaping_end(shaping: Shaping, style: str) -> None:
             "shaping": str(shaping.path),
             "status": shaping.status,
             "stages": [stage_summary(run) for run in shaping.stages],
-            "prey": None if shaping.prey is None else str(shaping.prey),
+            "product": None if shaping.product is None else str(shaping.product),
         }
         click.echo(json.dumps(end))
     else:
@@ -146,7 +147,7 @@ def _next_commands(shaping: Shaping) -> list[str]:
     if len({run.champion.genes.shape for run in shaping.stages if run.champion}) == 1:
         every = f"conevo test {path} --stages"
         commands[every] = "test it in the environment of every stage"
-    if shaping.prey is not None:
-        pursuit = f"conevo run pursuit/team-3 --prey {quoted(shaping.prey)}"
-        commands[pursuit] = "set predators on the evolved prey"
+    if shaping.product is not None:
+        command, why = product_of(shaping.tasks).USE
+        commands[command.format(file=quoted(shaping.product))] = why
     return [line for command, what in commands.items() for line in (f"# {what}", command)]

@@ -27,8 +27,6 @@ from conevo.worlds.registry import inherited
 __all__ = ["record", "record_epoch"]
 
 Array = npt.NDArray[Any]
-# What a replay does not need of a scenario: what only kernels look at.
-_UNSEEN = ("seed", "cell", "clamp", "prey_in", "prey_out")
 
 
 def record(
@@ -135,7 +133,7 @@ def record_epoch(
     channels["hidden"] = Channel.of(hidden * has_network[:, None], bits=8)
     channels["outputs"] = Channel.of(_sigmoid(outputs) * has_network[:, None], bits=8)
     for name in vars(scenes):
-        if name not in _UNSEEN:
+        if name not in scenes.unseen:
             is_shared = simulator.is_shared(name)
             values = getattr(scenes, name)
             channels[f"scene/{name}"] = Channel.of(values if is_shared else values[0])
@@ -196,8 +194,9 @@ def _sigmoid(sums: Array) -> npt.NDArray[np.float64]:
 
 
 def _params(world: World) -> dict[str, Any]:
-    """Return the parameters of a world; a prey file by its digest, not by where it lies."""
+    """Return the parameters of a world; a file by its digest, not by where it lies."""
     found = asdict(world.params)
-    if found.get("prey_digest"):
-        found["prey"] = "file"
+    for name in found:
+        if found.get(f"{name}_digest"):
+            found[name] = "file"
     return found

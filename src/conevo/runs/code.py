@@ -40,7 +40,10 @@ DECIDING = (
     "runs/session.py",
     "runs/testing.py",
 )
-"""Files and folders of the package. A world in a file of its own has a digest of its own."""
+"""Files and folders of the package, but for what worlds only draw (``drawn*.py``).
+
+A world in a file of its own has a digest of its own.
+"""
 
 MAKING = ("numpy", "warp", "device")  # what else makes results, and is shown if it changed
 Record = Mapping[str, Any]
@@ -60,6 +63,8 @@ def code_digest() -> str:
     for name in DECIDING:
         path = package / name
         for file in sorted(path.rglob("*.py")) if path.is_dir() else [path]:
+            if file.name.startswith("drawn"):
+                continue
             text = file.read_bytes().replace(b"\r\n", b"\n")
             found.update(f"{file.relative_to(package).as_posix()} {len(text)}\n".encode() + text)
     return found.hexdigest()

@@ -7,7 +7,7 @@ Nitschke 2009, sections 4.3 (prey) and 6.4.2 (construction)::
     stage-1/ ...    the runs, each as any other; a stage appears when the one before is sealed
     generations.jsonl   every generation of all stages with the environment that it saw; written
                     when a stage is sealed
-    prey.npz        the evolved prey, if the stages are the six experiments that shape prey
+    prey.npz        what the world makes of these stages, if it does: here evolved prey
     DONE            the seal of a finished shaping: digests of all files
     lock            held (flock) by the process that is at work here
 """
@@ -29,11 +29,11 @@ from conevo.reading import check, read_bytes, read_toml
 from conevo.runs.code import last_code, refuse_other_code, sessions_of
 from conevo.runs.directory import CONFIG, SHAPING, Directory, appearing, refuse_existing
 from conevo.runs.durable import is_there, replace_file
-from conevo.runs.evolved_prey import PREY, PREY_TASKS, refuse_other_prey, save_prey
 from conevo.runs.outline import Outline, identify, outline_of
 from conevo.runs.run import RUNS, Record, Run, Watch, start
 from conevo.runs.time_limit import TimeLimit
 from conevo.terms import quoted
+from conevo.worlds.registry import product_of
 
 if TYPE_CHECKING:
     from conevo.evolution.protocol import State
@@ -104,8 +104,8 @@ def start_shaping(
     configs = [resolve(task, method, preset, seed, config, overrides, place) for task in tasks]
     path = Path(out) if out is not None else RUNS / label(configs)
     refuse_existing(path)
-    if tuple(stage.task for stage in configs) == PREY_TASKS:
-        refuse_other_prey(configs)
+    if makes := product_of([stage.task for stage in configs]):
+        makes.refuse(configs)
     state: State | None = None
     for before, stage in zip([configs[0], *configs], configs, strict=False):
         state = Lab.equip(stage, threads, device).first_state(state)
@@ -247,10 +247,10 @@ class Shaping:
         ]
 
     @property
-    def prey(self) -> Path | None:
-        """The file with the evolved prey of a finished shaping, None if it makes none."""
-        has_prey = self._directory.is_finished and tuple(self.tasks) == PREY_TASKS
-        return self.path / PREY if has_prey else None
+    def product(self) -> Path | None:
+        """The file that a finished shaping of these tasks has made, None if it makes none."""
+        makes = product_of(self.tasks) if self._directory.is_finished else None
+        return self.path / makes.FILE if makes else None
 
     @property
     def changed_files(self) -> list[str]:
@@ -336,8 +336,8 @@ class Shaping:
                 if run.status != "finished":
                     return self
                 self._write_generations()
-            if tuple(self.tasks) == PREY_TASKS:
-                save_prey(self.stages, self.path / PREY)
+            if makes := product_of(self.tasks):
+                makes.save(self.stages, self.path / makes.FILE)
             self._directory.seal()
         return self
 

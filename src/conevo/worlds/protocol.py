@@ -49,10 +49,12 @@ class Scenarios:
     """E scenarios of a world, each drawn from a key.
 
     A world adds an array for each further field of its scene: [E, ...], or of any shape if all
-    scenarios share it. seed [E] uint64: of what is random while a scenario is played.
+    scenarios share it. seed [E] uint64: of what is random while a scenario is played. unseen:
+    arrays that only kernels need, which recordings leave out.
     """
 
     seed: npt.NDArray[np.uint64]
+    unseen: ClassVar[tuple[str, ...]] = ("seed",)
 
     def __len__(self) -> int:
         """Return the number of scenarios."""

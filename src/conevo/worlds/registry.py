@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from importlib import import_module
 from pathlib import Path
@@ -13,7 +14,7 @@ from conevo.worlds.measures import measures_of
 if TYPE_CHECKING:
     from conevo.worlds.protocol import World
 
-__all__ = ["WORLDS", "WorldEntry", "inherited", "resolve", "world"]
+__all__ = ["WORLDS", "WorldEntry", "colours_of", "inherited", "product_of", "resolve", "world"]
 
 
 @dataclass(frozen=True)
@@ -22,10 +23,11 @@ class WorldEntry:
 
     ``module`` holds the classes named ``params_name`` (parameters) and ``world_name`` (built from
     an environment name and parameters). ``drawn`` is the module whose ``playback`` tells what is to
-    be drawn of an epoch, without Warp; without it, what the world's class says in its own ``drawn``
-    is (``playback.drawn``). An entry in a file outside the package leaves it out;
-    ``worlds.outside`` fills it in, with the file's path, ``files`` (this one first, then the files
-    next to it that it imports) and the digest of their texts.
+    be drawn of an epoch, without Warp, and ``CASTES`` the colours of its castes; without it, what
+    the world's class says in its own ``drawn`` is (``playback.drawn``). ``product`` is the module
+    that makes a file of a finished shaping in all of its ``TASKS``. An entry in a file outside the
+    package leaves it out; ``worlds.outside`` fills it in, with the file's path, ``files`` (this one
+    first, then the files next to it that it imports) and the digest of their texts.
     """
 
     name: str
@@ -37,6 +39,7 @@ class WorldEntry:
     world_name: str
     module: str = ""
     drawn: str = ""
+    product: str = ""
     file: str = ""
     files: tuple[str, ...] = ()
     digest: str = ""
@@ -116,6 +119,7 @@ WORLDS: dict[str, WorldEntry] = {
             environments=tuple(f"shaping-{n}" for n in range(1, 7)),
             module="conevo.worlds.pursuit.prey",
             drawn="conevo.worlds.pursuit.drawn",
+            product="conevo.worlds.pursuit.evolved",
             params_name="PreyParams",
             world_name="PreyWorld",
         ),
@@ -179,6 +183,25 @@ def _named(name: str) -> WorldEntry:
     if entry is None:
         raise unknown_name("world", name, [*newest, *WORLDS])
     return entry
+
+
+def colours_of(world: str) -> dict[str, str]:
+    """Return the colours of a world's castes by its name; none of a world elsewhere."""
+    entry = WORLDS.get(world) or next((e for e in WORLDS.values() if e.short_name == world), None)
+    if entry is None or not entry.drawn:
+        return {}
+    return dict(import_module(entry.drawn).CASTES)
+
+
+def product_of(tasks: Sequence[str]) -> Any:
+    """Return the module that makes a file of a shaping in these tasks, None if there is none.
+
+    Its ``FILE`` is the file's name, ``refuse`` raises UsageError at configurations it cannot use,
+    ``save`` writes the file from the finished stages, and ``USE`` is a command with it, and why.
+    """
+    entry = WORLDS.get(tasks[0].partition("/")[0]) if tasks else None
+    module = import_module(entry.product) if entry is not None and entry.product else None
+    return module if module is not None and tuple(tasks) == module.TASKS else None
 
 
 def inherited(world: World) -> str:

@@ -17,6 +17,7 @@ from conevo.analysis.sections.arrangement import Arrangement
 from conevo.analysis.sections.scope import KEYS, Scope, sizes
 from conevo.palette import caste_colours
 from conevo.terms import NON_SPECIALIZED, S_SCALE
+from conevo.worlds.registry import colours_of
 
 __all__ = ["castes"]
 
@@ -60,7 +61,7 @@ def _over_generations(
         if math.isfinite(share)
     ]
     size = sizes(len(scope.cells.get(cell, ())) for cell in found)
-    colours = caste_colours(scope.group.world, histories.castes)
+    colours = caste_colours(colours_of(scope.group.world), histories.castes)
     return Figure(
         f"{scope.stem}-castes",
         "Castes of the fittest team over the generations",

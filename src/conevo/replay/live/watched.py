@@ -19,6 +19,7 @@ from conevo.replay.live.files import readable
 from conevo.replay.live.groups import Experiment, Group, Names, Runs, children
 from conevo.replay.live.runs import Subject
 from conevo.runs.directory import kind_of
+from conevo.worlds.registry import colours_of
 
 __all__ = ["FORMAT", "Watched"]
 
@@ -156,4 +157,4 @@ def _castes(runs: Iterable[Mapping[str, Any]]) -> dict[str, dict[str, str]]:
     seen: dict[str, set[str]] = {}
     for run in runs:
         seen.setdefault(run["task"].partition("/")[0], set()).update(run["castes"])
-    return {world: caste_colours(world, names) for world, names in seen.items()}
+    return {world: caste_colours(colours_of(world), names) for world, names in seen.items()}

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 
-from conevo import palette
-from conevo.palette import BLUE, FAINT, INK, VERMILION
+from conevo.palette import BLUE, FAINT, GREEN, INK, MOVE, ORANGE, SKY, VERMILION, shade
 from conevo.playback.channel import Channel
 from conevo.playback.parts import Parts, begun, columns, octants
 from conevo.playback.schema import (
@@ -20,12 +19,25 @@ from conevo.playback.schema import (
     SensorGroup,
     Things,
 )
-from conevo.worlds.gacc.building import EVENT_KINDS, Building
+from conevo.worlds.gacc.drawn_building import EVENT_KINDS, Building
 from conevo.worlds.gacc.plans import TYPES, plan
 
-__all__ = ["playback"]
+__all__ = ["CASTES", "playback"]
 
-ACTIONS, CASTES = palette.ACTIONS["gacc"], palette.CASTES["gacc"]
+# Choice: hue is the type of object, lightness what is done: detecting is light, gripping and
+# gathering are as light as the objects themselves, constructing is dark.
+OBJECTS = {"A": ORANGE, "B": SKY, "C": GREEN}
+_DETECT, _GRIP, _CONSTRUCT = 0.5, 0.0, -0.35
+ACTIONS = {
+    **{f"detect {kind}": shade(hue, _DETECT) for kind, hue in OBJECTS.items()},
+    "move": MOVE,
+    **{f"grip {kind}": shade(hue, _GRIP) for kind, hue in OBJECTS.items()},
+}
+CASTES = {
+    f"{kind}-{agent}": shade(hue, by)
+    for agent, by in (("detector", _DETECT), ("gatherer", _GRIP), ("constructor", _CONSTRUCT))
+    for kind, hue in OBJECTS.items()
+}
 OUTPUTS = (
     *(f"detect {kind}" for kind in TYPES),
     *("move: dx", "move: dy"),
@@ -88,7 +100,7 @@ def _objects(parts: Parts) -> Things:
     k = kind.codes.size
     return Things(
         "objects",
-        tuple(Kind(f"object {n}", colour) for n, colour in palette.OBJECTS.items()),
+        tuple(Kind(f"object {n}", colour) for n, colour in OBJECTS.items()),
         kind,
         parts.channel("object_x", parts.t, k),
         parts.channel("object_y", parts.t, k),
@@ -122,7 +134,7 @@ def _demand(parts: Parts) -> tuple[Gauge, ...]:
     """Return the demand for each type, which is at most 1."""
     demand = parts.channel("demand", parts.t, len(TYPES))
     return tuple(
-        Gauge(f"demand {kind}", values, 1.0, palette.OBJECTS[kind])
+        Gauge(f"demand {kind}", values, 1.0, OBJECTS[kind])
         for kind, values in zip(TYPES, columns(demand), strict=True)
     )
 

@@ -6,7 +6,7 @@ Nitschke 2009, sections 4.1 to 4.3, table 4.1. Shared by ``pursuit.world`` and `
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -70,6 +70,7 @@ class ArenaScenarios(Scenarios):
     NaN where free.
     """
 
+    unseen: ClassVar[tuple[str, ...]] = ("seed", "clamp", "prey_in", "prey_out")
     x: npt.NDArray[np.float32]
     y: npt.NDArray[np.float32]
     heading: npt.NDArray[np.float32]

@@ -7,8 +7,18 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from conevo import palette
-from conevo.palette import FAINT, GREEN, GROUND, INK, shade
+from conevo.palette import (
+    BLUE,
+    FAINT,
+    GREEN,
+    GROUND,
+    INK,
+    MOVE,
+    SKY,
+    VERMILION,
+    YELLOW,
+    shade,
+)
 from conevo.playback.channel import Channel
 from conevo.playback.parts import Parts, begun
 from conevo.playback.schema import (
@@ -25,9 +35,10 @@ from conevo.playback.schema import (
 from conevo.playback.words import enumerated
 from conevo.terms import counted
 
-__all__ = ["playback"]
+__all__ = ["CASTES", "playback"]
 
-ACTIONS = palette.ACTIONS["pursuit"]
+ACTIONS = {"stop": MOVE, "forward": BLUE, "left": YELLOW, "right": SKY, "reverse": VERMILION}
+CASTES = ACTIONS
 RADIUS = 2.75  # of a Khepera and of an obstacle, cm; as in kernels.khepera, like the next
 LOOK = (10, 45, 90, 180, -180, -90, -45, -10)  # directions of the sensors, degrees
 SECONDS = 0.1  # of an iteration
@@ -52,7 +63,7 @@ def playback(parts: Parts) -> Playback:
     captured = None if is_prey else parts.index("captured", 2, t, n - r)
     ranges = "infrared range" if is_prey else "infrared and light range"
     return Playback(
-        **begun(parts, ACTIONS, ACTIONS, ("left wheel", "right wheel")),
+        **begun(parts, ACTIONS, CASTES, ("left wheel", "right wheel")),
         unit="cm",
         seconds=SECONDS,
         bounds=(0.0, 0.0, side, side),

@@ -6,17 +6,18 @@ from collections import Counter
 
 import numpy as np
 
-from conevo import palette
-from conevo.palette import INK
+from conevo.palette import BLUE, INK, MOVE, SKY, YELLOW
 from conevo.playback.channel import Channel
 from conevo.playback.parts import Parts, begun, octants
 from conevo.playback.schema import Backdrop, BodyKind, Curve, Event, Kind, Playback, Ring, Things
 from conevo.playback.words import enumerated
 from conevo.worlds.rover import rocks
 
-__all__ = ["playback"]
+__all__ = ["CASTES", "playback"]
 
-ACTIONS = palette.ACTIONS["rover"]
+# Choice: the shorter the range of a setting, and the more accurate, the darker its colour.
+ACTIONS = {"low": YELLOW, "med": SKY, "hi": BLUE, "move": MOVE}
+CASTES = ACTIONS
 OUTPUTS = ("low", "med", "hi", "move: dx", "move: dy")
 # Choice: all rocks are red, as they are called, and the darker the more they are worth; type E,
 # which is never with others, looks like A, which is worth the same.
@@ -33,7 +34,7 @@ def playback(parts: Parts) -> Playback:
     ranges = tuple(parts.param(f"{name}_range") for name in ("low", "med", "hi"))
     near = parts.param("rover_sensor_range")
     return Playback(
-        **begun(parts, ACTIONS, ACTIONS, OUTPUTS),
+        **begun(parts, ACTIONS, CASTES, OUTPUTS),
         unit="sides",
         seconds=0.0,
         bounds=(0.0, 0.0, 1.0, 1.0),

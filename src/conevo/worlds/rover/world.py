@@ -140,6 +140,7 @@ class RoverScenarios(Scenarios):
     start_x, start_y [E, R] float32; lander [E, 2] float32.
     """
 
+    unseen: ClassVar[tuple[str, ...]] = ("seed", "cell")
     rock_x: npt.NDArray[np.float32]
     rock_y: npt.NDArray[np.float32]
     rock_value: npt.NDArray[np.float32]

@@ -8,25 +8,26 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from conevo.errors import UsageError
+from conevo.worlds.pursuit import prey_sets
 
-if TYPE_CHECKING:
-    from conevo.runs.config import RunConfig
-    from conevo.runs.run import Run
+__all__ = ["FILE", "TASKS", "USE", "refuse", "save"]
 
-__all__ = ["PREY", "PREY_TASKS", "refuse_other_prey", "save_prey"]
-
-PREY = "prey.npz"
-PREY_TASKS = tuple(f"prey-v1/shaping-{number}" for number in range(1, 7))
+FILE = "prey.npz"
+USE = ("conevo run pursuit/team-3 --prey {file}", "set predators on the evolved prey")
+TASKS = tuple(f"prey-v1/shaping-{number}" for number in range(1, 7))
 
 
-def refuse_other_prey(stages: Sequence[RunConfig]) -> None:
-    """Raise UsageError unless the prey are networks such as a prey file holds."""
-    from conevo.worlds.pursuit.prey_sets import WEIGHT_SCALE
-
-    right = {"name": "srn", "recurrent": False, "bias": False, "weight_scale": WEIGHT_SCALE}
+def refuse(stages: Sequence[Any]) -> None:
+    """Raise UsageError unless the stages' configurations are of networks such as the file holds."""
+    right = {
+        "name": "srn",
+        "recurrent": False,
+        "bias": False,
+        "weight_scale": prey_sets.WEIGHT_SCALE,
+    }
     for stage in stages:
         table = stage.tables()["controller"]
         for key, value in right.items():
@@ -37,14 +38,12 @@ def refuse_other_prey(stages: Sequence[RunConfig]) -> None:
                 )
 
 
-def save_prey(stages: Sequence[Run], path: Path) -> None:
-    """Write the evolved prey of six finished stages.
+def save(stages: Sequence[Any], path: Path) -> None:
+    """Write the evolved prey of six finished stages, which are runs.
 
     The file says what made it, but neither when nor on which machine, so that the same command
     writes the same bytes.
     """
-    from conevo.worlds.pursuit.prey_sets import PreySet, save
-
     one, two = (stages[k].champion for k in (2, 5))
     if one is None or two is None:
         raise RuntimeError("a stage is not finished")
@@ -58,11 +57,11 @@ def save_prey(stages: Sequence[Run], path: Path) -> None:
         "generations": [one.generation, two.generation],
     }
     about |= {key: made_with[key] for key in ("conevo", "python", "numpy", "warp", "kernel_hash")}
-    prey = PreySet(
+    prey = prey_sets.PreySet(
         one=one.genes,
         one_active=one.active,
         two=two.genes,
         two_active=two.active,
         about=about,
     )
-    save(path, prey)
+    prey_sets.save(path, prey)
