@@ -334,6 +334,6 @@ def test_a_run_without_a_team_and_one_of_other_kernels_are_refused(
     config = resolve("rover/complex-1", "cone", "smoke", 1, None, settings)
     with pytest.raises(UsageError, match="no finished generation yet"):
         study(start(config, tmp_path / "run", threads=1))
-    monkeypatch.setattr(Rollout, "kernel_hash", "another")
+    monkeypatch.setattr(Rollout, "fingerprint", "another")
     with pytest.raises(UsageError, match="other kernels"):
         study(runs["rover/complex-5"])
