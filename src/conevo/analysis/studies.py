@@ -2,43 +2,37 @@
 
 Nitschke 2009, sections 4.6.4 to 4.6.6, 5.5.2 to 5.5.4, 6.5.4 and 6.5.5. One study holds it all as
 plain data: each robot's caste, S and fitness, measures of the team's specialization, caste lesions
-and teams of clones scenario by scenario, and what predators are seen to do.
+and teams of clones scenario by scenario, and what robots are seen to do where their world has more
+than actions to see (``analysis.observed``).
 
 - Choice: castes are told in the scenarios of the testing phase, lesions and clones are played in
   others, and all teams of a comparison meet the same ones: so that no caste is told by the luck
   it is judged by.
 - Choice: the fittest robot of a caste is the one with the highest private fitness in the scenarios
   that the castes were told in, of the run's own fittest team (5.5.4 takes it from CONE's).
-- Choice: predators begin clones' scenarios close together around the prey (4.6.5), all teams in the
-  same places; at random if obstacles are in the way or they see less far than they are wide.
 - A score that is not a finite number is left out, as in the testing phase; a fitness is None.
 """
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from conevo.analysis.behaviours import BEHAVIOURS
-from conevo.analysis.captures import most_frequent
 from conevo.analysis.fittest import equip
 from conevo.analysis.lesions import Compared, clone, lesion
-from conevo.analysis.pursuit import Observation, watch
-from conevo.analysis.reproduction import place_together
-from conevo.rng import fold, stream
+from conevo.analysis.observed import Observed, observed
+from conevo.rng import fold
 from conevo.runs.champions import Team
 from conevo.runs.evaluation import describe
 from conevo.runs.lab import Lab
 from conevo.runs.run import Run
 from conevo.specialization.individual import NON_SPECIALIZED
 from conevo.specialization.team import Activity, measure
-from conevo.worlds.protocol import Outcome, Scenarios
-from conevo.worlds.pursuit.world import PursuitWorld
+from conevo.worlds.protocol import Outcome
 
 __all__ = ["study"]
 
@@ -70,7 +64,7 @@ class _Portrait:
 def study(run: Run, scenarios: int = 20, *, threads: int | None = None) -> dict[str, Any]:
     """Study the fittest team of a run in fresh scenarios; writes nothing.
 
-    The castes of predators are their individual behaviours, and only the specialized ones are
+    Where a world observes behaviours, these are the castes, and only the specialized ones are
     replaced or cloned (table 4.5, figure 4.12); in other worlds the non-specialized are a caste.
 
     Args:
@@ -83,7 +77,7 @@ def study(run: Run, scenarios: int = 20, *, threads: int | None = None) -> dict[
         "clones", teams "whole" and castes; the testing phase is the run's own (``test_result``).
         robots: robot, caste, specialization (S), fitness, hidden. actions: robot, action (of
         ``World.castes``), count. metrics: those of ``specialization.team``, by what castes are told
-        by. behaviours (predators only): kind, behaviour, count; for the kind "team" its most
+        by. behaviours (if observed): kind, behaviour, count; for the kind "team" its most
         frequent collective behaviour, and all its captures.
 
     Raises:
@@ -93,13 +87,12 @@ def study(run: Run, scenarios: int = 20, *, threads: int | None = None) -> dict[
     seed = run.config.run.seed
     fresh = lab.world.scenarios([fold(seed, "test", k) for k in range(scenarios)])
     outcome = lab.simulator.evaluate(*team.as_trial(), fresh)
-    seen = None
-    if isinstance(lab.world, PursuitWorld):
-        seen = watch(team, lab, scenarios, seed, threads=threads)
+    seen = observed(team, lab, scenarios, seed, threads)
     portrait = _portray(lab, outcome, seen)
     altered = portrait.castes
     if seen is not None:
         altered = [caste for caste in altered if caste != NON_SPECIALIZED]
+    clones = [fold(seed, "clones", k) for k in range(scenarios)]
     others = lab.world.scenarios([fold(seed, "lesion", k) for k in range(scenarios)])
     lesioned = lesion(lab.simulator, team, portrait.labels, altered, others)
     cloned = clone(
@@ -108,29 +101,23 @@ def study(run: Run, scenarios: int = 20, *, threads: int | None = None) -> dict[
         portrait.labels,
         portrait.fitness,
         [caste for caste in altered if caste not in NOT_CLONED],
-        _clones_scenarios(lab, seen, seed, scenarios),
+        seen.together(clones) if seen is not None else lab.world.scenarios(clones),
     )
     return {
         "scores": _rows("lesion", lesioned) + _rows("clones", cloned),
         "robots": _robots(team, portrait),
         "actions": _actions(lab, outcome),
         "metrics": measure(portrait.activity),
-        "behaviours": [] if seen is None else _behaviours(seen),
+        "behaviours": [] if seen is None else seen.behaviours,
     }
 
 
-def _portray(lab: Lab, outcome: Outcome, seen: Observation | None) -> _Portrait:
+def _portray(lab: Lab, outcome: Outcome, seen: Observed | None) -> _Portrait:
     if seen is None:
         found, order = describe(outcome, lab.world.castes), lab.world.castes
         activity = Activity(_counts(outcome), np.array(found.specialization), found.labels)
     else:
-        lives, order = seen.lifetimes, BEHAVIOURS
-        windows = [[share * life.windows for share in life.shares.values()] for life in lives]
-        activity = Activity(
-            np.rint(windows),
-            np.array([life.specialization for life in lives]),
-            [life.label for life in lives],
-        )
+        activity, order = seen.activity, seen.castes
     named = [name for name in order if name in activity.labels and name != NON_SPECIALIZED]
     return _Portrait(
         activity=activity,
@@ -143,24 +130,6 @@ def _counts(outcome: Outcome) -> npt.NDArray[np.int64]:
     """Return how often each robot of the only team executed what, in all scenarios [R, C]."""
     counts: npt.NDArray[np.int64] = outcome.counts[0].astype(np.int64).sum(axis=0)
     return counts
-
-
-def _clones_scenarios(lab: Lab, seen: Observation | None, seed: int, n: int) -> Scenarios:
-    keys = [fold(seed, "clones", k) for k in range(n)]
-    if seen is None or not _fits_together(seen):
-        return lab.world.scenarios(keys)
-    roles = [""] * seen.world.n_robots
-    poses = np.stack(
-        [place_together(stream(key, "places"), seen, roles, at_wall=False) for key in keys]
-    )
-    x, y, heading = (np.ascontiguousarray(poses[..., k]) for k in range(3))
-    return replace(seen.world.scenarios(keys), x=x, y=y, heading=heading)
-
-
-def _fits_together(seen: Observation) -> bool:
-    """Whether all predators find room in sight of one prey."""
-    sees_enough = seen.setting.range_cm >= 2 * seen.setting.radius_cm
-    return sees_enough and not seen.world.params.n_obstacles
 
 
 def _rows(study: str, compared: Compared) -> list[Row]:
@@ -198,15 +167,3 @@ def _actions(lab: Lab, outcome: Outcome) -> list[Row]:
         for robot, executed in enumerate(_counts(outcome))
         for action, count in zip(lab.world.castes, executed, strict=True)
     ]
-
-
-def _behaviours(seen: Observation) -> list[Row]:
-    """Return how many predators are labelled so, and how many captures are of each kind."""
-    labels = Counter(life.label for life in seen.lifetimes)
-    usual, captures = most_frequent(seen.all_captures)
-    counts = [
-        *(("individual", name, labels[name]) for name in (*BEHAVIOURS, NON_SPECIALIZED)),
-        *(("collective", name, n) for name, n in captures.items()),
-        ("team", usual, len(seen.all_captures)),
-    ]
-    return [{"kind": kind, "behaviour": name, "count": n} for kind, name, n in counts]

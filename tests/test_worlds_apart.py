@@ -1,0 +1,60 @@
+"""No file outside ``worlds/`` names a world in its code, but for those listed here."""
+
+import ast
+import re
+from pathlib import Path
+
+import conevo
+
+SOURCE = Path(conevo.__file__).parent
+WORLDS = re.compile(r"rover|pursuit|gacc|prey|predator", re.IGNORECASE)
+
+# Claims are a registry of what the thesis says of its worlds.
+FOLDERS = ("worlds/", "analysis/claims/")
+ALLOWED = {
+    # The study that the pursuit world names as what it observes, and its own command.
+    "analysis/behaviour_report.py": "conevo behaviours",
+    "analysis/behaviours.py": "rules of predators' behaviours",
+    "analysis/captures.py": "rules of captures",
+    "analysis/predators.py": "what the pursuit world observes",
+    "analysis/pursuit.py": "recordings of predators",
+    "analysis/pursuit_tables.py": "tables of the thesis' chapter on pursuit",
+    "analysis/reproduction.py": "behaviours reproduced",
+    "analysis/sections/behaviours.py": "words of their section in a report",
+    "analysis/sensors.py": "what predators sense meanwhile",
+    "cli/behaviours.py": "words of the command",
+    # The command line: a command, an option and examples of what to type.
+    "cli/main.py": "its table of commands has shape-prey",
+    "cli/run.py": "its option --prey",
+    "cli/settings_text.py": "the task whose sizes are listed unless another is named",
+    "cli/shape_prey.py": "the command shape-prey",
+    "cli/listing.py": "a hint",
+    "runs/config.py": "a hint",
+}
+
+
+def names_a_world(path: Path) -> bool:
+    """Whether a name or a text in a file's code, docstrings and comments aside, is of a world."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    prose = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in prose:
+            said = [node.value]
+        elif isinstance(node, ast.ImportFrom):
+            said = [node.module or "", *(one.name for one in node.names)]
+        else:
+            said = [getattr(node, key, None) for key in ("id", "attr", "arg", "name")]
+        if any(isinstance(text, str) and WORLDS.search(text) for text in said):
+            return True
+    return False
+
+
+def test_only_listed_files_name_a_world() -> None:
+    naming = {
+        name
+        for path in sorted(SOURCE.rglob("*.py"))
+        if not (name := path.relative_to(SOURCE).as_posix()).startswith(FOLDERS)
+        and names_a_world(path)
+    }
+    assert naming - ALLOWED.keys() == set()
+    assert ALLOWED.keys() - naming == set()  # a file that names none any more leaves the list
