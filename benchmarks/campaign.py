@@ -13,7 +13,8 @@ import time
 from pathlib import Path
 
 from conevo.campaigns.campaign import create
-from conevo.campaigns.executors import EXECUTORS, make_executor, usable_cores
+from conevo.campaigns.executors.registry import EXECUTORS, make_executor
+from conevo.campaigns.executors.worker import usable_cores
 from conevo.campaigns.plan import Plan
 from machine import machine, table
 

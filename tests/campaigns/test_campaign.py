@@ -8,7 +8,8 @@ import pytest
 
 from campaigns.plans import tiny_campaign, write_plan
 from conevo.campaigns.campaign import ATTEMPTS, Campaign, Stopped, create
-from conevo.campaigns.executors import Ending, Job, Serial
+from conevo.campaigns.executors.local import Serial
+from conevo.campaigns.executors.protocol import Ending, Job
 from conevo.campaigns.plan_file import read_plan
 from conevo.campaigns.work import carry_out
 from conevo.errors import EnvironmentFailure, UsageError

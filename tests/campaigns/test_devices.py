@@ -11,7 +11,9 @@ import conevo
 from campaigns.plans import tiny_campaign
 from conevo.campaigns import devices, slurm, work
 from conevo.campaigns.devices import next_device, parse_devices
-from conevo.campaigns.executors import Ending, Job, make_executor, worker_command
+from conevo.campaigns.executors.protocol import Ending, Job
+from conevo.campaigns.executors.registry import make_executor
+from conevo.campaigns.executors.worker import worker_command
 from conevo.cli.main import main
 from conevo.errors import EnvironmentFailure, UsageError
 
@@ -202,7 +204,7 @@ def ray_with(monkeypatch):
 
     def make(gpus):
         fake = FakeRay(gpus)
-        monkeypatch.setattr("conevo.campaigns.executors_ray.import_module", lambda _: fake)
+        monkeypatch.setattr("conevo.campaigns.executors.ray.import_module", lambda _: fake)
         return fake
 
     return make

@@ -13,8 +13,9 @@ import pytest
 import conevo
 from campaigns.plans import tiny_campaign
 from campaigns.processes import n_generations, until, workers
-from conevo.campaigns.executors import Job, make_executor
-from conevo.campaigns.executors_ray import RayCluster
+from conevo.campaigns.executors.protocol import Job
+from conevo.campaigns.executors.ray import RayCluster
+from conevo.campaigns.executors.registry import make_executor
 from conevo.errors import EnvironmentFailure
 
 pytest.importorskip("ray")
@@ -174,7 +175,7 @@ def test_ray_begins_nothing_that_calls_home_and_no_page():
 def test_what_is_missing_is_said_in_one_line(tmp_path):
     code = (
         "import sys; sys.modules['ray'] = None\n"
-        "from conevo.campaigns.executors import make_executor\n"
+        "from conevo.campaigns.executors.registry import make_executor\n"
         "from conevo.errors import UsageError\n"
         "try:\n    make_executor('ray')\nexcept UsageError as error:\n    sys.exit(str(error))\n"
     )

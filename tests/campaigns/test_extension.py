@@ -13,7 +13,7 @@ import pytest
 from campaigns.plans import tiny_campaign
 from campaigns.test_campaign import Scripted
 from conevo.campaigns.campaign import Campaign, Stopped, create
-from conevo.campaigns.executors import Serial
+from conevo.campaigns.executors.local import Serial
 from conevo.campaigns.work import carry_out
 from conevo.errors import UsageError
 from conevo.runs.run import Run

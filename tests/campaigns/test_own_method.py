@@ -10,7 +10,7 @@ import pytest
 
 from campaigns.plans import write_plan
 from conevo.campaigns.campaign import Campaign, create
-from conevo.campaigns.executors import make_executor
+from conevo.campaigns.executors.registry import make_executor
 from conevo.campaigns.plan_file import read_plan
 from conevo.cli.main import main
 from conevo.errors import UsageError

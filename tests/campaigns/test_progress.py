@@ -8,7 +8,7 @@ import pytest
 
 import conevo
 from campaigns.plans import tiny_campaign
-from conevo.campaigns.executors import make_executor
+from conevo.campaigns.executors.registry import make_executor
 from conevo.campaigns.progress import Progress, last_written, progress_of
 from conevo.campaigns.work import carry_out
 from conevo.runs.directory import Directory

@@ -11,7 +11,7 @@ import conevo
 from campaigns.plans import tiny_campaign
 from campaigns.processes import n_generations, until, workers
 from conevo.campaigns import slurm
-from conevo.campaigns.executors import make_executor
+from conevo.campaigns.executors.registry import make_executor
 from conevo.errors import UsageError
 
 

@@ -11,7 +11,7 @@ from conevo.analysis.frames import SCHEMA, Tables
 from conevo.analysis.report import write_report
 from conevo.analysis.sections.overview import read_campaign
 from conevo.campaigns.campaign import Campaign
-from conevo.campaigns.executors import Serial
+from conevo.campaigns.executors.local import Serial
 from conevo.campaigns.places import Places
 from conevo.campaigns.tables import seal_tables
 from conevo.runs.directory import read_json

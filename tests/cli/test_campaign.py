@@ -250,7 +250,7 @@ def test_a_wrong_word_is_one_clear_line_and_nothing_is_written(conevo, tmp_path,
 
 
 def test_an_interrupted_campaign_says_how_to_go_on(conevo, tmp_path, monkeypatch):
-    from conevo.campaigns.executors import Serial
+    from conevo.campaigns.executors.local import Serial
 
     tiny_campaign(tmp_path / "campaigns")
 

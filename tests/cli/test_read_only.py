@@ -8,7 +8,7 @@ import sys
 import pytest
 
 from campaigns.plans import tiny_campaign
-from conevo.campaigns.executors import make_executor
+from conevo.campaigns.executors.registry import make_executor
 
 MOUNT = "mount --bind {0} {0} && mount -o remount,ro,bind {0} && "
 

@@ -18,7 +18,8 @@ import pytest
 import conevo
 from campaigns.processes import n_generations, until, workers
 from conevo.campaigns.campaign import create
-from conevo.campaigns.executors import EXECUTORS, Job, make_executor
+from conevo.campaigns.executors.protocol import Job
+from conevo.campaigns.executors.registry import EXECUTORS, make_executor
 from conevo.campaigns.plan_file import read_plan
 from conevo.runs.directory import read_json
 
@@ -103,7 +104,7 @@ def coordinate(campaign, name):
     """Begin a process that carries a campaign on, one core for all."""
     code = (
         "from conevo.campaigns.campaign import Campaign\n"
-        "from conevo.campaigns.executors import make_executor\n"
+        "from conevo.campaigns.executors.registry import make_executor\n"
         f"Campaign({str(campaign.path)!r}).carry_on(make_executor({name!r}, 1))\n"
     )
     begun = subprocess.Popen(

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import conevo
 from campaigns.plans import tiny_campaign, write_plan
-from conevo.campaigns.executors import Serial
+from conevo.campaigns.executors.local import Serial
 from conevo.replay.recording import record
 from conevo.runs.shaping import start_shaping
 from runs.tiny import TASK, evolve_tiny, tiny_settings

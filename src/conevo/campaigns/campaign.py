@@ -30,7 +30,7 @@ from pathlib import Path
 from conevo.campaigns.admission import admit_code
 from conevo.campaigns.devices import CPU, next_device
 from conevo.campaigns.ended import read_ended
-from conevo.campaigns.executors import Ending, Executor, Job
+from conevo.campaigns.executors.protocol import Ending, Executor, Job
 from conevo.campaigns.extension import check_plan, settle, texts_of, write_plan
 from conevo.campaigns.inputs import located
 from conevo.campaigns.ledger import Entry, Ledger

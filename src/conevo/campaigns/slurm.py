@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from conevo.campaigns.devices import CPU, parse_devices
-from conevo.campaigns.executors import ONE_THREAD
+from conevo.campaigns.executors.worker import ONE_THREAD
 from conevo.campaigns.places import Places
 from conevo.errors import UsageError, shown
 from conevo.reading import DamagedFile, read_json

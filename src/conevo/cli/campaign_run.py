@@ -14,7 +14,8 @@ import click
 from conevo.campaigns.campaign import Campaign, Stopped
 from conevo.campaigns.devices import parse_devices
 from conevo.campaigns.estimate import remaining_seconds
-from conevo.campaigns.executors import Ending, Executor, make_executor
+from conevo.campaigns.executors.protocol import Ending, Executor
+from conevo.campaigns.executors.registry import make_executor
 from conevo.campaigns.ledger import Entry
 from conevo.cli.campaign_text import counts, grid, print_failed
 from conevo.cli.carry import drop_output, style_of

@@ -14,7 +14,7 @@ import click
 
 from conevo.campaigns.campaign import CAMPAIGNS, Campaign
 from conevo.campaigns.estimate import remaining_seconds
-from conevo.campaigns.executors import usable_cores
+from conevo.campaigns.executors.worker import usable_cores
 from conevo.campaigns.inputs import shown_as
 from conevo.campaigns.ledger import STATES, Entry
 from conevo.campaigns.plan import PlannedRun

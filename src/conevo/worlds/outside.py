@@ -14,7 +14,7 @@ from typing import Any
 from conevo import outside
 from conevo.errors import UsageError, unknown_name
 from conevo.outside import classes_of
-from conevo.worlds.registry import WORLDS, WorldEntry
+from conevo.worlds.entry import WorldEntry
 
 __all__ = ["load"]
 
@@ -53,8 +53,6 @@ def _problem(entry: Any, module: ModuleType) -> str:
         return f"its ENTRY must be a WorldEntry, not {type(entry).__name__}"
     if not re.fullmatch(r"[a-z0-9-]+-v\d+", str(entry.name)):
         return f"its name {entry.name!r} must be lower case and end with a version, as in light-v1"
-    if entry.name in WORLDS:
-        return f"its name {entry.name!r} is that of a world of the package"
     names: Any = entry.environments
     if not (isinstance(names, tuple) and names and all(_is_environment(one) for one in names)):
         return "its environments must be a tuple of names, as in ('dark-1',)"

@@ -3,85 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from conevo.errors import UsageError, unknown_name
-from conevo.worlds.measures import measures_of
+from conevo.worlds.entry import WorldEntry
 
 if TYPE_CHECKING:
     from conevo.worlds.protocol import World
 
 __all__ = ["WORLDS", "WorldEntry", "colours_of", "inherited", "product_of", "resolve", "world"]
-
-
-@dataclass(frozen=True)
-class WorldEntry:
-    """What the registry knows of a world without loading it.
-
-    ``module`` holds the classes named ``params_name`` (parameters) and ``world_name`` (built from
-    an environment name and parameters). ``drawn`` is the module whose ``playback`` tells what is to
-    be drawn of an epoch, without Warp, and ``CASTES`` the colours of its castes; without it, what
-    the world's class says in its own ``drawn`` is (``playback.drawn``). ``product`` is the module
-    that makes a file of a finished shaping in all of its ``TASKS``. An entry in a file outside the
-    package leaves it out; ``worlds.outside`` fills it in, with the file's path, ``files`` (this one
-    first, then the files next to it that it imports) and the digest of their texts.
-    """
-
-    name: str
-    title: str
-    summary: str
-    source: str
-    environments: tuple[str, ...]
-    params_name: str
-    world_name: str
-    module: str = ""
-    drawn: str = ""
-    product: str = ""
-    file: str = ""
-    files: tuple[str, ...] = ()
-    digest: str = ""
-
-    @property
-    def short_name(self) -> str:
-        """The name without its version, as in "rover"."""
-        return self.name.rpartition("-v")[0]
-
-    @property
-    def params_class(self) -> type[Any]:
-        """The dataclass of the world's parameters; it refuses what they do not allow."""
-        from conevo.parameters import checked
-
-        return checked(getattr(import_module(self.module), self.params_name), "world")
-
-    @property
-    def world_class(self) -> Any:
-        """The class of its environments."""
-        return getattr(import_module(self.module), self.world_name)
-
-    def address(self, environment: str) -> str:
-        """What ``resolve`` finds an environment of this world by."""
-        return f"{self.file}:{environment}" if self.file else f"{self.name}/{environment}"
-
-    def build(self, environment: str, params: Any) -> World:
-        """Return one environment of this world.
-
-        Raises:
-            UsageError: parameters that are not allowed, or do not fit together, or a world without
-                inputs or outputs.
-        """
-        part = self.params_class
-        if not isinstance(params, part):  # of a plain dataclass, which has checked nothing
-            given = {one.name: getattr(params, one.name) for one in fields(params) if one.init}
-            params = part(**given)
-        built: World = self.world_class(environment, params)
-        for name in ("inputs", "outputs"):
-            if not hasattr(built, name):
-                raise UsageError(f"world {built.name} needs {name}, a tuple of names, one of each")
-        _ = measures_of(built)  # refuses what are no measures
-        return built
 
 
 WORLDS: dict[str, WorldEntry] = {
@@ -159,6 +91,10 @@ def resolve(path: str, digest: str = "", is_whole: bool = True) -> tuple[WorldEn
         from conevo.worlds.outside import load
 
         name, entry = file, load(Path(file), digest)
+        if entry.name in WORLDS:
+            raise UsageError(
+                f"world file {file}: its name {entry.name!r} is that of a world of the package"
+            )
         example = f"{file}:{entry.environments[0]}"
     elif file or ".py/" in path or path.startswith(("/", ".")):
         raise UsageError(f"world {path!r}: a world in a file is named FILE.py:ENVIRONMENT")

@@ -11,7 +11,7 @@ from typing import Any
 
 from conevo.campaigns.campaign import Campaign
 from conevo.campaigns.estimate import remaining_seconds
-from conevo.campaigns.executors import usable_cores
+from conevo.campaigns.executors.worker import usable_cores
 from conevo.campaigns.inputs import shown_as
 from conevo.campaigns.ledger import Entry
 from conevo.errors import ConevoError, UsageError

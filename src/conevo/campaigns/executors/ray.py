@@ -20,7 +20,8 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from conevo.campaigns.devices import CPU
-from conevo.campaigns.executors import Ending, Job, spawn, usable_cores, why_lost
+from conevo.campaigns.executors.protocol import Ending, Job
+from conevo.campaigns.executors.worker import spawn, usable_cores, why_lost
 from conevo.campaigns.object_store import ObjectStore
 from conevo.campaigns.places import Places
 from conevo.errors import EnvironmentFailure, UsageError

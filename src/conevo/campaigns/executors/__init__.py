@@ -1,0 +1,1 @@
+"""Where runs are executed: here one after another, in processes, on a Ray cluster."""

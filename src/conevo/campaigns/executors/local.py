@@ -1,0 +1,84 @@
+"""Executors on this machine."""
+
+from __future__ import annotations
+
+import subprocess
+import time
+from typing import ClassVar
+
+from conevo.campaigns.executors.protocol import Ending, Job
+from conevo.campaigns.executors.worker import spawn, why_lost
+from conevo.campaigns.work import carry_out, core_seconds
+
+__all__ = ["Processes", "Serial"]
+
+
+class Serial:
+    """One run after the other, in this process: for debugging."""
+
+    name: ClassVar[str] = "serial"
+
+    def __init__(self, cores: int) -> None:
+        self.cores = cores
+        self._endings: list[Ending] = []
+
+    def submit(self, job: Job) -> None:
+        """Carry the job out now; Ctrl-C reaches the run itself."""
+        carry_out(
+            job.root,
+            job.label,
+            job.threads,
+            device=job.device,
+            limit=job.limit,
+            spent_before=core_seconds(),
+        )
+        self._endings.append(Ending(job.label))
+
+    def wait(self, seconds: float) -> list[Ending]:
+        """Return what was carried out since the last call."""
+        endings, self._endings = self._endings, []
+        return endings
+
+    def stop(self) -> None:
+        """Do nothing: no worker outlives ``submit``."""
+
+
+class Processes:
+    """One spawned process per run: what befalls one run befalls no other."""
+
+    name: ClassVar[str] = "processes"
+
+    def __init__(self, cores: int) -> None:
+        self.cores = cores
+        self._workers: dict[str, subprocess.Popen[bytes]] = {}
+
+    def submit(self, job: Job) -> None:
+        """Spawn a worker; it leaves when this process does, since its stdin ends then."""
+        self._workers[job.label] = spawn(job)
+
+    def wait(self, seconds: float) -> list[Ending]:
+        """Return the workers that have ended."""
+        deadline = time.monotonic() + seconds
+        while True:
+            codes = {label: worker.poll() for label, worker in self._workers.items()}
+            gone = {label: code for label, code in codes.items() if code is not None}
+            if gone or time.monotonic() >= deadline:
+                break
+            time.sleep(min(0.02, max(0.0, deadline - time.monotonic())))
+        for label in gone:
+            self._close(label)
+        return [Ending(label, why_lost(code)) for label, code in gone.items()]
+
+    def stop(self) -> None:
+        """End the workers' stdin, and wait for them."""
+        for worker in self._workers.values():
+            if worker.stdin is not None:
+                worker.stdin.close()
+        for label in list(self._workers):
+            self._workers[label].wait()
+            self._close(label)
+
+    def _close(self, label: str) -> None:
+        worker = self._workers.pop(label)
+        if worker.stdin is not None and not worker.stdin.closed:
+            worker.stdin.close()

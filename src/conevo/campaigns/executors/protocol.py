@@ -1,0 +1,64 @@
+"""What an executor is. It only decides where runs are executed; what a run is, ``work`` knows.
+
+Results are files in the campaign's directory. An executor reports that a worker is gone, never
+what it found.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import ClassVar, Protocol
+
+from conevo.campaigns.devices import CPU
+from conevo.runs.time_limit import TimeLimit
+
+__all__ = ["Ending", "Executor", "Job"]
+
+
+@dataclass(frozen=True)
+class Job:
+    """One run to carry out, on so many threads and, if it has not begun, on this device.
+
+    ``limit`` is for an executor that is no other process.
+    """
+
+    root: Path
+    label: str
+    threads: int
+    device: str = CPU
+    limit: TimeLimit = field(default_factory=lambda: TimeLimit(None), compare=False)
+
+
+@dataclass(frozen=True)
+class Ending:
+    """A worker that is gone.
+
+    Attributes:
+        label: of its run.
+        lost: why it could not write down how it ended ("killed by signal 9"); "" if it could.
+    """
+
+    label: str
+    lost: str = ""
+
+
+class Executor(Protocol):
+    """Carries out jobs.
+
+    Attributes:
+        name: as on the command line.
+        cores: CPU cores that jobs may use together.
+    """
+
+    name: ClassVar[str]
+    cores: int
+
+    def submit(self, job: Job) -> None:
+        """Begin a job; only called when the cores it asks for are free."""
+
+    def wait(self, seconds: float) -> list[Ending]:
+        """Return the workers that are gone, after at most about so long if there are none."""
+
+    def stop(self) -> None:
+        """Let every worker write its checkpoint and leave; return when all have."""

@@ -1,0 +1,51 @@
+"""A worker: one process that executes one run."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+from conevo.campaigns.devices import CPU
+from conevo.campaigns.executors.protocol import Job
+from conevo.campaigns.places import Places
+
+__all__ = ["ONE_THREAD", "spawn", "usable_cores", "why_lost", "worker_command"]
+
+ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+
+
+def spawn(job: Job) -> subprocess.Popen[bytes]:
+    """Begin a worker, which leaves when its stdin ends; what it says goes to the run's log."""
+    log = Places(job.root).log(job.label)
+    log.parent.mkdir(exist_ok=True)
+    with log.open("ab") as file:
+        return subprocess.Popen(
+            worker_command(job),
+            stdin=subprocess.PIPE,
+            stdout=file,
+            stderr=file,
+            start_new_session=True,  # Ctrl-C is for the coordinator, which ends its workers
+            env=os.environ | dict.fromkeys(ONE_THREAD, "1"),
+        )
+
+
+def worker_command(job: Job) -> list[str]:
+    """Return the command that carries a job out."""
+    arguments = [str(job.root.resolve()), job.label, str(job.threads)]
+    arguments += [job.device] if job.device != CPU else []
+    return [sys.executable, "-m", "conevo.campaigns.work", *arguments]
+
+
+def why_lost(code: int) -> str:
+    """Return what an exit code says of a worker that may not have written how it ended."""
+    if code in (0, 1):
+        return ""
+    return f"killed by signal {-code}" if code < 0 else f"ended with exit code {code}"
+
+
+def usable_cores() -> int:
+    """Return the number of CPU cores this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
