@@ -12,6 +12,7 @@ import tomllib
 from importlib import metadata, resources
 from pathlib import Path
 
+import grimp
 import pytest
 
 import conevo
@@ -154,3 +155,13 @@ def search(pattern: re.Pattern[str], path: Path) -> re.Match[str] | None:
     if path.suffix in {".gif", ".npz", ".pdf", ".png"} or not path.is_file():
         return None
     return pattern.search(path.read_text(encoding="utf-8"))
+
+
+def test_no_module_imports_one_that_imports_it() -> None:
+    """Neither directly nor by others, within functions included; for type checkers it may."""
+    graph = grimp.build_graph("conevo", exclude_type_checking_imports=True, cache_dir=None)
+    rest = {name: set(graph.find_modules_directly_imported_by(name)) for name in graph.modules}
+    while free := {name for name, imported in rest.items() if not imported & rest.keys()}:
+        rest = {name: imported for name, imported in rest.items() if name not in free}
+    in_circles = {name for name in rest if any(name in rest[other] for other in rest)}
+    assert in_circles == set()

@@ -65,7 +65,7 @@ def evolve(
         UsageError: a name or value that is not allowed, or ``out`` exists; nothing was written.
         EnvironmentFailure: no such device, full disk, no permission.
     """
-    from conevo.evolution.methods.outside import as_settings
+    from conevo.evolution.methods.objects import as_settings
     from conevo.runs.config import resolve
 
     name, overrides = as_settings(method, overrides or {})

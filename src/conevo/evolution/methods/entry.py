@@ -1,0 +1,57 @@
+"""What is known of a method without loading it."""
+
+from __future__ import annotations
+
+import importlib
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, cast
+
+if TYPE_CHECKING:
+    from conevo.evolution.protocol import Method
+
+__all__ = ["MethodEntry"]
+
+
+@dataclass(frozen=True)
+class MethodEntry:
+    """What the registry knows of a method without loading it.
+
+    ``module`` holds the classes named ``config_name`` (parameters) and ``method_name`` (built from
+    parameters, name and title). An entry in a file outside the package leaves it out;
+    ``methods.outside`` fills it in, with the file's path, ``files`` (this one first, then the files
+    next to it that it imports) and the digest of their texts.
+
+    Attributes:
+        name: how it is asked for.
+        title: its name as published.
+        summary: one line on what it does.
+        source: where it is described.
+    """
+
+    name: str
+    title: str
+    summary: str
+    source: str
+    config_name: str
+    method_name: str
+    module: str = ""
+    file: str = ""
+    files: tuple[str, ...] = ()
+    digest: str = ""
+
+    @property
+    def address(self) -> str:
+        """What ``resolve`` finds this method by: its name, or "FILE.py:NAME"."""
+        return f"{self.file}:{self.name}" if self.file else self.name
+
+    @property
+    def config_class(self) -> type[Any]:
+        """The dataclass of its parameters; it refuses what they do not allow."""
+        from conevo.parameters import checked
+
+        return checked(getattr(importlib.import_module(self.module), self.config_name), "method")
+
+    def build(self, config: Any) -> Method:
+        """Return the method with the given parameters, an instance of ``config_class``."""
+        make = getattr(importlib.import_module(self.module), self.method_name)
+        return cast("Method", make(config=config, name=self.name, title=self.title))
