@@ -21,7 +21,9 @@ import warp as wp
 import conevo
 from conevo.worlds import rollout
 from conevo.worlds.gacc import dynamics as gacc_dynamics
-from conevo.worlds.gacc.state import Params, Scene, Team
+from conevo.worlds.gacc.state import GaccConstants as Params
+from conevo.worlds.gacc.state import GaccScene as Scene
+from conevo.worlds.gacc.state import GaccTeam as Team
 from teams import champion, controlled, error, keys_of, play, random_clones, random_networks, sample
 
 TASK = "gacc/complex-1"

@@ -165,3 +165,13 @@ def test_no_module_imports_one_that_imports_it() -> None:
         rest = {name: imported for name, imported in rest.items() if name not in free}
     in_circles = {name for name in rest if any(name in rest[other] for other in rest)}
     assert in_circles == set()
+
+
+def test_a_class_of_the_lower_floors_is_found_by_its_name() -> None:
+    """One word, one thing: below campaigns and reports no two classes have the same name."""
+    floors = ("kernels", "specialization", "controllers", "evolution", "playback", "worlds", "runs")
+    found: dict[str, list[str]] = {}
+    for path in (p for floor in floors for p in (ROOT / "src/conevo" / floor).rglob("*.py")):
+        for name in re.findall(r"^class (\w+)", path.read_text(), re.MULTILINE):
+            found.setdefault(name, []).append(path.name)
+    assert {name: files for name, files in found.items() if len(files) > 1} == {}

@@ -8,7 +8,7 @@ import warp as wp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from conevo.controllers.srn import Memory, Shape, Srn, Weights, clear, load, think
+from conevo.controllers.srn import Srn, SrnMemory, SrnShape, SrnWeights, clear, load, think
 from conevo.kernels import engine
 from conevo.kernels.geometry import COVER_WORDS, cover_disc, covered_by_any, octant
 from conevo.kernels.outputs import sigmoid, sigmoid_of
@@ -16,7 +16,7 @@ from conevo.kernels.random import uniform
 from oracles import rover_oracle, splitmix
 
 engine.start()
-weights_of, memory_of = engine.view_of(Weights), engine.view_of(Memory)
+weights_of, memory_of = engine.view_of(SrnWeights), engine.view_of(SrnMemory)
 
 
 @wp.kernel
@@ -47,9 +47,9 @@ def squash(a: wp.array[float], y: wp.array[float]):
 
 @wp.kernel
 def run_networks(
-    brains: Weights,
-    memories: Memory,
-    shape: Shape,
+    brains: SrnWeights,
+    memories: SrnMemory,
+    shape: SrnShape,
     genes: wp.array2d[float],
     slots: wp.array3d[int],
     sensors: wp.array2d[float],
@@ -164,7 +164,7 @@ def test_sigmoid_is_the_logistic_function_within_a_millionth():
 def run_kernel(mind, n_sensors, n_outputs, genes, slots, sensors):
     """Outputs [T, 2, O] of the second of two teams of two robots; the first one's stay empty."""
     kind = mind.mind(n_sensors, n_outputs)
-    weights, memory = Weights(), Memory()
+    weights, memory = SrnWeights(), SrnMemory()
     for struct in (weights, memory):
         for name, var in struct._cls.vars.items():
             empty = wp.zeros(4 * kind.sizes[name], dtype=var.type.dtype, device="cpu")

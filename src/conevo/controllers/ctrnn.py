@@ -28,7 +28,7 @@ __all__ = ["Ctrnn"]
 
 
 @wp.struct
-class Shape:
+class CtrnnShape:
     """Sizes of a network as the kernels need them."""
 
     n_inputs: int
@@ -40,7 +40,7 @@ class Shape:
 
 
 @wp.struct
-class Weights:
+class CtrnnWeights:
     """Weights of a team's networks.
 
     w_in [R, slots, inputs + context]; w_out [R, slots, outputs]; bias and rate [R, slots], the
@@ -55,7 +55,7 @@ class Weights:
 
 
 @wp.struct
-class Memory:
+class CtrnnMemory:
     """Of a team's neurons: activations and states [R, slots], 0 in empty slots."""
 
     hidden: wp.array[float]
@@ -64,8 +64,8 @@ class Memory:
 
 @wp.func
 def load(
-    weights: Weights,
-    shape: Shape,
+    weights: CtrnnWeights,
+    shape: CtrnnShape,
     i: int,
     genes: wp.array2d[float],
     rows: wp.array3d[int],
@@ -89,7 +89,7 @@ def load(
 
 
 @wp.func
-def clear(memory: Memory, shape: Shape, i: int) -> None:
+def clear(memory: CtrnnMemory, shape: CtrnnShape, i: int) -> None:
     """Let robot ``i`` remember nothing: states 0, and no activation yet."""
     for k in range(shape.n_slots):
         memory.hidden[i * shape.n_slots + k] = 0.0
@@ -98,9 +98,9 @@ def clear(memory: Memory, shape: Shape, i: int) -> None:
 
 @wp.func
 def think(
-    weights: Weights,
-    memory: Memory,
-    shape: Shape,
+    weights: CtrnnWeights,
+    memory: CtrnnMemory,
+    shape: CtrnnShape,
     inputs: wp.array2d[float],
     outputs: wp.array2d[float],
     i: int,
@@ -173,17 +173,17 @@ class Ctrnn:
 
     def mind(self, n_inputs: int, n_outputs: int) -> Mind:
         """Return the Warp side."""
-        shape = Shape()
+        shape = CtrnnShape()
         shape.n_inputs, shape.n_context, shape.n_outputs = n_inputs, self.n_hidden, n_outputs
         shape.n_slots, shape.weight_scale = self.max_hidden, self.weight_scale
         shape.slowest = self.slowest
         per_slot = {"w_in": n_inputs + self.n_hidden, "w_out": n_outputs, "bias": 1, "rate": 1}
         per_slot |= {"filled": 1, "hidden": 1, "state": 1}
         return Mind(
-            weights=Weights,
-            memory=Memory,
+            weights=CtrnnWeights,
+            memory=CtrnnMemory,
             shape=shape,
-            shape_type=Shape,
+            shape_type=CtrnnShape,
             sizes={name: self.max_hidden * size for name, size in per_slot.items()},
             load=load,
             clear=clear,

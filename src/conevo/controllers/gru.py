@@ -33,7 +33,7 @@ CANDIDATE = wp.constant(2)
 
 
 @wp.struct
-class Shape:
+class GruShape:
     """Sizes of a network as the kernels need them."""
 
     n_inputs: int
@@ -44,7 +44,7 @@ class Shape:
 
 
 @wp.struct
-class Weights:
+class GruWeights:
     """Weights of a team's networks.
 
     w_in [R, slots, 3, inputs + context + 1], of reset gate, update gate and candidate, the bias
@@ -57,7 +57,7 @@ class Weights:
 
 
 @wp.struct
-class Memory:
+class GruMemory:
     """Of a team's neurons [R, slots], 0 in empty slots: activations, and three to compute them."""
 
     hidden: wp.array[float]
@@ -68,8 +68,8 @@ class Memory:
 
 @wp.func
 def load(
-    weights: Weights,
-    shape: Shape,
+    weights: GruWeights,
+    shape: GruShape,
     i: int,
     genes: wp.array2d[float],
     rows: wp.array3d[int],
@@ -90,7 +90,7 @@ def load(
 
 
 @wp.func
-def clear(memory: Memory, shape: Shape, i: int) -> None:
+def clear(memory: GruMemory, shape: GruShape, i: int) -> None:
     """Let robot ``i`` remember nothing."""
     for k in range(shape.n_slots):
         memory.hidden[i * shape.n_slots + k] = 0.0
@@ -99,7 +99,7 @@ def clear(memory: Memory, shape: Shape, i: int) -> None:
 
 @wp.func
 def drive(
-    weights: Weights, shape: Shape, inputs: wp.array2d[float], i: int, slot: int, gate: int
+    weights: GruWeights, shape: GruShape, inputs: wp.array2d[float], i: int, slot: int, gate: int
 ) -> float:
     """Return bias and weighted inputs of one gate of a neuron."""
     seen = shape.n_inputs + shape.n_context
@@ -113,16 +113,16 @@ def drive(
 
 
 @wp.func
-def recurrent(shape: Shape, slot: int, gate: int) -> int:
+def recurrent(shape: GruShape, slot: int, gate: int) -> int:
     """Return where the recurrent weights of a gate of a neuron begin."""
     return (slot * 3 + gate) * (shape.n_inputs + shape.n_context + 1) + shape.n_inputs
 
 
 @wp.func
 def think(
-    weights: Weights,
-    memory: Memory,
-    shape: Shape,
+    weights: GruWeights,
+    memory: GruMemory,
+    shape: GruShape,
     inputs: wp.array2d[float],
     outputs: wp.array2d[float],
     i: int,
@@ -205,16 +205,16 @@ class Gru:
 
     def mind(self, n_inputs: int, n_outputs: int) -> Mind:
         """Return the Warp side."""
-        shape = Shape()
+        shape = GruShape()
         shape.n_inputs, shape.n_context, shape.n_outputs = n_inputs, self.n_hidden, n_outputs
         shape.n_slots, shape.weight_scale = self.max_hidden, self.weight_scale
         per_slot = {"w_in": 3 * (n_inputs + self.n_hidden + 1), "w_out": n_outputs, "filled": 1}
         per_slot |= dict.fromkeys(("hidden", "reset", "update", "candidate"), 1)
         return Mind(
-            weights=Weights,
-            memory=Memory,
+            weights=GruWeights,
+            memory=GruMemory,
             shape=shape,
-            shape_type=Shape,
+            shape_type=GruShape,
             sizes={name: self.max_hidden * size for name, size in per_slot.items()},
             load=load,
             clear=clear,

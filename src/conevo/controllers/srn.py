@@ -34,7 +34,7 @@ out_vector = wp.types.vector(length=8, dtype=float)
 
 
 @wp.struct
-class Shape:
+class SrnShape:
     """Sizes of a network as the kernels need them."""
 
     n_sensors: int
@@ -48,7 +48,7 @@ class Shape:
 
 
 @wp.struct
-class Weights:
+class SrnWeights:
     """Weights of a team's networks (or, flat, of a batch of teams).
 
     w_in [R, chunks, inputs] of 16 slots; w_out [R, slots] of 8 outputs; filled [R, chunks] of 16
@@ -62,7 +62,7 @@ class Weights:
 
 
 @wp.struct
-class Memory:
+class SrnMemory:
     """Activations of a team's hidden neurons [R, chunks * 16], 0 in empty slots."""
 
     hidden: wp.array[float]
@@ -70,8 +70,8 @@ class Memory:
 
 @wp.func
 def load(
-    weights: Weights,
-    shape: Shape,
+    weights: SrnWeights,
+    shape: SrnShape,
     i: int,
     genes: wp.array2d[float],
     rows: wp.array3d[int],
@@ -105,7 +105,7 @@ def load(
 
 
 @wp.func
-def clear(memory: Memory, shape: Shape, i: int) -> None:
+def clear(memory: SrnMemory, shape: SrnShape, i: int) -> None:
     """Let robot ``i`` remember nothing."""
     slots = shape.n_chunks * WIDE
     for k in range(slots):
@@ -114,9 +114,9 @@ def clear(memory: Memory, shape: Shape, i: int) -> None:
 
 @wp.func
 def think(
-    weights: Weights,
-    memory: Memory,
-    shape: Shape,
+    weights: SrnWeights,
+    memory: SrnMemory,
+    shape: SrnShape,
     inputs: wp.array2d[float],
     outputs: wp.array2d[float],
     i: int,
@@ -208,7 +208,7 @@ class Srn:
 
     def mind(self, n_inputs: int, n_outputs: int) -> Mind:
         """Return the Warp side."""
-        shape = Shape()
+        shape = SrnShape()
         shape.n_sensors = n_inputs
         shape.n_context = self.n_context
         shape.n_inputs = n_inputs + self.n_context
@@ -219,10 +219,10 @@ class Srn:
         shape.bias = float(self.bias)
         slots = chunks * int(WIDE)
         return Mind(
-            weights=Weights,
-            memory=Memory,
+            weights=SrnWeights,
+            memory=SrnMemory,
             shape=shape,
-            shape_type=Shape,
+            shape_type=SrnShape,
             sizes={
                 "w_in": chunks * shape.n_inputs,
                 "w_out": slots,

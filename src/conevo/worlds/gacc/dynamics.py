@@ -26,9 +26,9 @@ from conevo.worlds.gacc.state import (
     NONE,
     UNDETECTED,
     WAITING,
-    Params,
-    Scene,
-    Team,
+    GaccConstants,
+    GaccScene,
+    GaccTeam,
     is_home,
     is_known,
     is_lying,
@@ -47,7 +47,7 @@ NON_SPECIALIZED = wp.constant(9)
 
 
 @wp.func
-def reset(team: Team, scene: Scene, p: Params, i: int) -> None:
+def reset(team: GaccTeam, scene: GaccScene, p: GaccConstants, i: int) -> None:
     """Put robot ``i`` at its start and clear its share of what is recorded."""
     team.x[i] = scene.start_x[i]
     team.y[i] = scene.start_y[i]
@@ -82,7 +82,7 @@ def reset(team: Team, scene: Scene, p: Params, i: int) -> None:
 
 
 @wp.func
-def fetch(team: Team, scene: Scene, p: Params, i: int, k: int) -> None:
+def fetch(team: GaccTeam, scene: GaccScene, p: GaccConstants, i: int, k: int) -> None:
     """Choose to grip object ``k``, or to go straight to it if it is out of reach."""
     dx = team.object_x[k] - team.x[i]
     dy = team.object_y[k] - team.y[i]
@@ -96,7 +96,7 @@ def fetch(team: Team, scene: Scene, p: Params, i: int, k: int) -> None:
 
 
 @wp.func
-def straight_step(p: Params, dx: float, dy: float) -> wp.vec2f:
+def straight_step(p: GaccConstants, dx: float, dy: float) -> wp.vec2f:
     """Return the longest step towards a place that lies so far away, not beyond it."""
     d = wp.sqrt(dx * dx + dy * dy)
     step = wp.min(p.move_range, d) / d
@@ -104,7 +104,7 @@ def straight_step(p: Params, dx: float, dy: float) -> wp.vec2f:
 
 
 @wp.func
-def propose(team: Team, scene: Scene, p: Params, i: int, step: wp.vec2f) -> None:
+def propose(team: GaccTeam, scene: GaccScene, p: GaccConstants, i: int, step: wp.vec2f) -> None:
     """Propose a step for robot ``i``, unless the place is refused."""
     x = team.x[i] + step[0]
     y = team.y[i] + step[1]
@@ -114,7 +114,7 @@ def propose(team: Team, scene: Scene, p: Params, i: int, step: wp.vec2f) -> None
 
 
 @wp.func
-def closest_carrier(team: Team, p: Params, i: int) -> int:
+def closest_carrier(team: GaccTeam, p: GaccConstants, i: int) -> int:
     """Return the closest robot in the home area that needs help, or NONE (situation 1)."""
     best = float(p.home_sight_2)
     found = int(NONE)
@@ -133,7 +133,7 @@ def closest_carrier(team: Team, p: Params, i: int) -> int:
 
 
 @wp.func
-def closest_at_home(team: Team, p: Params, i: int, t: int) -> int:
+def closest_at_home(team: GaccTeam, p: GaccConstants, i: int, t: int) -> int:
     """Return the closest known object that lies in the home area, or NONE (situation 3)."""
     best = float(p.home_sight_2)
     found = int(NONE)
@@ -152,7 +152,7 @@ def closest_at_home(team: Team, p: Params, i: int, t: int) -> int:
 
 
 @wp.func
-def takes_over(team: Team, scene: Scene, p: Params, i: int, t: int) -> int:
+def takes_over(team: GaccTeam, scene: GaccScene, p: GaccConstants, i: int, t: int) -> int:
     """Return which situation of 6.2.8 decides for robot ``i``, after it has decided; 0 if none."""
     if not is_home(p, team.x[i], team.y[i]):
         return 0
@@ -172,7 +172,9 @@ def takes_over(team: Team, scene: Scene, p: Params, i: int, t: int) -> int:
 
 
 @wp.func
-def within_grip(team: Team, scene: Scene, p: Params, i: int, t: int, kind: int) -> int:
+def within_grip(
+    team: GaccTeam, scene: GaccScene, p: GaccConstants, i: int, t: int, kind: int
+) -> int:
     """Return the closest object of a type that robot ``i`` can grip outside home, or NONE."""
     found = int(NONE)
     if is_home(p, team.x[i], team.y[i]):
@@ -193,7 +195,7 @@ def within_grip(team: Team, scene: Scene, p: Params, i: int, t: int, kind: int) 
 
 
 @wp.func
-def act(team: Team, scene: Scene, p: Params, i: int, t: int) -> None:
+def act(team: GaccTeam, scene: GaccScene, p: GaccConstants, i: int, t: int) -> None:
     """Choose robot ``i``'s action (6.2.7, 6.2.8) and propose where it will be, or what it grips."""
     team.to_x[i] = team.x[i]
     team.to_y[i] = team.y[i]
@@ -219,7 +221,7 @@ def act(team: Team, scene: Scene, p: Params, i: int, t: int) -> None:
 
 
 @wp.func
-def follow_preferences(team: Team, scene: Scene, p: Params, i: int, t: int) -> None:
+def follow_preferences(team: GaccTeam, scene: GaccScene, p: GaccConstants, i: int, t: int) -> None:
     """Choose heuristic robot ``i``'s action as table 6.3 prefers; constructors stay at home."""
     h = team.heuristic[i]
     u = uniform(scene.seed[0], t, 0, i)
@@ -244,7 +246,7 @@ def follow_preferences(team: Team, scene: Scene, p: Params, i: int, t: int) -> N
 
 
 @wp.func
-def is_first(team: Team, i: int, k: int) -> bool:
+def is_first(team: GaccTeam, i: int, k: int) -> bool:
     """Return whether no robot with a lower number grips at the same object."""
     j = int(0)
     while j < i:
@@ -255,7 +257,7 @@ def is_first(team: Team, i: int, k: int) -> bool:
 
 
 @wp.func
-def move(team: Team, p: Params, i: int) -> None:
+def move(team: GaccTeam, p: GaccConstants, i: int) -> None:
     """Move robot ``i`` and what it holds to where it proposes.
 
     Choice: of two robots that propose the same place, the one with the lower number gets it.
@@ -276,7 +278,7 @@ def move(team: Team, p: Params, i: int) -> None:
 
 
 @wp.func
-def commit(team: Team, scene: Scene, p: Params, i: int, t: int) -> None:
+def commit(team: GaccTeam, scene: GaccScene, p: GaccConstants, i: int, t: int) -> None:
     """Carry out robot ``i``'s action, count it and pay for it."""
     a = team.chosen[i]
     if a == NONE:
@@ -316,7 +318,7 @@ def commit(team: Team, scene: Scene, p: Params, i: int, t: int) -> None:
 
 
 @wp.func
-def place_for(team: Team, scene: Scene, p: Params, kind: int) -> int:
+def place_for(team: GaccTeam, scene: GaccScene, p: GaccConstants, kind: int) -> int:
     """Return the first complex object that needs a part of this type now, or NONE."""
     parts = scene.plan.shape[1]
     for c in range(p.n_complex):
@@ -330,7 +332,7 @@ def place_for(team: Team, scene: Scene, p: Params, kind: int) -> int:
 
 
 @wp.func
-def let_go(team: Team, i: int) -> None:
+def let_go(team: GaccTeam, i: int) -> None:
     """Open robot ``i``'s gripper in the home area; it keeps off the object until it has left."""
     team.dropped[i] = team.held[i]
     team.held[i] = NONE
@@ -338,7 +340,7 @@ def let_go(team: Team, i: int) -> None:
 
 
 @wp.func
-def build(team: Team, scene: Scene, p: Params, k: int, c: int) -> None:
+def build(team: GaccTeam, scene: GaccScene, p: GaccConstants, k: int, c: int) -> None:
     """Make object ``k`` the next part of complex object ``c`` and credit all that hold it."""
     kind = scene.object_type[k]
     parts = scene.plan.shape[1]
@@ -362,7 +364,7 @@ def build(team: Team, scene: Scene, p: Params, k: int, c: int) -> None:
 
 
 @wp.func
-def signal(team: Team, scene: Scene, p: Params) -> None:
+def signal(team: GaccTeam, scene: GaccScene, p: GaccConstants) -> None:
     """Set the demand for each type (6.2.3): how soon it is needed, over how many are missing.
 
     Choice: a complex object of two parts or more asks for a type with 1 / steps until its next use,
@@ -386,7 +388,7 @@ def signal(team: Team, scene: Scene, p: Params) -> None:
 
 
 @wp.func
-def resolve(team: Team, scene: Scene, p: Params, i: int, t: int) -> None:
+def resolve(team: GaccTeam, scene: GaccScene, p: GaccConstants, i: int, t: int) -> None:
     """Referee: build or refuse what is held in the home area, end waits, name objects' lives."""
     if i != 0:
         return
@@ -436,7 +438,7 @@ def resolve(team: Team, scene: Scene, p: Params, i: int, t: int) -> None:
 
 
 @wp.func
-def outcome(team: Team, scene: Scene, p: Params, t_end: int) -> None:
+def outcome(team: GaccTeam, scene: GaccScene, p: GaccConstants, t_end: int) -> None:
     """Write objects delivered in correct order, complex objects completed, percent of optimum."""
     delivered = int(0)
     completed = int(0)

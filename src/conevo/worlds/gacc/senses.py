@@ -13,9 +13,9 @@ from conevo.kernels.sensing import closest_in_octants, mark
 from conevo.worlds.gacc.state import (
     MOVE,
     UNDETECTED,
-    Params,
-    Scene,
-    Team,
+    GaccConstants,
+    GaccScene,
+    GaccTeam,
     is_blocked,
     is_lying,
 )
@@ -31,13 +31,13 @@ else:
 
 
 @wp.func
-def nearness(p: Params, d2: float) -> float:
+def nearness(p: GaccConstants, d2: float) -> float:
     """Return 1 within the least distance of eq. 6.1, from there on falling with the square."""
     return p.min_distance_2 / wp.max(d2, p.min_distance_2)
 
 
 @wp.func
-def is_noticed(scene: Scene, p: Params, i: int, t: int, thing: int) -> bool:
+def is_noticed(scene: GaccScene, p: GaccConstants, i: int, t: int, thing: int) -> bool:
     """Return whether robot ``i``'s detection sensors succeed on a thing in this iteration."""
     if p.object_accuracy >= 1.0:
         return True
@@ -45,7 +45,9 @@ def is_noticed(scene: Scene, p: Params, i: int, t: int, thing: int) -> bool:
 
 
 @wp.func
-def look(team: Team, scene: Scene, p: Params, i: int, t: int, setting: int) -> octants:
+def look(
+    team: GaccTeam, scene: GaccScene, p: GaccConstants, i: int, t: int, setting: int
+) -> octants:
     """Return the eight object and obstacle sensors; note the objects that are found (eq. 6.2).
 
     Choice: an object reads (type + 1) / 3 d_min^2 / d^2, an obstacle or a wall - d_min^2 / d^2.
@@ -99,7 +101,7 @@ def look(team: Team, scene: Scene, p: Params, i: int, t: int, setting: int) -> o
 
 
 @wp.func
-def look_around(team: Team, scene: Scene, p: Params, i: int) -> octants:
+def look_around(team: GaccTeam, scene: GaccScene, p: GaccConstants, i: int) -> octants:
     """Return the eight robot sensors: what the closest robot carries (eq. 6.3), 0 if nothing."""
     x = team.x[i]
     y = team.y[i]
@@ -127,7 +129,7 @@ def look_around(team: Team, scene: Scene, p: Params, i: int) -> octants:
 
 
 @wp.func
-def sense(team: Team, scene: Scene, p: Params, i: int, t: int) -> None:
+def sense(team: GaccTeam, scene: GaccScene, p: GaccConstants, i: int, t: int) -> None:
     """Fill robot ``i``'s 27 sensor inputs.
 
     Choice: the home area reads h / d in its octant, at most 1, with h half its side and d the

@@ -22,9 +22,9 @@ __all__ = [
     "N_CASTES",
     "UNDETECTED",
     "WAITING",
-    "Params",
-    "Scene",
-    "Team",
+    "GaccConstants",
+    "GaccScene",
+    "GaccTeam",
     "is_blocked",
     "is_home",
     "is_inside",
@@ -55,7 +55,7 @@ DROPPED = wp.constant(6)
 
 
 @wp.struct
-class Params:
+class GaccConstants:
     """What the kernels need of ``GaccParams``, by its names; ``NAME_2`` is a square."""
 
     n_robots: int
@@ -83,7 +83,7 @@ class Params:
 
 
 @wp.struct
-class Scene:
+class GaccScene:
     """A scenario, flat over the scenarios of a batch. K objects, R robots, obstacles."""
 
     object_x: wp.array[float]
@@ -100,7 +100,7 @@ class Scene:
 
 
 @wp.struct
-class Team:
+class GaccTeam:
     """State of a team, flat over a batch. R robots, K objects, C complex objects."""
 
     inputs: wp.array2d[float]  # [R, 27]
@@ -137,19 +137,21 @@ class Team:
 
 
 @wp.func
-def is_home(p: Params, x: float, y: float) -> bool:
+def is_home(p: GaccConstants, x: float, y: float) -> bool:
     """Return whether a place is in the home area."""
     return wp.abs(x - 0.5) <= p.home and wp.abs(y - 0.5) <= p.home
 
 
 @wp.func
-def is_inside(scene: Scene, k: int, x: float, y: float) -> bool:
+def is_inside(scene: GaccScene, k: int, x: float, y: float) -> bool:
     """Return whether a place is in obstacle ``k``, its edge included."""
     return x >= scene.left[k] and x <= scene.right[k] and y >= scene.bottom[k] and y <= scene.top[k]
 
 
 @wp.func
-def is_refused(team: Team, scene: Scene, p: Params, i: int, x: float, y: float) -> bool:
+def is_refused(
+    team: GaccTeam, scene: GaccScene, p: GaccConstants, i: int, x: float, y: float
+) -> bool:
     """Return whether robot ``i`` may not move to a place: edge, obstacle or another robot."""
     if x < 0.0 or x >= 1.0 or y < 0.0 or y >= 1.0:
         return True
@@ -177,7 +179,7 @@ def within(low: float, high: float, start: float, way: float) -> wp.vec2f:
 
 
 @wp.func
-def is_blocked(scene: Scene, x: float, y: float, dx: float, dy: float) -> bool:
+def is_blocked(scene: GaccScene, x: float, y: float, dx: float, dy: float) -> bool:
     """Return whether an obstacle stands in the view from a place along a way."""
     k = int(0)
     while k < scene.left.shape[0]:
@@ -193,12 +195,12 @@ def is_blocked(scene: Scene, x: float, y: float, dx: float, dy: float) -> bool:
 
 
 @wp.func
-def is_lying(team: Team, k: int) -> bool:
+def is_lying(team: GaccTeam, k: int) -> bool:
     """Return whether object ``k`` lies somewhere and nobody holds it."""
     return team.life[k] == LYING or team.life[k] == DROPPED
 
 
 @wp.func
-def is_known(team: Team, p: Params, k: int, t: int) -> bool:
+def is_known(team: GaccTeam, p: GaccConstants, k: int, t: int) -> bool:
     """Return whether a robot may grip object ``k``: it has been detected (6.2.6, 6.5.3)."""
     return team.detected[k] < t or p.needs_detection == 0

@@ -95,7 +95,7 @@ from conevo.parameters import parameters
 from conevo.rng import stream
 from conevo.worlds.gacc.dynamics import FUNCTIONS
 from conevo.worlds.gacc.plans import TYPES, Plan, plan
-from conevo.worlds.gacc.state import Params, Scene, Team
+from conevo.worlds.gacc.state import GaccConstants, GaccScene, GaccTeam
 from conevo.worlds.measures import Measure
 from conevo.worlds.places import draw_places
 from conevo.worlds.protocol import Scenarios, Simulation, kernel_params, names_of
@@ -320,13 +320,13 @@ class GaccWorld:
         c = len(plan.parts)
         per_object = "object_x object_y life detected part holders".split()
         return Simulation(
-            state=Team,
+            state=GaccTeam,
             sizes=dict.fromkeys(per_object, plan.parts.size)
             | {"built": c, "missing": 3 * c, "demand": 3},
-            scene=Scene,
-            params_type=Params,
+            scene=GaccScene,
+            params_type=GaccConstants,
             params=kernel_params(
-                Params,
+                GaccConstants,
                 self.params,
                 n_objects=plan.parts.size,
                 n_complex=c,

@@ -18,7 +18,7 @@ from conevo.parameters import parameters
 from conevo.rng import stream
 from conevo.terms import counted
 from conevo.worlds.protocol import Scenarios, Simulation, World, kernel_params
-from conevo.worlds.pursuit.bodies import N_OBSTACLES, Params, Scene, Team
+from conevo.worlds.pursuit.bodies import N_OBSTACLES, PursuitConstants, PursuitScene, PursuitTeam
 
 __all__ = ["ArenaParams", "ArenaScenarios", "draw_scenarios", "simulate"]
 
@@ -180,7 +180,7 @@ def simulate(
         given: fields of ``bodies.Params`` that its parameters do not have.
     """
     robots = world.n_robots
-    p = kernel_params(Params, world.params, world, team_is_prey=team_is_prey, **given)
+    p = kernel_params(PursuitConstants, world.params, world, team_is_prey=team_is_prey, **given)
     prey = 1 if team_is_prey else bodies - robots
     per_body = (
         "x y heading to_x to_y to_heading left right refused collided collisions "
@@ -193,10 +193,10 @@ def simulate(
         | {"infrared": bodies * 8, "first": 1}
     )
     return Simulation(
-        state=Team,
+        state=PursuitTeam,
         sizes=sizes,
-        scene=Scene,
-        params_type=Params,
+        scene=PursuitScene,
+        params_type=PursuitConstants,
         params=p,
         functions=functions,
         recorded=RECORDED if team_is_prey else (*RECORDED, "captured"),

@@ -12,9 +12,9 @@ from conevo.kernels.random import uniform
 __all__ = [
     "N_OBSTACLES",
     "NONE",
-    "Params",
-    "Scene",
-    "Team",
+    "PursuitConstants",
+    "PursuitScene",
+    "PursuitTeam",
     "command",
     "is_prey",
     "look",
@@ -31,7 +31,7 @@ N_OBSTACLES = wp.constant(6)  # most obstacles of a scenario
 
 
 @wp.struct
-class Params:
+class PursuitConstants:
     """What the kernels need of the parameters of both worlds, by their names."""
 
     n_robots: int
@@ -50,7 +50,7 @@ class Params:
 
 
 @wp.struct
-class Scene:
+class PursuitScene:
     """A scenario: places, and the networks of the prey. Flat over the scenarios of a batch."""
 
     x: wp.array[float]
@@ -67,7 +67,7 @@ class Scene:
 
 
 @wp.struct
-class Team:
+class PursuitTeam:
     """State of a team and its opponents, flat over a batch. B bodies, R robots, Q prey."""
 
     inputs: wp.array2d[float]  # [R, S]
@@ -102,13 +102,13 @@ class Team:
 
 
 @wp.func
-def is_prey(p: Params, b: int) -> bool:
+def is_prey(p: PursuitConstants, b: int) -> bool:
     """Return whether body ``b`` is a prey."""
     return (b < p.n_robots) == (p.team_is_prey != 0)
 
 
 @wp.func
-def wheel_speed(p: Params, b: int) -> float:
+def wheel_speed(p: PursuitConstants, b: int) -> float:
     """Return how far body ``b``'s wheel rolls in an iteration at command 1."""
     return wp.where(is_prey(p, b), p.prey_speed_cm, p.max_speed_cm)
 
@@ -117,7 +117,9 @@ def wheel_speed(p: Params, b: int) -> float:
 
 
 @wp.func
-def look(team: Team, scene: Scene, p: Params, b: int, is_light: bool) -> eight:
+def look(
+    team: PursuitTeam, scene: PursuitScene, p: PursuitConstants, b: int, is_light: bool
+) -> eight:
     """Return the activations of body ``b``'s infrared or light sensors.
 
     Infrared sees walls, obstacles and bodies; light sees prey, over the heads of others.
@@ -165,7 +167,9 @@ def look(team: Team, scene: Scene, p: Params, b: int, is_light: bool) -> eight:
 
 
 @wp.func
-def walk_randomly(team: Team, scene: Scene, p: Params, b: int, t: int) -> wp.vec2f:
+def walk_randomly(
+    team: PursuitTeam, scene: PursuitScene, p: PursuitConstants, b: int, t: int
+) -> wp.vec2f:
     """Return wheel commands of a random walk: straight on, now and then another way.
 
     Choice: it turns with chance 0.05 in an iteration, and whenever its last move was refused.
@@ -176,7 +180,7 @@ def walk_randomly(team: Team, scene: Scene, p: Params, b: int, t: int) -> wp.vec
 
 
 @wp.func
-def pursue(team: Team, scene: Scene, p: Params, b: int, t: int) -> wp.vec2f:
+def pursue(team: PursuitTeam, scene: PursuitScene, p: PursuitConstants, b: int, t: int) -> wp.vec2f:
     """Return wheel commands of the heuristic predator (sections 4.3, 4.6.6).
 
     Straight at the closest prey in light range; else to where it was seen last; else a random walk.
@@ -208,7 +212,7 @@ def pursue(team: Team, scene: Scene, p: Params, b: int, t: int) -> wp.vec2f:
 
 
 @wp.func
-def avoid(team: Team, p: Params, b: int) -> wp.vec2f:
+def avoid(team: PursuitTeam, p: PursuitConstants, b: int) -> wp.vec2f:
     """Return wheel commands of the heuristic prey: ahead, and away from the nearer side.
 
     Choice: the thesis has no heuristic prey; this one turns by the difference between its three
@@ -226,7 +230,7 @@ def avoid(team: Team, p: Params, b: int) -> wp.vec2f:
 
 
 @wp.func
-def think_as_prey(team: Team, scene: Scene, p: Params, b: int) -> wp.vec2f:
+def think_as_prey(team: PursuitTeam, scene: PursuitScene, p: PursuitConstants, b: int) -> wp.vec2f:
     """Return wheel commands of a prey that is not the team: its feed-forward network (fig. 4.2)."""
     left = float(0.0)
     right = float(0.0)
@@ -244,7 +248,9 @@ def think_as_prey(team: Team, scene: Scene, p: Params, b: int) -> wp.vec2f:
 
 
 @wp.func
-def command(team: Team, scene: Scene, p: Params, b: int, t: int) -> wp.vec2f:
+def command(
+    team: PursuitTeam, scene: PursuitScene, p: PursuitConstants, b: int, t: int
+) -> wp.vec2f:
     """Return the wheel commands, left and right, that body ``b``'s controller gives."""
     h = int(NONE)
     if b < p.n_robots:

@@ -13,9 +13,9 @@ from conevo.kernels.actions import begin_counting, count_action
 from conevo.kernels.khepera import RADIUS, drive
 from conevo.worlds.pursuit.bodies import (
     NONE,
-    Params,
-    Scene,
-    Team,
+    PursuitConstants,
+    PursuitScene,
+    PursuitTeam,
     command,
     is_prey,
     look,
@@ -40,7 +40,7 @@ STOP_BELOW = wp.constant(0.1)  # Choice: both wheels below a tenth of full speed
 
 
 @wp.func
-def reset(team: Team, scene: Scene, p: Params, i: int) -> None:
+def reset(team: PursuitTeam, scene: PursuitScene, p: PursuitConstants, i: int) -> None:
     """Put robot ``i`` and the bodies it looks after at their places and clear their records."""
     b = int(i)
     while b < team.x.shape[0]:  # absent bodies too: nothing of another team is left in a record
@@ -70,7 +70,7 @@ def reset(team: Team, scene: Scene, p: Params, i: int) -> None:
 
 
 @wp.func
-def sense(team: Team, scene: Scene, p: Params, i: int, t: int) -> None:
+def sense(team: PursuitTeam, scene: PursuitScene, p: PursuitConstants, i: int, t: int) -> None:
     """Fill robot ``i``'s sensor inputs, and those of prey that are not the team."""
     seen = look(team, scene, p, i, False)
     for k in range(8):
@@ -107,7 +107,9 @@ def overlaps(ax: float, ay: float, bx: float, by: float) -> bool:
 
 
 @wp.func
-def is_refused(team: Team, scene: Scene, p: Params, b: int, x: float, y: float) -> int:
+def is_refused(
+    team: PursuitTeam, scene: PursuitScene, p: PursuitConstants, b: int, x: float, y: float
+) -> int:
     """Return 1 if body ``b`` may not move to a place: wall, obstacle, or another body there now."""
     far = p.arena_cm - RADIUS
     if x < RADIUS or x > far or y < RADIUS or y > far:
@@ -126,7 +128,7 @@ def is_refused(team: Team, scene: Scene, p: Params, b: int, x: float, y: float) 
 
 
 @wp.func
-def act(team: Team, scene: Scene, p: Params, i: int, t: int) -> None:
+def act(team: PursuitTeam, scene: PursuitScene, p: PursuitConstants, i: int, t: int) -> None:
     """Set the wheels of robot ``i`` and of the bodies it looks after; propose where they will be.
 
     A prey of the team that has collided does nothing more in its epoch (section 4.3).
@@ -163,7 +165,7 @@ def primitive(left: float, right: float) -> int:
 
 
 @wp.func
-def commit(team: Team, scene: Scene, p: Params, i: int, t: int) -> None:
+def commit(team: PursuitTeam, scene: PursuitScene, p: PursuitConstants, i: int, t: int) -> None:
     """Move robot ``i`` and the bodies it looks after, unless refused; count the robot's action.
 
     Choice: of two bodies that would overlap where both want to go, neither moves, so that no order
@@ -202,7 +204,7 @@ def commit(team: Team, scene: Scene, p: Params, i: int, t: int) -> None:
 
 
 @wp.func
-def is_captured(team: Team, p: Params, q: int, t: int) -> bool:
+def is_captured(team: PursuitTeam, p: PursuitConstants, q: int, t: int) -> bool:
     """Return whether prey ``q`` is captured in this iteration: immobilized, with predators near."""
     if t + 1 < p.capture_window:
         return False
@@ -227,7 +229,9 @@ def is_captured(team: Team, p: Params, q: int, t: int) -> bool:
 
 
 @wp.func
-def resolve_capture(team: Team, scene: Scene, p: Params, i: int, t: int) -> None:
+def resolve_capture(
+    team: PursuitTeam, scene: PursuitScene, p: PursuitConstants, i: int, t: int
+) -> None:
     """Credit predator ``i`` if any prey is captured, as all predators are (section 4.4).
 
     Each predator finds it out by itself, so nobody writes another's data.
@@ -248,7 +252,9 @@ def resolve_capture(team: Team, scene: Scene, p: Params, i: int, t: int) -> None
 
 
 @wp.func
-def resolve_escape(team: Team, scene: Scene, p: Params, i: int, t: int) -> None:
+def resolve_escape(
+    team: PursuitTeam, scene: PursuitScene, p: PursuitConstants, i: int, t: int
+) -> None:
     """Credit prey ``i`` with the way it has come, the straighter the more; nothing once collided.
 
     Section 4.3: "how far and fast the prey could move in a straight line without colliding".
@@ -266,7 +272,9 @@ def resolve_escape(team: Team, scene: Scene, p: Params, i: int, t: int) -> None:
 
 
 @wp.func
-def outcome_capture(team: Team, scene: Scene, p: Params, t_end: int) -> None:
+def outcome_capture(
+    team: PursuitTeam, scene: PursuitScene, p: PursuitConstants, t_end: int
+) -> None:
     """Write capture time, iteration of the first capture, captures, and the team's collisions."""
     captures = int(0)
     for q in range(team.captured.shape[0]):
@@ -281,7 +289,7 @@ def outcome_capture(team: Team, scene: Scene, p: Params, t_end: int) -> None:
 
 
 @wp.func
-def outcome_escape(team: Team, scene: Scene, p: Params, t_end: int) -> None:
+def outcome_escape(team: PursuitTeam, scene: PursuitScene, p: PursuitConstants, t_end: int) -> None:
     """Write the prey's mean path, and the share of them that collided."""
     path = float(0.0)
     collided = int(0)

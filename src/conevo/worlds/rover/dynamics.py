@@ -21,9 +21,9 @@ __all__ = [
     "FUNCTIONS",
     "N_ACTIONS",
     "ROCK_CELLS",
-    "Params",
-    "Scene",
-    "Team",
+    "RoverConstants",
+    "RoverScene",
+    "RoverTeam",
 ]
 
 # --- state ----------------------------------------------------------------------------------------
@@ -39,7 +39,7 @@ octants = wp.types.vector(length=8, dtype=float)
 
 
 @wp.struct
-class Params:
+class RoverConstants:
     """What the kernels need of ``RoverParams``, by its names; ``NAME_2`` is a square."""
 
     n_robots: int
@@ -58,7 +58,7 @@ class Params:
 
 
 @wp.struct
-class Scene:
+class RoverScene:
     """A scenario: rocks sorted by grid cell, canals, starts. Flat over the scenarios of a batch."""
 
     rock_x: wp.array[float]
@@ -73,7 +73,7 @@ class Scene:
 
 
 @wp.struct
-class Team:
+class RoverTeam:
     """State of a team, flat over a batch. R robots, K rocks."""
 
     inputs: wp.array2d[float]  # [R, 16]
@@ -102,7 +102,7 @@ class Team:
 
 
 @wp.func
-def reset(team: Team, scene: Scene, p: Params, i: int) -> None:
+def reset(team: RoverTeam, scene: RoverScene, p: RoverConstants, i: int) -> None:
     """Put rover ``i`` at its start and clear its share of what is recorded."""
     team.x[i] = scene.start_x[i]
     team.y[i] = scene.start_y[i]
@@ -129,7 +129,7 @@ def rock_cell(v: float) -> int:
 
 
 @wp.func
-def sense(team: Team, scene: Scene, p: Params, i: int, t: int) -> None:
+def sense(team: RoverTeam, scene: RoverScene, p: RoverConstants, i: int, t: int) -> None:
     """Fill rover ``i``'s 16 sensor inputs (eqs 5.2, 5.3), each mapped monotonically into [0, 1].
 
     Choice: a rover sensor reads setting d_min^2 / (3 d^2); a rock sensor z / (1 + z) with z the
@@ -190,7 +190,9 @@ def sense(team: Team, scene: Scene, p: Params, i: int, t: int) -> None:
 
 
 @wp.func
-def is_refused(team: Team, scene: Scene, p: Params, i: int, x: float, y: float) -> bool:
+def is_refused(
+    team: RoverTeam, scene: RoverScene, p: RoverConstants, i: int, x: float, y: float
+) -> bool:
     """Return whether rover ``i`` may not move to a place: edge, canal, or another rover there."""
     if x < 0.0 or x >= 1.0 or y < 0.0 or y >= 1.0:
         return True
@@ -201,7 +203,7 @@ def is_refused(team: Team, scene: Scene, p: Params, i: int, x: float, y: float) 
 
 
 @wp.func
-def act(team: Team, scene: Scene, p: Params, i: int, t: int) -> None:
+def act(team: RoverTeam, scene: RoverScene, p: RoverConstants, i: int, t: int) -> None:
     """Choose rover ``i``'s action from its outputs (section 5.2) and propose where it will be.
 
     A heuristic rover draws its action from table 5.3 and, if it moves, a random direction.
@@ -232,7 +234,7 @@ def act(team: Team, scene: Scene, p: Params, i: int, t: int) -> None:
 
 
 @wp.func
-def commit(team: Team, scene: Scene, p: Params, i: int, t: int) -> None:
+def commit(team: RoverTeam, scene: RoverScene, p: RoverConstants, i: int, t: int) -> None:
     """Make rover ``i``'s proposal its state, count the action and pay for it.
 
     Choice: of two rovers that propose the same place, the one with the lower number gets it.
@@ -269,7 +271,7 @@ def partner(rock_type: int, setting: int) -> int:
 
 
 @wp.func
-def resolve(team: Team, scene: Scene, p: Params, i: int, t: int) -> None:
+def resolve(team: RoverTeam, scene: RoverScene, p: RoverConstants, i: int, t: int) -> None:
     """Mark what rover ``i``'s activation covers and credit the rocks it detects with another.
 
     Both rovers of a pair find the detection by themselves, so nobody writes another's data;
@@ -330,7 +332,13 @@ def resolve(team: Team, scene: Scene, p: Params, i: int, t: int) -> None:
 
 @wp.func
 def is_paired(
-    team: Team, scene: Scene, p: Params, mates: wp.uint64, need: int, k: int, t: int
+    team: RoverTeam,
+    scene: RoverScene,
+    p: RoverConstants,
+    mates: wp.uint64,
+    need: int,
+    k: int,
+    t: int,
 ) -> bool:
     """Return whether one of the mates has the needed setting and succeeds on rock ``k``."""
     r = p.ranges[need]
@@ -350,7 +358,7 @@ def is_paired(
 
 
 @wp.func
-def outcome(team: Team, scene: Scene, p: Params, t_end: int) -> None:
+def outcome(team: RoverTeam, scene: RoverScene, p: RoverConstants, t_end: int) -> None:
     """Write the team's task performance: value the lander has recorded, share of area covered."""
     value = float(0.0)
     for k in range(team.detected.shape[0]):

@@ -51,7 +51,13 @@ from conevo.worlds.measures import Measure
 from conevo.worlds.places import draw_places
 from conevo.worlds.protocol import Scenarios, Simulation, kernel_params, names_of
 from conevo.worlds.rover import canals, rocks
-from conevo.worlds.rover.dynamics import FUNCTIONS, ROCK_CELLS, Params, Scene, Team
+from conevo.worlds.rover.dynamics import (
+    FUNCTIONS,
+    ROCK_CELLS,
+    RoverConstants,
+    RoverScene,
+    RoverTeam,
+)
 
 __all__ = ["RoverParams", "RoverScenarios", "RoverWorld"]
 
@@ -236,14 +242,14 @@ class RoverWorld:
     def simulation(self) -> Simulation:
         """Return the Warp side of this world."""
         return Simulation(
-            state=Team,
+            state=RoverTeam,
             sizes={
                 "detected": int(sum(rocks.mix(self.environment))),
                 "cover": self.n_robots * int(COVER_WORDS),
             },
-            scene=Scene,
-            params_type=Params,
-            params=kernel_params(Params, self.params),
+            scene=RoverScene,
+            params_type=RoverConstants,
+            params=kernel_params(RoverConstants, self.params),
             functions=FUNCTIONS,
             recorded=("x", "y", "action", "setting", "energy", "covered", "value", "fitness"),
             recorded_at_end=("detected",),
