@@ -114,7 +114,7 @@ def _build_worlds(runs: Iterable[PlannedRun]) -> None:
 
     Raises:
         UsageError: a world in a file of its own, whose author made a mistake.
-        EnvironmentFailure: there is no place for compiled kernels.
+        EnvironmentFailure: compiled kernels cannot be written.
     """
     from conevo.controllers.registry import DEFAULT, controller
     from conevo.worlds.simulators import simulator
@@ -270,7 +270,7 @@ class Campaign:
 
         Raises:
             UsageError: a coordinator is at work already, or other code has begun the campaign.
-            EnvironmentFailure: there is no place for compiled kernels, or for the campaign's files.
+            EnvironmentFailure: compiled kernels or the campaign's files cannot be written.
             Stopped: by ``stop``, or the time is over; the campaign can be carried on.
         """
         limit = time_limit if isinstance(time_limit, TimeLimit) else TimeLimit(time_limit)

@@ -20,7 +20,7 @@ import warp as wp
 from annotated_types import Ge, Gt, Le
 
 from conevo.controllers.protocol import Bools, Floats, Genome, Mind
-from conevo.errors import UsageError
+from conevo.controllers.slots import Slots
 from conevo.kernels.outputs import sigmoid, sigmoid_of
 from conevo.parameters import parameters
 
@@ -140,17 +140,9 @@ def think(
 
 
 @parameters("controller")
-class Ctrnn:
-    """Settings of a continuous-time recurrent network; see the module.
+class Ctrnn(Slots):
+    """Settings of a continuous-time recurrent network; see the module."""
 
-    Raises:
-        UsageError: fewer slots than neurons at the start.
-    """
-
-    n_hidden: Annotated[int, Ge(1), Le(16)] = 10
-    """(neurons) hidden neurons at the start, and those that feed back."""
-    max_hidden: Annotated[int, Ge(1), Le(32)] = 20
-    """(neurons) hidden neurons that it can grow to."""
     weight_scale: Annotated[float, Gt(0), Le(1000)] = 10.0
     """connection weight, or bias, of gene 1."""
     slowest: Annotated[float, Ge(1), Le(10_000)] = 20.0
@@ -159,13 +151,6 @@ class Ctrnn:
     name: ClassVar[str] = "ctrnn"
     max_outputs: ClassVar[int] = 64
     n_memory: ClassVar[int] = 2
-
-    def __post_init__(self) -> None:
-        if self.max_hidden < self.n_hidden:
-            raise UsageError(
-                f"controller.max_hidden ({self.max_hidden}) must not be below n_hidden "
-                f"({self.n_hidden})"
-            )
 
     def genome(self, n_inputs: int, n_outputs: int) -> Genome:
         """Return what a network is built from: hidden neurons."""

@@ -18,10 +18,10 @@ from typing import Annotated, ClassVar
 
 import numpy as np
 import warp as wp
-from annotated_types import Ge, Gt, Le
+from annotated_types import Gt, Le
 
 from conevo.controllers.protocol import Bools, Floats, Genome, Mind
-from conevo.errors import UsageError
+from conevo.controllers.slots import Slots
 from conevo.kernels.outputs import sigmoid, sigmoid_of
 from conevo.parameters import parameters
 
@@ -168,17 +168,9 @@ def think(
 
 
 @parameters("controller")
-class Srn:
-    """Settings of a simple recurrent network; see the module.
+class Srn(Slots):
+    """Settings of a simple recurrent network; see the module."""
 
-    Raises:
-        UsageError: fewer slots than neurons at the start.
-    """
-
-    n_hidden: Annotated[int, Ge(1), Le(16)] = 10
-    """(neurons) hidden neurons at the start, and context inputs."""
-    max_hidden: Annotated[int, Ge(1), Le(32)] = 20
-    """(neurons) hidden neurons that it can grow to."""
     recurrent: bool = True
     """whether it has context inputs; without it is feed-forward."""
     bias: bool = False
@@ -189,13 +181,6 @@ class Srn:
     name: ClassVar[str] = "srn"
     max_outputs: ClassVar[int] = 8
     n_memory: ClassVar[int] = 1
-
-    def __post_init__(self) -> None:
-        if self.max_hidden < self.n_hidden:
-            raise UsageError(
-                f"controller.max_hidden ({self.max_hidden}) must not be below n_hidden "
-                f"({self.n_hidden})"
-            )
 
     @property
     def n_context(self) -> int:

@@ -18,9 +18,9 @@ __all__ = ["Ending", "Executor", "Job"]
 
 @dataclass(frozen=True)
 class Job:
-    """One run to carry out, on so many threads and, if it has not begun, on this device.
+    """One run to execute, with its number of threads and, if it has not begun, its device.
 
-    ``limit`` is for an executor that is no other process.
+    ``limit`` is for an executor that runs in this process.
     """
 
     root: Path
