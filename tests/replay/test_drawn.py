@@ -62,7 +62,10 @@ def test_the_ball_and_its_goal_are_drawn():
 def test_it_needs_no_code_of_the_world(tmp_path):
     path = tmp_path / "epoch.npz"
     epoch(BALL, 80).save(path)
-    assert playback_of(Trajectory.load(path)) is not None
+    (ball,), (goal,) = (
+        getattr(playback_of(Trajectory.load(path)), k) for k in ("things", "backdrop")
+    )
+    assert (ball.name, goal.label) == ("ball", "goal")
     assert Trajectory.load(path).about == epoch(BALL, 80).about
 
 
