@@ -33,6 +33,7 @@ import warp as wp
 from annotated_types import Ge, Gt, Le
 
 from conevo.kernels.actions import begin_counting, count_action, heuristic_action
+from conevo.kernels.arrays import named_arrays
 from conevo.kernels.outputs import highest
 from conevo.kernels.random import uniform
 from conevo.kernels.steps import steered_step
@@ -73,18 +74,18 @@ class Scene:
     seed: wp.array[wp.uint64]
 
 
-@wp.struct
+@named_arrays
 class Team:
-    """State of a team: R elements each; the ball has one x and one y."""
+    """State of a team; the ball has one x and one y."""
 
-    inputs: wp.array2d[float]  # [R, 4]
-    outputs: wp.array2d[float]  # [R, 4]
+    inputs: wp.array2d[float]
+    outputs: wp.array2d[float]
     x: wp.array[float]
     y: wp.array[float]
     push_x: wp.array[float]  # by what the robot pushes the ball, nothing if it does not
     push_y: wp.array[float]
     pushes: wp.array[int]
-    ball: wp.array[float]  # [2]
+    ball: Annotated[wp.array[float], "xy"]
     chosen: wp.array[int]
     action: wp.array[int]
     heuristic: wp.array[int]
@@ -239,7 +240,7 @@ class BallWorld:
         phases = (reset, sense, act, commit, settle, resolve, outcome)
         return Simulation(
             state=Team,
-            sizes={"ball": 2},
+            sizes={"xy": 2},
             scene=Scene,
             params_type=Params,
             params=kernel_params(Params, self.params),

@@ -228,7 +228,7 @@ def load(w, seen, t):
         for robot, value in zip(w.robots, seen[name][t].tolist(), strict=True):
             setattr(robot, name, value)
     for i, robot in enumerate(w.robots):
-        robot.counts = seen["counts"][t].reshape(len(w.robots), -1)[i].tolist()
+        robot.counts = seen["counts"][t][i].tolist()
         robot.inputs = seen["inputs"][t, i].tolist()
         robot.context = seen["hidden"][t, i, : len(robot.context)].tolist()
     for name, ours in OBJECT.items():

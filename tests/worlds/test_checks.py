@@ -18,6 +18,19 @@ from conevo.worlds import checking
 from conevo.worlds.checks import findings
 from worlds.test_outside import TEXT, line_with, written
 
+TEAM = TEXT[TEXT.index("@wp.struct\nclass Team") : TEXT.index("@wp.func\ndef light(")]
+
+
+IMPORT = "from conevo.kernels.arrays import named_arrays\n"
+
+
+def named(field: str, dimension: str) -> str:
+    """Return the team's state with a dimension given to one of its fields."""
+    text = TEAM.replace("@wp.struct", f"{IMPORT}\n@named_arrays")
+    given = f'{field}: Annotated[wp.array[float], "{dimension}"]'
+    return text.replace(f"{field}: wp.array[float]", given)
+
+
 # One line changed, and the topic and words of the one problem that must be found.
 DECLARED = {
     "phase": ("(reset, sense, act,", "(reset, sense,", "structure", "has no phase 'act'; a world"),
@@ -60,9 +73,13 @@ DECLARED = {
                  "unknown array 'acton' in Simulation.recorded; did you mean 'action'?"),
     "must be": ('"action", "fitness")', '"action")', "structure", "recorded must have 'fitness'"),
     "sizes": ("recorded=(", "sizes={'lights': 2}, recorded=(", "structure",
-              "unknown array 'lights' in Simulation.sizes"),
-    "size": ("recorded=(", "sizes={'fitness': 2}, recorded=(", "structure",
-             "Simulation.sizes['fitness'] must be 3 (robots)"),
+              "Simulation.sizes has 'lights', which is no dimension of an array of Team"),
+    "size": ("recorded=(", "sizes={'robots': 2}, recorded=(", "structure",
+             "Simulation.sizes must not have 'robots', which is 3 in this world"),
+    "dimension": (TEAM, named("y", "robot"), "structure",
+                  "unknown dimension 'robot' in Team.y; did you mean 'robots'?"),
+    "dimensions": (TEAM, named("fitness", "castes"), "structure",
+                   "Team.fitness must have the dimensions robots"),
     "made of": ("kernel_params(Params, self.params)", "self.params", "structure",
                 "must be made of"),
     "bounds": ("step: Annotated[float, Gt(0), Le(0.1)]", "step: float", "parameters",
@@ -132,7 +149,11 @@ def move_light(team: Team, i: int) -> None:
 
 """
 RESET = "@wp.func\ndef reset("
-FIELDS = ["moved", "left", "kept"]
+FIELDS = [
+    '    moved: Annotated[wp.array[float], "team"]\n',
+    "    left: wp.array[float]\n",
+    '    kept: Annotated[wp.array[float], "team"]\n',
+]
 
 
 def problems(file: Path) -> list[tuple[str, str]]:
@@ -163,10 +184,11 @@ def faulty(path: Path, name: str) -> Path:
         ("class LightParams:", f"{{}}\n    fault: Annotated[int, Ge(0), Le(99)] = {number}\n"),
         ("    step: float\n", "{}    fault: int\n    zero: float\n"),
         (given, "kernel_params(Params, self.params, zero=0.0)"),
-        (state, "{}" + "".join(f"    {name}: wp.array[float]\n" for name in FIELDS)),
+        (state, "{}" + "".join(FIELDS)),
+        ("@wp.struct\nclass Team:", "@named_arrays\nclass Team:"),
+        ("import warp as wp\n", "{}" + IMPORT),
         (RESET, MOVE_LIGHT + "{}"),
         (begin, "{}    if i == 0:\n        team.kept[0] = 0.0\n        team.moved[0] = 0.0\n"),
-        ("recorded=(", "sizes=dict(moved=1, kept=1), {}"),
     ):
         assert text.count(old) == 1, old
         text = text.replace(old, new.replace("{}", old))

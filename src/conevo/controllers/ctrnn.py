@@ -21,6 +21,7 @@ from annotated_types import Ge, Gt, Le
 
 from conevo.controllers.protocol import Bools, Floats, Genome, Mind
 from conevo.controllers.slots import Slots
+from conevo.kernels.arrays import named_arrays
 from conevo.kernels.outputs import sigmoid, sigmoid_of
 from conevo.parameters import parameters
 
@@ -39,27 +40,27 @@ class CtrnnShape:
     slowest: float
 
 
-@wp.struct
+@named_arrays
 class CtrnnWeights:
     """Weights of a team's networks.
 
-    w_in [R, slots, inputs + context]; w_out [R, slots, outputs]; bias and rate [R, slots], the
-    neuron's bias and the share of the way that it goes in an iteration; filled [R, slots].
+    Feeds: inputs, then context. bias and rate: the neuron's bias, and the share of the way that it
+    goes in an iteration.
     """
 
-    w_in: wp.array[float]
-    w_out: wp.array[float]
-    bias: wp.array[float]
-    rate: wp.array[float]
-    filled: wp.array[int]
+    w_in: Annotated[wp.array[float], "robots", "slots", "feeds"]
+    w_out: Annotated[wp.array[float], "robots", "slots", "outputs"]
+    bias: Annotated[wp.array[float], "robots", "slots"]
+    rate: Annotated[wp.array[float], "robots", "slots"]
+    filled: Annotated[wp.array[int], "robots", "slots"]
 
 
-@wp.struct
+@named_arrays
 class CtrnnMemory:
-    """Of a team's neurons: activations and states [R, slots], 0 in empty slots."""
+    """Of a team's neurons: activations and states, 0 in empty slots."""
 
-    hidden: wp.array[float]
-    state: wp.array[float]
+    hidden: Annotated[wp.array[float], "robots", "slots"]
+    state: Annotated[wp.array[float], "robots", "slots"]
 
 
 @wp.func
@@ -162,14 +163,13 @@ class Ctrnn(Slots):
         shape.n_inputs, shape.n_context, shape.n_outputs = n_inputs, self.n_hidden, n_outputs
         shape.n_slots, shape.weight_scale = self.max_hidden, self.weight_scale
         shape.slowest = self.slowest
-        per_slot = {"w_in": n_inputs + self.n_hidden, "w_out": n_outputs, "bias": 1, "rate": 1}
-        per_slot |= {"filled": 1, "hidden": 1, "state": 1}
+        feeds = n_inputs + self.n_hidden
         return Mind(
             weights=CtrnnWeights,
             memory=CtrnnMemory,
             shape=shape,
             shape_type=CtrnnShape,
-            sizes={name: self.max_hidden * size for name, size in per_slot.items()},
+            sizes={"slots": self.max_hidden, "feeds": feeds, "outputs": n_outputs},
             load=load,
             clear=clear,
             think=think,

@@ -22,6 +22,7 @@ from annotated_types import Gt, Le
 
 from conevo.controllers.protocol import Bools, Floats, Genome, Mind
 from conevo.controllers.slots import Slots
+from conevo.kernels.arrays import named_arrays
 from conevo.kernels.outputs import sigmoid, sigmoid_of
 from conevo.parameters import parameters
 
@@ -43,27 +44,26 @@ class GruShape:
     weight_scale: float
 
 
-@wp.struct
+@named_arrays
 class GruWeights:
     """Weights of a team's networks.
 
-    w_in [R, slots, 3, inputs + context + 1], of reset gate, update gate and candidate, the bias
-    last; w_out [R, slots, outputs]; filled [R, slots].
+    Gates: reset gate, update gate and candidate. Feeds: inputs, context, and the bias last.
     """
 
-    w_in: wp.array[float]
-    w_out: wp.array[float]
-    filled: wp.array[int]
+    w_in: Annotated[wp.array[float], "robots", "slots", "gates", "feeds"]
+    w_out: Annotated[wp.array[float], "robots", "slots", "outputs"]
+    filled: Annotated[wp.array[int], "robots", "slots"]
 
 
-@wp.struct
+@named_arrays
 class GruMemory:
-    """Of a team's neurons [R, slots], 0 in empty slots: activations, and three to compute them."""
+    """Of a team's neurons, 0 in empty slots: activations, and three to compute them."""
 
-    hidden: wp.array[float]
-    reset: wp.array[float]
-    update: wp.array[float]
-    candidate: wp.array[float]
+    hidden: Annotated[wp.array[float], "robots", "slots"]
+    reset: Annotated[wp.array[float], "robots", "slots"]
+    update: Annotated[wp.array[float], "robots", "slots"]
+    candidate: Annotated[wp.array[float], "robots", "slots"]
 
 
 @wp.func
@@ -193,14 +193,13 @@ class Gru(Slots):
         shape = GruShape()
         shape.n_inputs, shape.n_context, shape.n_outputs = n_inputs, self.n_hidden, n_outputs
         shape.n_slots, shape.weight_scale = self.max_hidden, self.weight_scale
-        per_slot = {"w_in": 3 * (n_inputs + self.n_hidden + 1), "w_out": n_outputs, "filled": 1}
-        per_slot |= dict.fromkeys(("hidden", "reset", "update", "candidate"), 1)
+        feeds = n_inputs + self.n_hidden + 1
         return Mind(
             weights=GruWeights,
             memory=GruMemory,
             shape=shape,
             shape_type=GruShape,
-            sizes={name: self.max_hidden * size for name, size in per_slot.items()},
+            sizes={"slots": self.max_hidden, "gates": 3, "feeds": feeds, "outputs": n_outputs},
             load=load,
             clear=clear,
             think=think,

@@ -46,17 +46,18 @@ class Mind:
     """The Warp side of a controller, for robots with so many inputs and outputs.
 
     Attributes:
-        weights: struct type; its one-dimensional arrays hold a team's robots one after another.
+        weights: struct type; its arrays name their dimensions (``kernels.arrays``), "robots" first,
+            which is all that an array without names has.
         memory: struct type, likewise.
         shape: an instance of ``shape_type``: the sizes that the functions need.
         shape_type: struct type.
-        sizes: elements that one robot needs of each array of weights and memory.
+        sizes: of the dimensions other than "robots" that the arrays name.
         load: ``load(weights, shape, i, genes, rows, n)`` builds robot i's controller from the pool
             of genotypes ``genes`` [K, G] and the rows [N, R, U] of team n, -1 for an empty slot.
         clear: ``clear(memory, shape, i)`` lets robot i remember nothing.
         think: ``think(weights, memory, shape, inputs, outputs, i)`` fills robot i's outputs [R, O]
             from its inputs [R, S] and its memory, and writes nothing of another robot.
-        probe: the array of the memory that shows the activation of each slot, [R, slots or more].
+        probe: the array [R, U or more] of the memory that shows the activation of each slot.
     """
 
     weights: Any

@@ -22,6 +22,7 @@ from annotated_types import Gt, Le
 
 from conevo.controllers.protocol import Bools, Floats, Genome, Mind
 from conevo.controllers.slots import Slots
+from conevo.kernels.arrays import named_arrays
 from conevo.kernels.outputs import sigmoid, sigmoid_of
 from conevo.parameters import parameters
 
@@ -47,25 +48,25 @@ class SrnShape:
     bias: float
 
 
-@wp.struct
+@named_arrays
 class SrnWeights:
     """Weights of a team's networks (or, flat, of a batch of teams).
 
-    w_in [R, chunks, inputs] of 16 slots; w_out [R, slots] of 8 outputs; filled [R, chunks] of 16
-    slots, 1 where a slot holds a neuron; n_used [R], one above the last filled slot.
+    A chunk is 16 slots. Feeds: inputs, then context. filled: 1 where a slot holds a neuron. n_used:
+    one above the last filled slot.
     """
 
-    w_in: wp.array[wide_vector]
-    w_out: wp.array[out_vector]
-    filled: wp.array[wide_vector]
+    w_in: Annotated[wp.array[wide_vector], "robots", "chunks", "feeds"]
+    w_out: Annotated[wp.array[out_vector], "robots", "slots"]
+    filled: Annotated[wp.array[wide_vector], "robots", "chunks"]
     n_used: wp.array[int]
 
 
-@wp.struct
+@named_arrays
 class SrnMemory:
-    """Activations of a team's hidden neurons [R, chunks * 16], 0 in empty slots."""
+    """Activations of a team's hidden neurons, 0 in empty slots."""
 
-    hidden: wp.array[float]
+    hidden: Annotated[wp.array[float], "robots", "slots"]
 
 
 @wp.func
@@ -202,19 +203,12 @@ class Srn(Slots):
         shape.n_chunks = chunks = -(-self.max_hidden // int(WIDE))
         shape.weight_scale = self.weight_scale
         shape.bias = float(self.bias)
-        slots = chunks * int(WIDE)
         return Mind(
             weights=SrnWeights,
             memory=SrnMemory,
             shape=shape,
             shape_type=SrnShape,
-            sizes={
-                "w_in": chunks * shape.n_inputs,
-                "w_out": slots,
-                "filled": chunks,
-                "n_used": 1,
-                "hidden": slots,
-            },
+            sizes={"chunks": chunks, "slots": chunks * int(WIDE), "feeds": shape.n_inputs},
             load=load,
             clear=clear,
             think=think,

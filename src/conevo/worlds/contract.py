@@ -7,17 +7,18 @@ import numpy as np
 import warp as wp
 
 from conevo.errors import UsageError, unknown_name
-from conevo.worlds.measures import measures_of
+from conevo.kernels.arrays import dimensions, shapes
 from conevo.worlds.protocol import Simulation, World
 
 __all__ = [
     "PHASES",
     "TEAM_PHASE",
     "faults",
+    "dimensions_of",
     "faults_of_names",
     "refuse_faults",
     "scenario_faults",
-    "sizes_of",
+    "shapes_of",
 ]
 
 
@@ -47,7 +48,16 @@ STATE = {
     "performance": float,
 }
 STRUCT = type(_Nothing)
-WIDE = ("inputs", "outputs")  # [R, S] and [R, O]
+WIDE = ("inputs", "outputs")
+# The dimensions of arrays that every world has; all others have one element for each robot unless
+# they name what they have.
+DIMENSIONS = {
+    "inputs": ("robots", "inputs"),
+    "outputs": ("robots", "outputs"),
+    "counts": ("robots", "castes"),
+    "performance": ("measures",),
+}
+ROBOTS = ("robots",)
 RECORDED = ("action", "fitness")
 
 
@@ -61,11 +71,20 @@ def refuse_faults(world: World, simulation: Simulation) -> None:
         raise UsageError(f"world {world.name}: {fault}")
 
 
-def sizes_of(world: World, simulation: Simulation) -> dict[str, int]:
-    """Return how many elements of each flat array of the state one team needs."""
-    arrays = [name for name, var in simulation.state.vars.items() if wp.types.is_array(var.type)]
-    known = {"counts": world.n_robots * len(world.castes), "performance": len(world.performance)}
-    return dict.fromkeys(arrays, world.n_robots) | known | simulation.sizes
+def dimensions_of(simulation: Simulation) -> dict[str, tuple[str, ...]]:
+    """Return the names of the dimensions of each array of a team's state."""
+    return dimensions(simulation.state, lambda name: DIMENSIONS.get(name, ROBOTS))
+
+
+def shapes_of(world: World, simulation: Simulation) -> dict[str, tuple[int, ...]]:
+    """Return the shape of each array of a team's state."""
+    return shapes(dimensions_of(simulation), _known_sizes(world) | simulation.sizes)
+
+
+def _known_sizes(world: World) -> dict[str, int]:
+    """Return the sizes of the dimensions that every world has."""
+    named = {n: len(getattr(world, n)) for n in ("inputs", "outputs", "castes")}
+    return {"robots": world.n_robots, "measures": len(world.performance), "team": 1} | named
 
 
 def faults(world: World, simulation: Simulation) -> Iterator[str]:
@@ -148,7 +167,7 @@ def _of_state(world: World, simulation: Simulation) -> Iterator[str]:
     for name, kind in fields.items():
         if name not in (*WIDE, *STATE) and not (name in arrays and kind.ndim == 1):
             yield f"{state.key}.{name} must be a one-dimensional array: only those keep a value"
-    yield from _of_sizes(world, simulation, arrays)
+    yield from _of_dimensions(world, simulation)
     for what in ("recorded", "recorded_at_end"):
         names = getattr(simulation, what)
         for name in names:
@@ -159,17 +178,25 @@ def _of_state(world: World, simulation: Simulation) -> Iterator[str]:
             yield f"Simulation.recorded must have {name!r}"
 
 
-def _of_sizes(world: World, simulation: Simulation, arrays: set[str]) -> Iterator[str]:
-    fixed = {"counts": (world.n_robots * len(world.castes), "robots times castes")}
-    fixed["performance"] = (len(measures_of(world)), "measures")
-    fixed |= {name: (world.n_robots, "robots") for name in STATE if name not in fixed}
+def _of_dimensions(world: World, simulation: Simulation) -> Iterator[str]:
+    key, known = simulation.state.key, _known_sizes(world)
+    named = dimensions_of(simulation)
+    used = {name for names in named.values() for name in names}
     for name, size in simulation.sizes.items():
-        if name not in arrays:
-            yield str(unknown_name("array", name, arrays, "in Simulation.sizes"))
+        if name in known:
+            yield f"Simulation.sizes must not have {name!r}, which is {known[name]} in this world"
+        elif name not in used:
+            yield f"Simulation.sizes has {name!r}, which is no dimension of an array of {key}"
         elif size < 1:
             yield f"Simulation.sizes[{name!r}] must be 1 or more, not {size!r}"
-        elif name in fixed and size != fixed[name][0]:
-            yield f"Simulation.sizes[{name!r}] must be {fixed[name][0]} ({fixed[name][1]})"
+    for array, names in named.items():
+        wanted = DIMENSIONS.get(array, ROBOTS)
+        if array in (*STATE, *WIDE) and names != wanted:
+            yield f"{key}.{array} must have the dimensions {', '.join(wanted)}"
+        for name in names:
+            if name not in known and name not in simulation.sizes:
+                sizes = {*known, *simulation.sizes}
+                yield str(unknown_name("dimension", name, sizes, f"in {key}.{array}"))
 
 
 def _is_array_of(kind: Any, dtype: Any, ndim: int = 1) -> bool:

@@ -65,10 +65,11 @@ class Scenarios:
 class Simulation:
     """The Warp side of a world: what ``worlds.rollout`` needs to run it.
 
-    state: struct type of a team's state, whose arrays are flat over a batch of teams; ``inputs``
-        [R, S] and ``outputs`` [R, O] are what the robots' controllers read and write. sizes:
-        elements that one team needs of those that do not have one for each robot; the world's names
-        tell those of ``counts`` and ``performance``.
+    state: struct type of a team's state; ``inputs`` [R, S] and ``outputs`` [R, O] are what the
+        robots' controllers read and write. An array has one element for each robot unless it names
+        its dimensions (``kernels.arrays``); in a kernel it is flat. sizes: of these dimensions; the
+        world's names tell those of "robots", "inputs", "outputs", "castes" and "measures", and
+        "team" is 1.
     scene: struct type of a scenario; its arrays are those of the scenarios object, by name: flat
         over the scenarios, or of two and more dimensions if all scenarios share them.
     params_type, params: struct type of the parameters, and the parameters.
@@ -181,9 +182,10 @@ class Simulator(Protocol):
         """Play one team [R, U] in one scenario and return what happened in every iteration.
 
         Returns:
-            What is recorded of the world, each [T, its size], ``x``, ``y``, ``action`` [T, R] and
-            ``fitness`` [T, R] among it; ``inputs`` [T, R, S], ``outputs`` [T, R, O], ``hidden``
-            [T, R, U]; ``performance`` [T, measures]. The last row equals what ``evaluate`` gives.
+            What is recorded of the world, each [T, its dimensions]; ``x``, ``y``, ``action`` and
+            ``fitness``, all [T, R], are among it; ``inputs`` [T, R, S], ``outputs`` [T, R, O],
+            ``hidden`` [T, R, U]; ``performance`` [T, measures]. The last row equals what
+            ``evaluate`` gives.
         """
 
     def is_shared(self, name: str) -> bool:

@@ -18,9 +18,10 @@ from conevo.controllers.registry import controller as make_controller
 from conevo.controllers.registry import genome_of, refuse_misfit
 from conevo.errors import EnvironmentFailure, UsageError
 from conevo.kernels import engine
+from conevo.kernels.arrays import allocate, dimensions, shapes
 from conevo.kernels.devices import refuse_unknown_device
 from conevo.kernels.engine import barrier
-from conevo.worlds.contract import PHASES, refuse_faults, scenario_faults, sizes_of
+from conevo.worlds.contract import PHASES, refuse_faults, scenario_faults, shapes_of
 from conevo.worlds.measures import measures_of
 from conevo.worlds.protocol import Outcome, Scenarios, Simulation, World
 
@@ -220,7 +221,12 @@ class Rollout:
             self._kernel = episode_kernel(self._simulation, self._mind)
             mind = self._mind
             self._loading = loading_kernel(mind.weights, mind.shape_type, mind.load)
-        self._sizes = sizes_of(world, self._simulation)
+        self._shapes = shapes_of(world, self._simulation)
+        sizes = {"robots": world.n_robots} | mind.sizes
+        self._mind_shapes = {
+            struct: shapes(dimensions(struct, lambda _: ("robots",)), sizes)
+            for struct in (mind.memory, mind.weights)
+        }
         self._is_built = False
         self._workspace: _Workspace | None = None
 
@@ -312,10 +318,10 @@ class Rollout:
             heuristic: [R] or None.
 
         Returns:
-            The world's recorded arrays, each [T, its size], and those it records at the end as they
-            are; ``inputs`` [T, R, S] and ``outputs`` [T, R, O] of every iteration; ``hidden``
-            [T, R, U], the activation of the part in each slot; ``performance`` [T, measures], each
-            as if the epoch ended there.
+            The world's recorded arrays, each [T, its dimensions], and those it records at the end
+            as they are; ``inputs`` [T, R, S], ``outputs`` [T, R, O] and ``hidden`` [T, R, U], the
+            activation of the part in each slot; ``performance`` [T, measures], each as if the epoch
+            ended there.
         """
         self._refuse_faulty(scenarios)
         if len(scenarios) != 1:
@@ -329,20 +335,17 @@ class Rollout:
         self._load(batch, self._array(genes), teams)
         names = dict.fromkeys((*self._simulation.recorded, "performance", "inputs", "outputs"))
         steps: dict[str, list[npt.NDArray[Any]]] = {name: [] for name in (*names, "hidden")}
-        state, sizes, r = batch.state, self._sizes, self.world.n_robots
-        slots = self._mind.sizes[self._mind.probe]
+        mind = self._mind
+        probe = self._mind_shapes[mind.memory][mind.probe]
         for t in range(self.world.params.iterations):
             job.t_begin, job.t_end = t, t + 1
             self._launch(batch, scene, job, 1)
             for name in names:
-                rows = r if name in ("inputs", "outputs") else sizes[name]
-                steps[name].append(getattr(state, name).numpy()[:rows].copy())
-            seen = getattr(batch.memory, self._mind.probe).numpy()[: r * slots].reshape(r, slots)
+                steps[name].append(self._read(batch, name, 1)[0])
+            seen = _first(getattr(batch.memory, mind.probe), 1, probe)[0]
             steps["hidden"].append(seen[:, : self.genome.max_parts].copy())
-        final = {n: getattr(state, n).numpy() for n in self._simulation.recorded_at_end}
-        return {name: np.stack(values) for name, values in steps.items()} | {
-            name: values[: sizes[name]].copy() for name, values in final.items()
-        }
+        final = {n: self._read(batch, n, 1)[0] for n in self._simulation.recorded_at_end}
+        return {name: np.stack(values) for name, values in steps.items()} | final
 
     def _refuse_faulty(self, scenarios: Scenarios) -> None:
         """Raise UsageError for scenarios that are not those of the world's scene."""
@@ -410,24 +413,20 @@ class Rollout:
             if had is not None:
                 n_worlds, n_teams = max(n_worlds, had.n_worlds), max(n_teams, had.n_teams)
             self._workspace = None  # frees what was there before more is taken
-            r, mind = self.world.n_robots, self._mind
-            state, memory, weights = self._simulation.state(), mind.memory(), mind.weights()
-            for name, size in self._sizes.items():
-                wide = {"inputs": len(self.world.inputs), "outputs": len(self.world.outputs)}
-                shape = (n_worlds * r, wide[name]) if name in wide else n_worlds * size
-                setattr(state, name, self._zeros(shape, self._simulation.state, name))
-            for name in mind.memory.vars:
-                size = n_worlds * r * mind.sizes[name]
-                setattr(memory, name, self._zeros(size, mind.memory, name))
-            for name in mind.weights.vars:
-                size = n_teams * r * mind.sizes[name]
-                setattr(weights, name, self._zeros(size, mind.weights, name))
-            self._workspace = _Workspace(n_worlds, n_teams, state, memory, weights)
+            mind, wanted = self._mind, self._mind_shapes
+            self._workspace = _Workspace(
+                n_worlds,
+                n_teams,
+                allocate(self._simulation.state, self._shapes, n_worlds, self.device),
+                allocate(mind.memory, wanted[mind.memory], n_worlds, self.device),
+                allocate(mind.weights, wanted[mind.weights], n_teams, self.device),
+            )
         assert self._workspace is not None
         return self._workspace
 
-    def _zeros(self, shape: Any, struct: Any, name: str) -> Any:
-        return wp.zeros(shape, dtype=struct.vars[name].type.dtype, device=self.device)
+    def _read(self, batch: _Workspace, name: str, n: int) -> npt.NDArray[Any]:
+        """Return a copy of an array of the first ``n`` worlds' state, [n, its dimensions]."""
+        return _first(getattr(batch.state, name), n, self._shapes[name]).copy()
 
     def _load(self, batch: _Workspace, pool: Any, teams: npt.NDArray[np.int32]) -> None:
         """Build the controllers of some teams."""
@@ -446,11 +445,11 @@ class Rollout:
         )
 
     def _collect(self, batch: _Workspace, n_teams: int, e: int) -> dict[str, npt.NDArray[Any]]:
-        n = n_teams * e
-        return {
-            name: getattr(batch.state, name)
-            .numpy()[: n * self._sizes[name]]
-            .reshape(n_teams, -1)
-            .copy()
-            for name in ("fitness", "counts", "switches", "performance")
-        }
+        names = ("fitness", "counts", "switches", "performance")
+        return {name: self._read(batch, name, n_teams * e) for name in names}
+
+
+def _first(array: Any, n: int, shape: tuple[int, ...]) -> npt.NDArray[Any]:
+    """Return what the first ``n`` parts of a batch hold, each of a shape."""
+    values: npt.NDArray[Any] = array.numpy().reshape(-1, *shape)[:n]
+    return values

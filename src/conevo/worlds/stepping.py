@@ -148,16 +148,13 @@ class Stepper(Rollout):
         wp.launch(self._kernel, dim=self.n_worlds, inputs=[*arguments, *more], device="cpu")
 
     def arrays(self) -> Arrays:
-        """Return the state, each array [B, its size]: what is written there, the next step sees.
+        """Return the state, each array [B, its dimensions].
 
-        ``inputs`` [B, R, S] and ``outputs`` [B, R, O] are what controllers read and write.
+        What is written there, the next step sees.
         """
-        n, r = self.n_worlds, self.world.n_robots
-        state = self._epochs.state
-        seen = {name: getattr(state, name).numpy().reshape(n, -1) for name in self._sizes}
-        for name in ("inputs", "outputs"):
-            seen[name] = getattr(state, name).numpy().reshape(n, r, -1)
-        return seen
+        n, state = self.n_worlds, self._epochs.state
+        shape_of = self._shapes.items()
+        return {name: getattr(state, name).numpy().reshape(n, *shape) for name, shape in shape_of}
 
     def epoch(self, iterations: int) -> Iterator[tuple[str, int]]:
         """Yield the steps of an epoch, in turn, with their iterations."""

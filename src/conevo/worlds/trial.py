@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from conevo.rng import stream
+from conevo.worlds.contract import dimensions_of
 from conevo.worlds.measures import measures_of
 from conevo.worlds.protocol import Scenarios, World
 from conevo.worlds.stepping import Arrays, Order, Stepper
@@ -132,7 +133,8 @@ class Trial:
         probe, r = Stepper(*self._task), self.world.n_robots
         probe.step("reset", probe.natural)  # loads the networks
         arrays = probe.arrays()
-        shared = set(self._simulation.sizes) - {"counts"} | {"performance"}
+        named = dimensions_of(self._simulation)
+        shared = {name for name, those in named.items() if those[0] != "robots"}
         foreign: dict[str, tuple[int, int]] = {}
         common: dict[str, set[int]] = {}
         for i in range(r):

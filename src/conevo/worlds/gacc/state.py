@@ -3,9 +3,12 @@
 The rules and the choices stand on the card of ``worlds.gacc.world``.
 """
 
+from typing import Annotated
+
 import warp as wp
 
 from conevo.kernels.actions import NONE
+from conevo.kernels.arrays import named_arrays
 from conevo.kernels.steps import is_taken
 
 __all__ = [
@@ -99,12 +102,12 @@ class GaccScene:
     seed: wp.array[wp.uint64]
 
 
-@wp.struct
+@named_arrays
 class GaccTeam:
-    """State of a team, flat over a batch. R robots, K objects, C complex objects."""
+    """State of a team."""
 
-    inputs: wp.array2d[float]  # [R, 27]
-    outputs: wp.array2d[float]  # [R, 8]
+    inputs: wp.array2d[float]
+    outputs: wp.array2d[float]
     x: wp.array[float]
     y: wp.array[float]
     to_x: wp.array[float]
@@ -119,17 +122,18 @@ class GaccTeam:
     heuristic: wp.array[int]
     energy: wp.array[float]
     fitness: wp.array[float]
-    counts: wp.array[int]  # [R, N_CASTES]
+    counts: wp.array[int]
     switches: wp.array[int]
-    object_x: wp.array[float]
-    object_y: wp.array[float]
-    life: wp.array[int]
-    detected: wp.array[int]  # iteration in which it was sensed first; "known at t" is detected < t
-    part: wp.array[int]  # which part of what it has become: c * M + step
-    holders: wp.array[int]  # how many robots hold it
-    built: wp.array[int]  # [C] parts of each complex object
-    missing: wp.array[int]  # [C, 3] parts of each type that it lacks
-    demand: wp.array[float]  # [3]
+    object_x: Annotated[wp.array[float], "objects"]
+    object_y: Annotated[wp.array[float], "objects"]
+    life: Annotated[wp.array[int], "objects"]
+    # iteration in which it was sensed first; "known at t" is detected < t
+    detected: Annotated[wp.array[int], "objects"]
+    part: Annotated[wp.array[int], "objects"]  # which part of what it has become: c * M + step
+    holders: Annotated[wp.array[int], "objects"]  # how many robots hold it
+    built: Annotated[wp.array[int], "complex_objects"]  # parts of each complex object
+    missing: Annotated[wp.array[int], "complex_objects", "types"]  # parts that it lacks
+    demand: Annotated[wp.array[float], "types"]
     performance: wp.array[float]  # delivered, completed, delivered_share
 
 

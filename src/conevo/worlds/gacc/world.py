@@ -318,11 +318,9 @@ class GaccWorld:
         """Return the Warp side of this world."""
         plan = self.plan
         c = len(plan.parts)
-        per_object = "object_x object_y life detected part holders".split()
         return Simulation(
             state=GaccTeam,
-            sizes=dict.fromkeys(per_object, plan.parts.size)
-            | {"built": c, "missing": 3 * c, "demand": 3},
+            sizes={"objects": plan.parts.size, "complex_objects": c, "types": 3},
             scene=GaccScene,
             params_type=GaccConstants,
             params=kernel_params(

@@ -182,16 +182,7 @@ def simulate(
     robots = world.n_robots
     p = kernel_params(PursuitConstants, world.params, world, team_is_prey=team_is_prey, **given)
     prey = 1 if team_is_prey else bodies - robots
-    per_body = (
-        "x y heading to_x to_y to_heading left right refused collided collisions "
-        "wander known known_x known_y"
-    ).split()
-    sizes = (
-        dict.fromkeys(per_body, bodies)
-        | dict.fromkeys(("captured", "captures"), prey)
-        | dict.fromkeys(("moved", "commanded"), prey * p.capture_window)
-        | {"infrared": bodies * 8, "first": 1}
-    )
+    sizes = {"bodies": bodies, "sensors": 8, "prey": prey, "window": p.capture_window}
     return Simulation(
         state=PursuitTeam,
         sizes=sizes,

@@ -3,8 +3,11 @@
 Nitschke 2009, sections 4.1, 4.3, 4.6.6. What happens to them is ``worlds.pursuit.dynamics``.
 """
 
+from typing import Annotated
+
 import warp as wp
 
+from conevo.kernels.arrays import named_arrays
 from conevo.kernels.khepera import RADIUS, eight, see_disc, see_wall, steer, wrap
 from conevo.kernels.outputs import sigmoid
 from conevo.kernels.random import uniform
@@ -66,37 +69,37 @@ class PursuitScene:
     seed: wp.array[wp.uint64]
 
 
-@wp.struct
+@named_arrays
 class PursuitTeam:
-    """State of a team and its opponents, flat over a batch. B bodies, R robots, Q prey."""
+    """State of a team and its opponents."""
 
-    inputs: wp.array2d[float]  # [R, S]
-    outputs: wp.array2d[float]  # [R, 2]
+    inputs: wp.array2d[float]
+    outputs: wp.array2d[float]
     heuristic: wp.array[int]
-    x: wp.array[float]
-    y: wp.array[float]
-    heading: wp.array[float]
-    to_x: wp.array[float]
-    to_y: wp.array[float]
-    to_heading: wp.array[float]
-    left: wp.array[float]  # wheel commands in [-1, 1]
-    right: wp.array[float]
-    refused: wp.array[int]  # by walls, obstacles and where others are
-    collided: wp.array[int]  # refused for any reason
-    collisions: wp.array[int]
-    infrared: wp.array[float]  # [B, 8]
-    wander: wp.array[float]  # direction of a random walk
-    known: wp.array[int]  # whether there is a last known place of a prey
-    known_x: wp.array[float]
-    known_y: wp.array[float]
-    moved: wp.array[float]  # [Q, window], a ring
-    commanded: wp.array[float]
-    captured: wp.array[int]
-    captures: wp.array[int]
-    first: wp.array[int]  # iteration of the first capture, NONE before
+    x: Annotated[wp.array[float], "bodies"]
+    y: Annotated[wp.array[float], "bodies"]
+    heading: Annotated[wp.array[float], "bodies"]
+    to_x: Annotated[wp.array[float], "bodies"]
+    to_y: Annotated[wp.array[float], "bodies"]
+    to_heading: Annotated[wp.array[float], "bodies"]
+    left: Annotated[wp.array[float], "bodies"]  # wheel commands in [-1, 1]
+    right: Annotated[wp.array[float], "bodies"]
+    refused: Annotated[wp.array[int], "bodies"]  # by walls, obstacles and where others are
+    collided: Annotated[wp.array[int], "bodies"]  # refused for any reason
+    collisions: Annotated[wp.array[int], "bodies"]
+    infrared: Annotated[wp.array[float], "bodies", "sensors"]
+    wander: Annotated[wp.array[float], "bodies"]  # direction of a random walk
+    known: Annotated[wp.array[int], "bodies"]  # whether there is a last known place of a prey
+    known_x: Annotated[wp.array[float], "bodies"]
+    known_y: Annotated[wp.array[float], "bodies"]
+    moved: Annotated[wp.array[float], "prey", "window"]  # a ring
+    commanded: Annotated[wp.array[float], "prey", "window"]
+    captured: Annotated[wp.array[int], "prey"]
+    captures: Annotated[wp.array[int], "prey"]
+    first: Annotated[wp.array[int], "team"]  # iteration of the first capture, NONE before
     action: wp.array[int]
     fitness: wp.array[float]
-    counts: wp.array[int]  # [R, A]
+    counts: wp.array[int]
     switches: wp.array[int]
     performance: wp.array[float]
 

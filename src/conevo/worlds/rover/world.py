@@ -243,10 +243,7 @@ class RoverWorld:
         """Return the Warp side of this world."""
         return Simulation(
             state=RoverTeam,
-            sizes={
-                "detected": int(sum(rocks.mix(self.environment))),
-                "cover": self.n_robots * int(COVER_WORDS),
-            },
+            sizes={"rocks": sum(rocks.mix(self.environment)), "words": int(COVER_WORDS)},
             scene=RoverScene,
             params_type=RoverConstants,
             params=kernel_params(RoverConstants, self.params),
