@@ -1,5 +1,6 @@
 """What every controller promises, for each of the registry, in several worlds."""
 
+from math import prod
 from pathlib import Path
 
 import numpy as np
@@ -7,6 +8,7 @@ import pytest
 
 from conevo.controllers.registry import CONTROLLERS, controller
 from conevo.errors import UsageError
+from conevo.kernels.arrays import dimensions
 from conevo.rng import stream
 from conevo.runs.config import resolve
 from conevo.worlds.protocol import Scenarios
@@ -111,8 +113,10 @@ def test_scenarios_share_a_teams_weights_but_not_memory(case, rollout):
     rollout.evaluate(pool, teams, scenarios)
     at, mind = rollout._workspace, rollout._mind
     for struct, parts in ((at.weights, n), (at.memory, n * e)):
-        for name in struct._cls.vars:
-            assert getattr(struct, name).size == parts * r * mind.sizes[name], name
+        for name, those in dimensions(struct._cls, lambda _: ("robots",)).items():
+            size = prod(mind.sizes.get(one, r) for one in those)
+            assert those[0] == "robots"
+            assert getattr(struct, name).size == parts * size, name
     left = getattr(at.memory, mind.probe).numpy().reshape(n, e, r, -1)
     alone = Rollout(*case, n_threads=1)
     for k in range(n):
