@@ -8,11 +8,11 @@ from typing import Any
 
 import conevo
 import pages
-from conevo.analysis.behaviours import BEHAVIOURS
-from conevo.analysis.captures import COLLECTIVES
-from conevo.analysis.pursuit import observe
-from conevo.analysis.pursuit_tables import composition_table, lesion_table
+from conevo.analysis.caste_tables import composition_table, lesion_table
+from conevo.analysis.observed import observe
 from conevo.specialization.individual import NON_SPECIALIZED
+from conevo.worlds.pursuit.study.behaviours import BEHAVIOURS
+from conevo.worlds.pursuit.study.captures import COLLECTIVES
 from pages import Row
 
 N_SCENARIOS = 20  # per run, as the thesis'
@@ -30,9 +30,11 @@ def tables(runs: dict[str, list[conevo.Run]], title: Title) -> tuple[dict[str, s
     lines = []
     for method, some in runs.items():
         seen = [observe(run, N_SCENARIOS, threads=1) for run in some]
-        counts = Counter(one.collective for team in seen for one in team.all_captures)
-        labels = Counter(life.label for team in seen for life in team.lifetimes)
-        n = sum(counts.values())
+        counts: Counter[str] = Counter()
+        for team in seen:
+            counts.update(team.seen.collectives[1])
+        labels = Counter(label for team in seen for label in team.labels)
+        n = counts.total()
         cells = [f"{counts[name] / n:.0%}".replace("%", " %") if n else "–" for name in COLLECTIVES]
         mix = ", ".join(f"{name} {k / len(some):.3g}" for name, k in labels.most_common())
         lines.append([title(method), len(some), n, *cells, mix])

@@ -12,17 +12,6 @@ WORLDS = re.compile(r"rover|pursuit|gacc|prey|predator", re.IGNORECASE)
 # Claims are a registry of what the thesis says of its worlds.
 FOLDERS = ("worlds/", "analysis/claims/")
 ALLOWED = {
-    # The study that the pursuit world names as what it observes, and its own command.
-    "analysis/behaviour_report.py": "conevo behaviours",
-    "analysis/behaviours.py": "rules of predators' behaviours",
-    "analysis/captures.py": "rules of captures",
-    "analysis/predators.py": "what the pursuit world observes",
-    "analysis/pursuit.py": "recordings of predators",
-    "analysis/pursuit_tables.py": "tables of the thesis' chapter on pursuit",
-    "analysis/reproduction.py": "behaviours reproduced",
-    "analysis/sections/behaviours.py": "words of their section in a report",
-    "analysis/sensors.py": "what predators sense meanwhile",
-    "cli/behaviours.py": "words of the command",
     # The command line: a command, an option and examples of what to type.
     "cli/main.py": "its table of commands has shape-prey",
     "cli/run.py": "its option --prey",

@@ -16,6 +16,7 @@ import pytest
 from analysis.finished_runs import Cell, cells, mean_of, write_campaign
 from conevo.analysis.frames import Tables
 from conevo.analysis.report import sections_of, write_report
+from conevo.analysis.sections.behaviours import behaviours
 from conevo.analysis.sections.champions import champions
 from conevo.analysis.sections.interventions import lesions
 from conevo.analysis.sections.overview import read_campaign
@@ -356,3 +357,21 @@ def test_diversity_that_pays_is_that_of_the_runs_of_a_cell(campaign, report) -> 
     ]
     assert float(row["mean"]) == pytest.approx(np.mean(diversity) * correlation, rel=1e-6)
     assert row["n"] == "4"
+
+
+def test_behaviours_of_no_study_that_is_known_are_shown_by_name(
+    campaign, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def shown() -> list[str]:
+        with Tables(campaign / "tables") as tables:
+            (scope,) = (one for one in scopes(tables) if one.group.world.startswith("pursuit"))
+            found = behaviours(scope)
+            assert found is not None
+            figure, table = found.exhibits
+            assert [column.key for column in table.columns if column.key.startswith("runs ")]
+        return [figure.name, *dict.fromkeys(row["behaviour"] for row in figure.rows)]
+
+    names = ["entrapment", "pursuer-blocker", "spiders-fly", "role-switcher", "none"]
+    assert shown() == ["pursuit-team-captures", *names]
+    monkeypatch.setattr("conevo.analysis.sections.behaviours.studies", dict)
+    assert shown() == ["pursuit-team-occurrences", *sorted(names[:-1]), "none"]

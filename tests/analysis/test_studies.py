@@ -12,9 +12,7 @@ import numpy as np
 import pytest
 
 import conevo
-from conevo.analysis import pursuit
-from conevo.analysis.behaviours import BEHAVIOURS
-from conevo.analysis.captures import COLLECTIVES, Capture, most_frequent
+from conevo.analysis import observed
 from conevo.analysis.lesions import replacement
 from conevo.analysis.studies import study
 from conevo.errors import UsageError
@@ -25,6 +23,9 @@ from conevo.runs.run import start
 from conevo.specialization import degree
 from conevo.specialization.team import METRICS, Activity, measure
 from conevo.worlds.measures import measures_of
+from conevo.worlds.pursuit.study import observation
+from conevo.worlds.pursuit.study.behaviours import BEHAVIOURS
+from conevo.worlds.pursuit.study.captures import COLLECTIVES, Capture, most_frequent
 from conevo.worlds.rollout import Rollout
 from runs.tiny import evolve_tiny, tiny_settings
 
@@ -186,10 +187,10 @@ PURSUIT = "pursuit/team-4"
 
 
 def test_behaviours_of_predators(runs, found) -> None:
-    seen = pursuit.observe(runs[PURSUIT], N, threads=1)
-    labels = [life.label for life in seen.lifetimes]
+    watched = observed.observe(runs[PURSUIT], N, threads=1)
+    seen, labels = watched.seen.seen, watched.labels
     assert [row["caste"] for row in found[PURSUIT]["robots"]] == labels
-    of = [life.specialization for life in seen.lifetimes]
+    of = [life.specialization for life in watched.lifetimes]
     assert [row["specialization"] for row in found[PURSUIT]["robots"]] == of
     counts: dict[str, dict[str, int]] = {"individual": {}, "collective": {}, "team": {}}
     for row in found[PURSUIT]["behaviours"]:
@@ -206,7 +207,7 @@ def test_behaviours_of_predators(runs, found) -> None:
 def test_captures_of_several_kinds(runs, monkeypatch: pytest.MonkeyPatch) -> None:
     names = ["spiders-fly", "entrapment", "spiders-fly", "none"]
     captures = [Capture(0, 0, 1, 2, ((),) * 5, False, 0, name) for name in names]
-    monkeypatch.setattr(pursuit, "find_captures", lambda *_: captures)
+    monkeypatch.setattr(observation, "find_captures", lambda *_: captures)
     rows = study(runs[PURSUIT], 2, threads=1)["behaviours"]
     counts = {(row["kind"], row["behaviour"]): row["count"] for row in rows}
     assert counts["team", "spiders-fly"] == 8  # all captures of the team, of two scenarios
@@ -220,7 +221,7 @@ def test_only_predators_have_behaviours(found) -> None:
 
 
 def test_metrics_of_predators_are_of_behaviours_not_of_motor_primitives(runs, found) -> None:
-    lives = pursuit.observe(runs[PURSUIT], N, threads=1).lifetimes
+    lives = observed.observe(runs[PURSUIT], N, threads=1).lifetimes
     counts = np.array([[share * one.windows for share in one.shares.values()] for one in lives])
     assert counts.shape[1] == len(BEHAVIOURS) + 1
     assert degree([one.switches for one in lives], counts) == pytest.approx(
@@ -235,13 +236,13 @@ def test_metrics_of_predators_are_of_behaviours_not_of_motor_primitives(runs, fo
 def staged(monkeypatch: pytest.MonkeyPatch) -> list[tuple[Any, ...]]:
     """Let predators be labelled by hand, and keep what is played."""
     labels = ["knocker", "idle", "pursuer", "non-specialized", "pursuer"]
-    told, played = pursuit.lifetimes, []
+    told, played = observed.lifetimes, []
     evaluate = Rollout.evaluate
 
-    def label_by_hand(conducts: Any) -> list[Any]:
+    def label_by_hand(*executed: Any) -> list[Any]:
         return [
             dataclasses.replace(one, label=name)
-            for one, name in zip(told(conducts), labels, strict=True)
+            for one, name in zip(told(*executed), labels, strict=True)
         ]
 
     def keep(
@@ -250,7 +251,7 @@ def staged(monkeypatch: pytest.MonkeyPatch) -> list[tuple[Any, ...]]:
         played.append((teams, scenarios, modes))
         return evaluate(self, genes, teams, scenarios, modes, rounds)
 
-    monkeypatch.setattr(pursuit, "lifetimes", label_by_hand)
+    monkeypatch.setattr(observed, "lifetimes", label_by_hand)
     monkeypatch.setattr(Rollout, "evaluate", keep)
     return played
 

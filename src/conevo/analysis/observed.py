@@ -1,48 +1,139 @@
-"""What a world observes of a team besides its actions: a hook of studies.
+"""The fittest team of a run, watched: what its robots are seen to do besides their actions.
 
-A world's class names it as ``observed = "module:function"``; the function takes team, lab, number
-of scenarios, their seed and threads, and returns an ``Observed``.
+A world's study tells behaviours from recorded epochs (``worlds.study``). What follows from them is
+the same for all worlds: each robot's S and caste, and how many robots and teams do what.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from importlib import import_module
-from typing import Any, Protocol
+from collections import Counter
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
+import numpy as np
+
+from conevo.analysis.fittest import equip
+from conevo.analysis.lifetimes import Lifetime, lifetimes
+from conevo.errors import UsageError
+from conevo.rng import fold
 from conevo.runs.champions import Team
 from conevo.runs.lab import Lab
+from conevo.runs.run import Run
+from conevo.specialization.individual import NON_SPECIALIZED
 from conevo.specialization.team import Activity
-from conevo.worlds.protocol import Scenarios
+from conevo.worlds.registry import WORLDS, studies, study_of
+from conevo.worlds.study import Seen, WorldStudy
 
-__all__ = ["Observed", "observed"]
+__all__ = ["Observed", "observe", "studied", "watch"]
 
 
-class Observed(Protocol):
-    """What a team's robots were seen to do, which tells their castes in place of actions."""
+@dataclass(frozen=True)
+class Observed:
+    """A team, watched.
+
+    Attributes:
+        study: of its world.
+        seen: what the study saw.
+        team: its controllers.
+        lab: what simulates it.
+        seed: the scenarios' root.
+    """
+
+    study: WorldStudy
+    seen: Seen
+    team: Team
+    lab: Lab
+    seed: int
+
+    @cached_property
+    def lifetimes(self) -> list[Lifetime]:
+        """Each robot's shares of behaviours, S and label."""
+        return lifetimes(self.seen.executed, self.study.BEHAVIOURS)
 
     @property
-    def castes(self) -> tuple[str, ...]:
-        """Names of what robots can be seen to do, in the order in which they are listed."""
+    def labels(self) -> list[str]:
+        """Caste of each robot: the behaviour it is specialized to, or "non-specialized"."""
+        return [life.label for life in self.lifetimes]
 
     @property
     def activity(self) -> Activity:
-        """How often each robot did what, with its S and caste."""
+        """Windows of each robot in each behaviour, with its S and caste."""
+        lives = self.lifetimes
+        windows = [[share * life.windows for share in life.shares.values()] for life in lives]
+        return Activity(
+            np.rint(windows), np.array([life.specialization for life in lives]), self.labels
+        )
 
     @property
     def behaviours(self) -> list[dict[str, Any]]:
-        """Rows {kind, behaviour, count} of what was seen."""
+        """Rows {kind, behaviour, count}: individual, collective and the team's usual one."""
+        labels = Counter(self.labels)
+        usual, together = self.seen.collectives
+        counts = [
+            *(("individual", name, labels[name]) for name in self.study.BEHAVIOURS),
+            ("individual", NON_SPECIALIZED, labels[NON_SPECIALIZED]),
+            *(("collective", name, n) for name, n in together.items()),
+            ("team", usual, sum(together.values())),
+        ]
+        return [{"kind": kind, "behaviour": name, "count": n} for kind, name, n in counts]
 
-    def together(self, keys: Sequence[int]) -> Scenarios:
-        """Return the scenarios that clones play, one per key."""
+
+def observe(
+    run: Run,
+    scenarios: int = 20,
+    seed: int | None = None,
+    *,
+    threads: int | None = None,
+    rules: Any = None,
+) -> Observed:
+    """Watch the fittest team of a run in fresh scenarios.
+
+    Args:
+        run: of a world with a study, finished or not.
+        scenarios: how many.
+        seed: draws other scenarios than those of the run's own testing phase.
+        threads: CPU threads, all by default.
+        rules: by which behaviours are told, those of the study by default.
+
+    Raises:
+        UsageError: another world, no generation has finished yet, or made with other kernels.
+    """
+    study = studied(run)
+    team, lab = equip(run, threads)
+    return _watched(
+        study, team, lab, scenarios, run.config.run.seed if seed is None else seed, rules
+    )
 
 
-def observed(
-    team: Team, lab: Lab, scenarios: int, seed: int, threads: int | None
-) -> Observed | None:
-    """Return what the team's world observes of it, None if it observes nothing."""
-    module, _, name = getattr(lab.world, "observed", "").partition(":")
-    if not module:
-        return None
-    found: Observed = getattr(import_module(module), name)(team, lab, scenarios, seed, threads)
+def watch(team: Team, lab: Lab, scenarios: int, seed: int) -> Observed | None:
+    """Watch a team in the scenarios of the testing phase; None if its world has no study."""
+    study = study_of(lab.config.entry)
+    return _watched(study, team, lab, scenarios, seed) if study is not None else None
+
+
+def studied(run: Run) -> WorldStudy:
+    """Return the study of a run's world.
+
+    Raises:
+        UsageError: it has none.
+    """
+    found = study_of(run.config.entry)
+    if found is None:
+        there = [(WORLDS[name], one.WORDS.robots) for name, one in studies().items()]
+        whose = " or ".join(f"the {robots} of {entry.name}" for entry, robots in there)
+        first = there[0][0]
+        raise UsageError(
+            f"{run.path} is a run of {run.config.task}: behaviours are those of {whose}, or of a "
+            f"world that inherits it, as in conevo run {first.short_name}/{first.environments[0]}"
+        )
     return found
+
+
+def _watched(
+    study: WorldStudy, team: Team, lab: Lab, scenarios: int, seed: int, rules: Any = None
+) -> Observed:
+    genes, (rows,) = team.as_trial()
+    keys = tuple(fold(seed, "test", k) for k in range(scenarios))
+    seen = study.observe(lab.simulator, genes, rows, keys, seed, rules)
+    return Observed(study, seen, team, lab, seed)

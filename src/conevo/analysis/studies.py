@@ -24,7 +24,7 @@ import numpy.typing as npt
 
 from conevo.analysis.fittest import equip
 from conevo.analysis.lesions import Compared, clone, lesion
-from conevo.analysis.observed import Observed, observed
+from conevo.analysis.observed import Observed, watch
 from conevo.rng import fold
 from conevo.runs.champions import Team
 from conevo.runs.evaluation import describe
@@ -87,10 +87,10 @@ def study(run: Run, scenarios: int = 20, *, threads: int | None = None) -> dict[
     seed = run.config.run.seed
     fresh = lab.world.scenarios([fold(seed, "test", k) for k in range(scenarios)])
     outcome = lab.simulator.evaluate(*team.as_trial(), fresh)
-    seen = observed(team, lab, scenarios, seed, threads)
-    portrait = _portray(lab, outcome, seen)
+    watched = watch(team, lab, scenarios, seed)
+    portrait = _portray(lab, outcome, watched)
     altered = portrait.castes
-    if seen is not None:
+    if watched is not None:
         altered = [caste for caste in altered if caste != NON_SPECIALIZED]
     clones = [fold(seed, "clones", k) for k in range(scenarios)]
     others = lab.world.scenarios([fold(seed, "lesion", k) for k in range(scenarios)])
@@ -101,23 +101,23 @@ def study(run: Run, scenarios: int = 20, *, threads: int | None = None) -> dict[
         portrait.labels,
         portrait.fitness,
         [caste for caste in altered if caste not in NOT_CLONED],
-        seen.together(clones) if seen is not None else lab.world.scenarios(clones),
+        watched.seen.together(clones) if watched is not None else lab.world.scenarios(clones),
     )
     return {
         "scores": _rows("lesion", lesioned) + _rows("clones", cloned),
         "robots": _robots(team, portrait),
         "actions": _actions(lab, outcome),
         "metrics": measure(portrait.activity),
-        "behaviours": [] if seen is None else seen.behaviours,
+        "behaviours": [] if watched is None else watched.behaviours,
     }
 
 
-def _portray(lab: Lab, outcome: Outcome, seen: Observed | None) -> _Portrait:
-    if seen is None:
+def _portray(lab: Lab, outcome: Outcome, watched: Observed | None) -> _Portrait:
+    if watched is None:
         found, order = describe(outcome, lab.world.castes), lab.world.castes
         activity = Activity(_counts(outcome), np.array(found.specialization), found.labels)
     else:
-        activity, order = seen.activity, seen.castes
+        activity, order = watched.activity, watched.study.BEHAVIOURS
     named = [name for name in order if name in activity.labels and name != NON_SPECIALIZED]
     return _Portrait(
         activity=activity,

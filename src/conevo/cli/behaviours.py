@@ -1,16 +1,29 @@
-"""``conevo behaviours``: what the predators of a run's fittest team do."""
+"""``conevo behaviours``: what the robots of a run's fittest team do, each and together."""
 
 from __future__ import annotations
 
 import json
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
+from conevo.worlds.registry import WORLDS
+
+if TYPE_CHECKING:
+    from conevo.worlds.study import WorldStudy
+
 __all__ = ["behaviours"]
 
+STUDIED = " or ".join(entry.short_name for entry in WORLDS.values() if entry.studied)
+HELP = f"""Classify what the fittest team of RUN does in fresh scenarios; nothing is written.
 
-@click.command(short_help="Classify predators: pursuer, blocker, flanker, knocker, idle.")
+RUN must be a run of the {STUDIED} world, or of a world that inherits it.
+
+Try: conevo behaviours runs/hunt
+"""
+
+
+@click.command(help=HELP, short_help="Classify what robots do, each and together.")
 @click.argument("run")
 @click.option(
     "--scenarios",
@@ -33,44 +46,29 @@ __all__ = ["behaviours"]
 def behaviours(
     run: str, scenarios: int, seed: int | None, threads: int | None, as_json: bool
 ) -> None:
-    """Classify what the fittest team of RUN does in fresh scenarios; nothing is written.
-
-    RUN must be a run of the pursuit world.
-
-    Try: conevo behaviours runs/hunt
-    """
+    """Classify what the fittest team of a run does."""
     from conevo.analysis.behaviour_report import behaviour_report
+    from conevo.analysis.observed import studied
     from conevo.cli.find import find_run
 
-    found = behaviour_report(find_run(run), scenarios, seed, threads=threads)
-    click.echo(json.dumps(found) if as_json else _text(found))
+    of = find_run(run)
+    found = behaviour_report(of, scenarios, seed, threads=threads)
+    click.echo(json.dumps(found) if as_json else _text(found, studied(of)))
 
 
-def _text(found: dict[str, Any]) -> str:
-    from conevo.cli.text import castes, number, table
-    from conevo.terms import S_SCALE, counted
+def _text(found: dict[str, Any], study: WorldStudy) -> str:
+    from conevo.cli.text import number, table
+    from conevo.terms import counted
 
-    def two(values: Any) -> list[str]:
-        return [f"{v:.2f}" if isinstance(v, float) else str(v) for v in values]
-
-    lives = found["predators"]
-    names, columns = list(lives[0]["shares"]), ("reproduced", "primitive", "left", "right")
-    seen = {name: n for name, n in found["captures"].items() if n}
-    return "\n".join([
+    measures, parts = study.account(found)
+    lines = [
         f"{found['run']}: fittest team (generation {found['generation']}), "
-        f"{counted(found['scenarios'], 'fresh scenario')}, "
-        f"capture time {number(found['capture_time'])}",
-        f"\nShares of the windows in which a predator interacts or idles (S: {S_SCALE})",
-        table(["", *names, "S", "label"], [
-            [f"predator {k}", *two(one["shares"].values()), number(one["specialization"]),
-             one["label"]] for k, one in enumerate(lives)]),
-        f"\nCaptures: {castes(seen) or 'none'}; most frequent: {found['collective']}",
-        "\nAverages of the sensors, from the front counter-clockwise",
-        table(["", "", *map(str, range(8))], [
-            [row["behaviour"], kind, *two(row[kind])]
-            for row in found["sensors"] for kind in ("proximity", "light")]),
-        "\nWith the sensors held at a predator's own averages (portion of trials)",
-        table(["", "behaviour", *columns, "result"], [
-            [f"predator {row['predator']}", row["behaviour"], *two(row[c] for c in columns),
-             row["result"]] for row in found["reproduction"]]),
-    ])  # fmt: skip
+        f"{counted(found['scenarios'], 'fresh scenario')}"
+        + "".join(f", {name} {number(value)}" for name, value in measures.items())
+    ]
+    for line, head, rows in parts:
+        lines.append(f"\n{line}")
+        if head:
+            cells = [[v if isinstance(v, str) else number(v) for v in row] for row in rows]
+            lines.append(table(head, cells))
+    return "\n".join(lines)

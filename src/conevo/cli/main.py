@@ -31,7 +31,7 @@ VERBS = {
     "replay": "See a run's fittest team in the browser.",
     "film": "Make a film of a run's fittest team (GIF, MP4).",
     "watch": "Follow runs live in the browser.",
-    "behaviours": "Classify predators: pursuer, blocker, flanker, knocker, idle.",
+    "behaviours": "Classify what robots do, each and together.",
     "campaign": "Start, monitor, stop and retry campaigns of many runs.",
     "report": "Write a campaign's report: page, tables, figures, data.",
     "query": "Query a campaign's tables with SQL.",

@@ -168,7 +168,7 @@ def record_epoch(
         "performance": portrait.performance,
         "units": {one.name: _worth(one) for one in measures_of(world)},
     }
-    if like := inherited(world):
+    if like := inherited(type(world)):
         about["like"] = like
     drawn = getattr(world, "drawn", None)
     if drawn is not None:

@@ -22,10 +22,12 @@ class WorldEntry:
     ``module`` holds the classes named ``params_name`` (parameters) and ``world_name`` (built from
     an environment name and parameters). ``drawn`` is the module whose ``playback`` tells what is to
     be drawn of an epoch, without Warp, and ``CASTES`` the colours of its castes; without it, what
-    the world's class says in its own ``drawn`` is (``playback.drawn``). ``product`` is the module
-    that makes a file of a finished shaping in all of its ``TASKS``. An entry in a file outside the
-    package leaves it out; ``worlds.outside`` fills it in, with the file's path, ``files`` (this one
-    first, then the files next to it that it imports) and the digest of their texts.
+    the world's class says in its own ``drawn`` is (``playback.drawn``). ``studied`` is the module
+    that tells what robots are seen to do besides their actions (``study.WorldStudy``), its import
+    without Warp. ``product`` is the module that makes a file of a finished shaping in all of its
+    ``TASKS``. An entry in a file outside the package leaves ``module`` out; ``worlds.outside``
+    fills it in, with the file's path, ``files`` (this one first, then the files next to it that it
+    imports) and the digest of their texts.
     """
 
     name: str
@@ -37,6 +39,7 @@ class WorldEntry:
     world_name: str
     module: str = ""
     drawn: str = ""
+    studied: str = ""
     product: str = ""
     file: str = ""
     files: tuple[str, ...] = ()

@@ -214,9 +214,7 @@ class World(Protocol):
     A world may have a property ``optimum``: the largest possible value of its main task performance
     measure, of which reports then give the share. It has none if smaller is better.
 
-    Its class may have ``drawn``, what replay and film draw next to its robots (``playback.drawn``);
-    and ``observed``, "module:function", what studies see of a team besides its actions
-    (``analysis.observed``).
+    Its class may have ``drawn``, what replay and film draw next to its robots (``playback.drawn``).
 
     A world that is not written in Warp has, in place of ``simulation``, a method
     ``simulator(controller, n_threads)`` that returns a ``Simulator`` of its own.

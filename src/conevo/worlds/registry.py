@@ -9,11 +9,23 @@ from typing import TYPE_CHECKING, Any
 
 from conevo.errors import UsageError, unknown_name
 from conevo.worlds.entry import WorldEntry
+from conevo.worlds.study import load_study
 
 if TYPE_CHECKING:
     from conevo.worlds.protocol import World
+    from conevo.worlds.study import WorldStudy
 
-__all__ = ["WORLDS", "WorldEntry", "colours_of", "inherited", "product_of", "resolve", "world"]
+__all__ = [
+    "WORLDS",
+    "WorldEntry",
+    "colours_of",
+    "inherited",
+    "product_of",
+    "resolve",
+    "studies",
+    "study_of",
+    "world",
+]
 
 
 WORLDS: dict[str, WorldEntry] = {
@@ -40,6 +52,7 @@ WORLDS: dict[str, WorldEntry] = {
             environments=tuple(f"team-{n}" for n in range(1, 11)),
             module="conevo.worlds.pursuit.world",
             drawn="conevo.worlds.pursuit.drawn",
+            studied="conevo.worlds.pursuit.study.predators",
             params_name="PursuitParams",
             world_name="PursuitWorld",
         ),
@@ -140,13 +153,30 @@ def product_of(tasks: Sequence[str]) -> Any:
     return module if module is not None and tuple(tasks) == module.TASKS else None
 
 
-def inherited(world: World) -> str:
+def inherited(world_class: type) -> str:
     """Return the name of the world of the package whose class a world's own inherits, or ""."""
-    classes = {(one.__module__, one.__qualname__) for one in type(world).__mro__[1:]}
+    classes = {(one.__module__, one.__qualname__) for one in world_class.__mro__[1:]}
     for entry in WORLDS.values():
         if (entry.module, entry.world_name) in classes:
             return entry.name
     return ""
+
+
+def study_of(entry: WorldEntry) -> WorldStudy | None:
+    """Return the study of a world, its own or that of the one it inherits, None if none.
+
+    Raises:
+        UsageError: the module that its entry names is not a study.
+    """
+    like = "" if entry.studied else inherited(entry.world_class)
+    module = WORLDS[like].studied if like else entry.studied
+    return load_study(like or entry.name, module) if module else None
+
+
+def studies() -> dict[str, WorldStudy]:
+    """Return the studies that there are by the names of their worlds."""
+    studied = {entry.name: entry.studied for entry in WORLDS.values() if entry.studied}
+    return {name: load_study(name, module) for name, module in studied.items()}
 
 
 def world(path: str, **params: Any) -> World:

@@ -113,7 +113,6 @@ class PursuitWorld:
         "n_hidden": 6,  # section 4.1
         "max_hidden": 12,  # Choice: twice the initial number
     }
-    observed: ClassVar[str] = "conevo.analysis.predators:predators"
     actions: ClassVar[tuple[str, ...]] = ACTIONS
     castes: ClassVar[tuple[str, ...]] = actions
     performance: ClassVar[tuple[Measure, ...]] = (

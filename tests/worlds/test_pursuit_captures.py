@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from analysis.trajectories import PRESS, STOP, around, body, record, setting
-from conevo.analysis.behaviours import BEHAVIOURS, NONE, Conduct, Rules, conduct
-from conevo.analysis.captures import (
+from conevo.worlds.pursuit.study.behaviours import BEHAVIOURS, NONE, Conduct, Rules, conduct
+from conevo.worlds.pursuit.study.captures import (
     COMPOSITIONS,
     Capture,
     find_captures,
     most_frequent,
     name,
 )
+from worlds.trajectories import PRESS, STOP, around, body, record, sizes
 
 LETTERS = {"p": "pursuer", "b": "blocker", "f": "flanker", "k": "knocker", "i": "idle"}
 
@@ -104,7 +104,7 @@ def scene(captured, behaviour=None, x=50.0, n_predators=2, prey_of=None, interac
         10,
     )
     found = {"x": places_x, "y": places, "captured": captured.astype(np.int32)}
-    return find_captures(found, one, setting(n_predators, arena=100.0), Rules())
+    return find_captures(found, one, sizes(n_predators, arena=100.0), Rules())
 
 
 def during(*intervals):
@@ -194,7 +194,7 @@ def test_a_triangle_of_pursuers_and_a_pincer_from_trajectories():
             body(*around((100.0, 100.0), b, 0.1), b + 180.0, [PRESS] * n) for b in bearings
         ]
         seen = record(*predators, prey, captured=held)
-        where = setting(3)
+        where = sizes(3)
         (one,) = find_captures(seen, conduct(seen, where), where)
         assert one.collective == expected
         near_wall = seen | {"x": seen["x"] - 92.0}  # the prey's rim is 5.25 cm from a wall

@@ -28,18 +28,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from conevo.specialization import degree, label, shares
-from conevo.specialization.individual import NON_SPECIALIZED
-
 __all__ = [
     "BEHAVIOURS",
     "NONE",
     "Conduct",
-    "Lifetime",
     "Rules",
-    "Setting",
+    "ArenaSizes",
     "conduct",
-    "lifetimes",
+    "executed",
     "spells",
 ]
 
@@ -103,7 +99,7 @@ class Rules:
 
 
 @dataclass(frozen=True)
-class Setting:
+class ArenaSizes:
     """What the rules must know of the arena and the robots; lengths in cm.
 
     Attributes:
@@ -140,49 +136,30 @@ class Conduct:
     start: int
 
 
-@dataclass(frozen=True)
-class Lifetime:
-    """One predator over all its epochs.
-
-    Attributes:
-        shares: of each behaviour, and of "none", in the windows that count.
-        windows: how many of them.
-        switches: how often the next one held another behaviour.
-        specialization: S = switches / possible ones.
-        label: the behaviour it is specialized to, or "non-specialized".
-    """
-
-    shares: dict[str, float]
-    windows: int
-    switches: int
-    specialization: float
-    label: str
-
-
 def conduct(
-    record: Mapping[str, npt.NDArray[Any]], setting: Setting, rules: Rules | None = None
+    record: Mapping[str, npt.NDArray[Any]], sizes: ArenaSizes, rules: Rules | None = None
 ) -> Conduct:
     """Return what every predator did in every iteration of a recorded epoch.
 
     Args:
         record: x, y, heading (after each iteration), left, right, collided, each [T, B].
-        setting: the arena and the robots.
+        sizes: the arena and the robots.
         rules: where behaviours begin and end.
     """
     rules = rules or Rules()
-    r, w = setting.n_predators, rules.window
+    r, w = sizes.n_predators, rules.window
     place = np.stack([record["x"], record["y"]], axis=-1).astype(np.float64)
     heading = record["heading"].astype(np.float64)
     place_before, heading_before = _before(place), _before(heading)
 
-    chord, direction = _commanded(record, heading_before, setting)
+    chord, direction = _commanded(record, heading_before, sizes)
     way = place_before[:, None, r:] - place_before[:, :r, None]  # [T, R, Q, 2], to the prey
     far = np.maximum(np.linalg.norm(way, axis=-1), 1e-9)
-    gap = far - 2 * setting.radius_cm
+    gap = far - 2 * sizes.radius_cm
     ahead = np.einsum("trk,trqk->trq", direction, way)
     aside = np.sqrt(np.maximum(far**2 - ahead**2, 0.0))
     aims = ahead >= far * math.cos(math.radians(rules.aim_deg))
-    aims |= (ahead > 0) & (aside < 2 * setting.radius_cm)
+    aims |= (ahead > 0) & (aside < 2 * sizes.radius_cm)
     refused = record["collided"][:, :r, None].astype(bool)
     touches = refused & (gap <= rules.touch_cm) & (ahead > 0)
     begins = touches & ~_before(touches)
@@ -191,7 +168,7 @@ def conduct(
 
     turned = np.degrees(np.abs(_last(_wrap(heading - heading_before)[:, :r], w)))
     idle = _last(chord, w) < rules.idle_cm
-    is_prey, is_near = _near(place, setting)
+    is_prey, is_near = _near(place, sizes)
     prey = is_prey.argmin(axis=-1)
 
     def towards(values: npt.NDArray[Any]) -> Floats:
@@ -206,7 +183,7 @@ def conduct(
     beside = (towards(at_rear) >= most) & (towards(gap <= rules.near_cm) == w)
     bumps = towards(begins) >= rules.bumps
 
-    near_prey = is_prey.min(axis=-1) <= setting.range_cm
+    near_prey = is_prey.min(axis=-1) <= sizes.range_cm
     interacts = near_prey & is_near
     found = np.select(
         [idle, bumps & (turned >= rules.arc_deg), bumps & beside, at_prey & faces, at_prey],
@@ -218,33 +195,14 @@ def conduct(
     return Conduct(found.astype(np.int64), interacts, prey.astype(np.int64), w)
 
 
-def lifetimes(conducts: Sequence[Conduct]) -> list[Lifetime]:
-    """Return each predator's shares, S and label over all epochs.
+def executed(conducts: Sequence[Conduct]) -> list[Ints]:
+    """Return each predator's behaviour in the windows that count, ``NONE`` included.
 
-    Nitschke 2009, sections 3.2.1 and 4.6.4: the specialization metric with behaviours for actions.
     Choice: a behaviour holds for a window, so a switch is possible from one window to the next, not
-    in every iteration. Choice: windows of an interaction without a behaviour count as "none", which
-    is also switched to and from; whoever does nothing else most of the time is non-specialized
-    ("perhaps none of the identified behaviors", 4.6.4). Choice: epochs are joined to one life.
+    in every iteration. Choice: epochs are joined to one life.
     """
-    names = (*BEHAVIOURS, "none")
-    lives = []
-    for i in range(conducts[0].behaviour.shape[1]):
-        executed = np.concatenate([_windows(one, i) for one in conducts])
-        counts = np.bincount(np.where(executed == NONE, len(BEHAVIOURS), executed), minlength=6)
-        switches = int((executed[1:] != executed[:-1]).sum())
-        s = float(degree(switches, counts))
-        name = label(s, counts, names)
-        lives.append(
-            Lifetime(
-                shares=dict(zip(names, shares(counts).tolist(), strict=True)),
-                windows=len(executed),
-                switches=switches,
-                specialization=s,
-                label=NON_SPECIALIZED if name == "none" else name,
-            )
-        )
-    return lives
+    predators = range(conducts[0].behaviour.shape[1])
+    return [np.concatenate([_windows(one, i) for one in conducts]) for i in predators]
 
 
 def spells(holds: Bools) -> list[tuple[int, int]]:
@@ -257,28 +215,28 @@ def _windows(one: Conduct, i: int) -> Ints:
     """Return predator ``i``'s behaviour in each of the windows that count."""
     at = slice(one.start, None, one.start)
     behaviour: Ints = one.behaviour[at, i]
-    executed: Ints = behaviour[one.interacts[at, i] | (behaviour != NONE)]
-    return executed
+    counted: Ints = behaviour[one.interacts[at, i] | (behaviour != NONE)]
+    return counted
 
 
 def _commanded(
-    record: Mapping[str, npt.NDArray[Any]], heading: Floats, setting: Setting
+    record: Mapping[str, npt.NDArray[Any]], heading: Floats, sizes: ArenaSizes
 ) -> tuple[Floats, Floats]:
     """Return the predators' steps as commanded, refused or not: length [T, R] and direction."""
-    r = setting.n_predators
+    r = sizes.n_predators
     left, right = (record[side][:, :r].astype(np.float64) for side in ("left", "right"))
-    half = setting.speed_cm * (right - left) / (2 * setting.axle_cm)
-    chord = setting.speed_cm * (left + right) / 2 * np.sinc(half / np.pi)
+    half = sizes.speed_cm * (right - left) / (2 * sizes.axle_cm)
+    chord = sizes.speed_cm * (left + right) / 2 * np.sinc(half / np.pi)
     angle = heading[:, :r] + half + np.where(chord < 0, np.pi, 0.0)
     return np.abs(chord), np.stack([np.cos(angle), np.sin(angle)], axis=-1)
 
 
-def _near(place: Floats, setting: Setting) -> tuple[Floats, Bools]:
+def _near(place: Floats, sizes: ArenaSizes) -> tuple[Floats, Bools]:
     """Return the gaps to each prey [T, R, Q] and whether another predator is in range [T, R]."""
-    r, body = setting.n_predators, 2 * setting.radius_cm
+    r, body = sizes.n_predators, 2 * sizes.radius_cm
     gaps = np.linalg.norm(place[:, :r, None] - place[:, None], axis=-1) - body
     others = gaps[:, :, :r] + np.where(np.eye(r, dtype=bool), np.inf, 0.0)
-    return gaps[:, :, r:], others.min(axis=-1) <= setting.range_cm
+    return gaps[:, :, r:], others.min(axis=-1) <= sizes.range_cm
 
 
 def _before(values: npt.NDArray[Any]) -> npt.NDArray[Any]:

@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from conevo.analysis.behaviours import BEHAVIOURS, Conduct, spells
+from conevo.worlds.pursuit.study.behaviours import BEHAVIOURS, Conduct, spells
 
 __all__ = ["N_SEGMENTS", "Profile", "Spell", "average", "find_spells", "profile", "sample"]
 

@@ -23,18 +23,21 @@ import dataclasses
 import math
 from collections import Counter
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from conevo.analysis.behaviours import BEHAVIOURS, NONE, conduct
-from conevo.analysis.captures import COLLECTIVES, find_captures
-from conevo.analysis.pursuit import Observation, Record
-from conevo.analysis.sensors import average
 from conevo.rng import fold, stream
-from conevo.worlds.pursuit.arena import ArenaScenarios
-from conevo.worlds.rollout import Rollout
+from conevo.worlds.pursuit.study.behaviours import BEHAVIOURS, NONE, conduct
+from conevo.worlds.pursuit.study.captures import COLLECTIVES, find_captures
+from conevo.worlds.pursuit.study.observation import Observation, Record
+from conevo.worlds.pursuit.study.sensors import average
+from conevo.worlds.simulators import simulator
+
+if TYPE_CHECKING:
+    from conevo.worlds.protocol import Simulator
+    from conevo.worlds.pursuit.arena import ArenaScenarios
 
 __all__ = ["place_together", "reproduce_collectives", "reproduce_individuals"]
 
@@ -56,7 +59,7 @@ def reproduce_individuals(seen: Observation) -> list[dict[str, Any]]:
     """
     params = dataclasses.replace(seen.world.params, iterations=TRIAL)
     world = dataclasses.replace(seen.world, params=params)
-    rollout = Rollout(world, seen.controller, seen.n_threads)
+    player = simulator(world, seen.simulator.controller, seen.simulator.n_threads)
     rows = []
     for predator in range(world.n_robots):
         for behaviour in BEHAVIOURS:
@@ -67,7 +70,7 @@ def reproduce_individuals(seen: Observation) -> list[dict[str, Any]]:
             records = []
             for one in some:
                 start = _clamped(_resumed(seen, one.epoch, one.start), {predator: held})
-                records.append(_play(rollout, seen, start))
+                records.append(_play(player, seen, start))
                 results[_most_executed(seen, records[-1], predator)] += 1
             action, left, right = (
                 np.concatenate([record[name][:, predator] for record in records])
@@ -105,7 +108,6 @@ def reproduce_collectives(
         trials: test simulations of each.
         clamped: hold each predator's sensors at its averages of its role.
     """
-    rollout = Rollout(seen.world, seen.controller, seen.n_threads)
     rows = []
     for collective in COLLECTIVES[:-1]:
         own = [one.roles for one in seen.all_captures if one.collective == collective]
@@ -121,9 +123,9 @@ def reproduce_collectives(
         captured = reproduced = 0
         for k in range(trials):
             start = _clamped(_together(seen, roles, collective, k), held)
-            record = _play(rollout, seen, start)
-            one = conduct(record, seen.setting, seen.rules)
-            found = [c.collective for c in find_captures(record, one, seen.setting, seen.rules)]
+            record = _play(seen.simulator, seen, start)
+            one = conduct(record, seen.sizes, seen.rules)
+            found = [c.collective for c in find_captures(record, one, seen.sizes, seen.rules)]
             captured += bool(found)
             reproduced += collective in found
             names.update(found)
@@ -152,15 +154,15 @@ def place_together(
         roles: of each predator, "" without one.
         at_wall: whether the prey is within infrared range of a wall.
     """
-    setting, n_prey = seen.setting, seen.world.n_prey
-    edge = setting.radius_cm + MARGIN
+    sizes, n_prey = seen.sizes, seen.world.n_prey
+    edge = sizes.radius_cm + MARGIN
     while True:
-        prey = _anywhere(rng, setting.arena_cm, edge)
+        prey = _anywhere(rng, sizes.arena_cm, edge)
         if at_wall:
-            gap = rng.uniform(MARGIN, min(setting.range_cm, setting.arena_cm / 2 - edge))
+            gap = rng.uniform(MARGIN, min(sizes.range_cm, sizes.arena_cm / 2 - edge))
             side, axis = int(rng.integers(2)), int(rng.integers(2))
-            at = setting.radius_cm + gap
-            at = setting.arena_cm - at if side else at
+            at = sizes.radius_cm + gap
+            at = sizes.arena_cm - at if side else at
             prey = (at, prey[1], prey[2]) if axis else (prey[0], at, prey[2])
         placed: list[Pose] = []
         for role in roles:
@@ -171,7 +173,7 @@ def place_together(
         else:
             bodies = [*placed, prey]
             while len(bodies) < len(roles) + n_prey:
-                pose = _anywhere(rng, setting.arena_cm, edge)
+                pose = _anywhere(rng, sizes.arena_cm, edge)
                 if all(math.dist(pose[:2], other[:2]) > 2 * edge for other in bodies):
                     bodies.append(pose)
             return np.array(bodies, dtype=np.float32)
@@ -181,21 +183,21 @@ def _fitting(
     rng: np.random.Generator, seen: Observation, role: str, prey: Pose, placed: Sequence[Pose]
 ) -> Pose | None:
     """Draw a pose that suits a role: free, in range of the prey and of a predator placed before."""
-    setting, rules = seen.setting, seen.rules
-    body = 2 * (setting.radius_cm + MARGIN)
+    sizes, rules = seen.sizes, seen.rules
+    body = 2 * (sizes.radius_cm + MARGIN)
     sector = {
         "pursuer": (rules.front_deg, 180.0),
         "blocker": (0.0, rules.front_deg),
         "flanker": (rules.rear_deg, rules.behind_deg),
     }.get(role, (0.0, 180.0))
-    low, high = setting.radius_cm + MARGIN, setting.arena_cm - setting.radius_cm - MARGIN
+    low, high = sizes.radius_cm + MARGIN, sizes.arena_cm - sizes.radius_cm - MARGIN
     for _ in range(N_TRIES):
-        far = rng.uniform(body, 2 * setting.radius_cm + setting.range_cm)
+        far = rng.uniform(body, 2 * sizes.radius_cm + sizes.range_cm)
         angle = math.radians(rng.uniform(*sector)) * (1 if rng.integers(2) else -1) + prey[2]
         x, y = prey[0] + far * math.cos(angle), prey[1] + far * math.sin(angle)
         gaps = [math.dist((x, y), other[:2]) - body for other in placed]
         is_free = low <= x <= high and low <= y <= high and min(gaps, default=0.0) >= 0
-        if is_free and min(gaps, default=0.0) <= setting.range_cm - 2 * MARGIN:
+        if is_free and min(gaps, default=0.0) <= sizes.range_cm - 2 * MARGIN:
             return x, y, rng.uniform(-math.pi, math.pi)
     return None
 
@@ -231,14 +233,13 @@ def _clamped(scenario: ArenaScenarios, held: dict[int, npt.NDArray[np.float64]])
     return dataclasses.replace(scenario, clamp=clamp)
 
 
-def _play(rollout: Rollout, seen: Observation, scenario: ArenaScenarios) -> Record:
-    genes, (rows,) = seen.team.as_trial()
-    return rollout.record(genes, rows, scenario)
+def _play(player: Simulator, seen: Observation, scenario: ArenaScenarios) -> Record:
+    return player.record(seen.genes, seen.team, scenario)
 
 
 def _most_executed(seen: Observation, record: Record, predator: int) -> str:
     """Return the behaviour that a predator executed most in a trial, "none" if none."""
-    behaviour = conduct(record, seen.setting, seen.rules).behaviour[:, predator]
+    behaviour = conduct(record, seen.sizes, seen.rules).behaviour[:, predator]
     named = behaviour[behaviour != NONE]
     return BEHAVIOURS[int(np.bincount(named).argmax())] if named.size else "none"
 

@@ -8,7 +8,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.trajectories import (
+from conevo.analysis.lifetimes import lifetimes as of_executed
+from conevo.worlds.pursuit.study.behaviours import (
+    BEHAVIOURS,
+    NONE,
+    Conduct,
+    Rules,
+    conduct,
+    executed,
+    spells,
+)
+from worlds.trajectories import (
     AHEAD,
     PRESS,
     PREY_SPEED,
@@ -16,16 +26,7 @@ from analysis.trajectories import (
     around,
     body,
     record,
-    setting,
-)
-from conevo.analysis.behaviours import (
-    BEHAVIOURS,
-    NONE,
-    Conduct,
-    Rules,
-    conduct,
-    lifetimes,
-    spells,
+    sizes,
 )
 
 T = 20
@@ -45,7 +46,7 @@ def watch(predator, prey=None, companion=None, rules=None, n_predators=2):
     if companion is None:
         away = float(predator["x"][0]), float(predator["y"][0]) + 20.0
         companion = body(*away, 0.0, [STOP] * n)
-    seen = conduct(record(predator, companion, prey), setting(n_predators), rules)
+    seen = conduct(record(predator, companion, prey), sizes(n_predators), rules)
     return names(seen.behaviour[:, 0])
 
 
@@ -272,11 +273,11 @@ def test_the_behaviour_is_about_the_closest_prey():
         body(*around((84.5, 100.0), 180, 5), 0.0, [STOP] * T),
         captured=np.zeros((T, 2), dtype=np.int32),
     )
-    seen = conduct(t, setting())
+    seen = conduct(t, sizes())
     assert set(seen.prey[:, 0].tolist()) == {1}
     assert names(seen.behaviour[10:, 0]) == ["none"] * 10  # it drives away from that one
     alone = {k: v[:, :3] if v.shape[1] == 4 else v for k, v in t.items()}
-    assert names(conduct(alone, setting()).behaviour[10:, 0]) == ["pursuer"] * 10
+    assert names(conduct(alone, sizes()).behaviour[10:, 0]) == ["pursuer"] * 10
 
 
 SCENES = {
@@ -292,7 +293,7 @@ SCENES = {
 @pytest.mark.parametrize("is_mirrored", [False, True])
 def test_behaviours_do_not_depend_on_where_north_is(name, quarter, is_mirrored):
     t = record(SCENES[name], body(100.0, 115.0, 0.0, [STOP] * T), body(*PREY, 0.0, [STOP] * T))
-    expected = conduct(t, setting())
+    expected = conduct(t, sizes())
     assert name in names(expected.behaviour[:, 0])
     x, y, angle = t["x"] - 100, t["y"] - 100, t["heading"]
     left, right = t["left"], t["right"]
@@ -306,7 +307,7 @@ def test_behaviours_do_not_depend_on_where_north_is(name, quarter, is_mirrored):
         "left": left,
         "right": right,
     }
-    seen = conduct(turned, setting())
+    seen = conduct(turned, sizes())
     assert np.array_equal(seen.behaviour, expected.behaviour)
     assert np.array_equal(seen.interacts, expected.interacts)
 
@@ -314,6 +315,11 @@ def test_behaviours_do_not_depend_on_where_north_is(name, quarter, is_mirrored):
 # --- lifetimes ------------------------------------------------------------------------------------
 
 PURSUER, BLOCKER, FLANKER, KNOCKER, IDLE = range(5)
+
+
+def lifetimes(conducts):
+    """Return what the study makes of what it is told about these epochs."""
+    return of_executed(executed(conducts), BEHAVIOURS)
 
 
 def life(*windows, start=10, interacts=None):
@@ -380,7 +386,7 @@ def test_a_predator_that_never_did_anything_that_counts():
 def test_windows_follow_the_rules():
     t = record(SCENES["pursuer"], body(80.0, 110.0, 0.0, [STOP] * T), body(*PREY, 0.0, [STOP] * T))
     for window in (4, 5):
-        seen = conduct(t, setting(), replace(Rules(), window=window))
+        seen = conduct(t, sizes(), replace(Rules(), window=window))
         assert (seen.behaviour[:window, 0] == NONE).all()
         assert lifetimes([seen])[0].windows == T // window - 1
 

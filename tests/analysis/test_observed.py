@@ -1,9 +1,10 @@
-"""From a run on disk to behaviours, their reproduction, and tables 4.4 and 4.5."""
+"""From a run on disk to behaviours, their reproduction, and tables 4.4 and 4.5; whose these are."""
 
 from __future__ import annotations
 
 import json
 import math
+import re
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -13,26 +14,26 @@ import pytest
 
 import conevo
 from conevo.analysis.behaviour_report import behaviour_report
-from conevo.analysis.behaviours import BEHAVIOURS, Rules
-from conevo.analysis.captures import COLLECTIVES, Capture
-from conevo.analysis.pursuit import Observation, observe, setting_of
-from conevo.analysis.pursuit_tables import (
-    composition,
-    composition_table,
-    fittest_runs,
-    lesion_table,
-)
-from conevo.analysis.reproduction import (
-    place_together,
-    reproduce_collectives,
-    reproduce_individuals,
-)
+from conevo.analysis.caste_tables import composition_table, fittest_runs, lesion_table
+from conevo.analysis.lifetimes import lifetimes
+from conevo.analysis.observed import Observed, observe
+from conevo.analysis.studies import study
 from conevo.cli.main import main
 from conevo.errors import UsageError
 from conevo.rng import fold, stream
 from conevo.runs.champions import Team
 from conevo.runs.shrinkage import shrinkage
+from conevo.worlds.pursuit.study.behaviours import BEHAVIOURS
+from conevo.worlds.pursuit.study.captures import COLLECTIVES, Capture, composition
+from conevo.worlds.pursuit.study.observation import Observation, record_team
+from conevo.worlds.pursuit.study.predators import Predators
+from conevo.worlds.pursuit.study.reproduction import (
+    place_together,
+    reproduce_collectives,
+    reproduce_individuals,
+)
 from conevo.worlds.pursuit.world import PursuitParams, PursuitWorld
+from conevo.worlds.registry import WORLDS, WorldEntry, studies, study_of
 from conevo.worlds.rollout import Rollout
 from runs.tiny import evolve_tiny
 
@@ -70,9 +71,21 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> list[conevo.Run]:
 
 
 @pytest.fixture(scope="module")
-def seen(runs: list[conevo.Run]) -> Observation:
+def watched(runs: list[conevo.Run]) -> Observed:
     """The fittest HomCNE team, which captures now and then."""
     return observe(runs[3], 4, threads=1)
+
+
+@pytest.fixture(scope="module")
+def seen(watched: Observed) -> Observation:
+    """What it was seen to do."""
+    return observation(watched)
+
+
+def observation(watched: Observed) -> Observation:
+    """Return what the world's study holds of a team."""
+    assert isinstance(watched.seen, Predators)
+    return watched.seen.seen
 
 
 # --- observing ------------------------------------------------------------------------------------
@@ -86,13 +99,14 @@ def test_the_records_are_those_of_the_testing_phase(runs, seen: Observation) -> 
     assert seen.capture_time == tested["mean"] > 0
 
 
-def test_threads_change_nothing_and_another_seed_does(runs, seen: Observation) -> None:
-    again = observe(runs[3], 4, threads=2)
+def test_threads_change_nothing_and_another_seed_does(runs, watched, seen: Observation) -> None:
+    watched_again = observe(runs[3], 4, threads=2)
+    again = observation(watched_again)
     for one, other in zip(seen.records, again.records, strict=True):
         assert all(np.array_equal(one[name], other[name]) for name in one)
-    assert again.lifetimes == seen.lifetimes
+    assert watched_again.lifetimes == watched.lifetimes
     assert again.captures == seen.captures
-    assert observe(runs[3], 4, seed=77, threads=1).keys != seen.keys
+    assert observation(observe(runs[3], 4, seed=77, threads=1)).keys != seen.keys
 
 
 def test_captured_iterations_are_those_of_the_captures(seen: Observation) -> None:
@@ -140,6 +154,64 @@ def test_a_run_of_another_world_is_refused(tmp_path: Path) -> None:
         composition_table([run])
 
 
+# --- worlds of one's own --------------------------------------------------------------------------
+
+SUBCLASS = """
+from dataclasses import dataclass
+from typing import ClassVar
+
+from conevo.worlds.pursuit.world import PursuitParams, PursuitWorld
+from conevo.worlds.registry import WorldEntry
+
+
+@dataclass(frozen=True)
+class MyWorld(PursuitWorld):
+    name: ClassVar[str] = "mine-v1"
+
+
+ENTRY = WorldEntry("mine-v1", "Mine", "", "", ("team-2",), "PursuitParams", "MyWorld")
+"""
+
+
+def test_a_subclass_is_studied_like_the_world_it_inherits(tmp_path: Path, capsys) -> None:
+    (tmp_path / "mine.py").write_text(SUBCLASS)
+    settings: dict[str, Any] = TINY | SIZES["homcne"] | {"run.generations": 1}
+    task, path = f"{tmp_path / 'mine.py'}:team-2", tmp_path / "run"
+    run = conevo.evolve(task, "homcne", "smoke", 2, path, overrides=settings, threads=1)
+    found = behaviour_report(run, 2, threads=1)
+    assert found["task"] == "mine-v1/team-2"
+    tested = run.test(2)["performance"]["capture_time"]["mean"]
+    assert found["capture_time"] == pytest.approx(tested)
+    labels = [life["label"] for life in found["predators"]]
+    assert [row["caste"] for row in study(run, 2, threads=1)["robots"]] == labels
+    code, out, err = say(capsys, "behaviours", str(path), "--scenarios", "2")
+    assert (code, err) == (0, "")
+    assert [out.count(f"predator {k}  ") > 0 for k in range(4)] == [True, True, True, False]
+
+
+@pytest.mark.parametrize(
+    ("studied", "words"),
+    [
+        ("no.such.study", "world mine-v1: its study 'no.such.study' is not there: No module named"),
+        ("json", "world mine-v1: its study 'json' has no BEHAVIOURS, no COLLECTIVES, no WORDS"),
+    ],
+)
+def test_an_entry_whose_study_is_none_is_one_line(studied: str, words: str) -> None:
+    entry = WorldEntry("mine-v1", "Mine", "", "", ("a-1",), "Params", "World", studied=studied)
+    with pytest.raises(UsageError, match=f"^{re.escape(words)}"):
+        study_of(entry)
+
+
+def test_only_what_is_studied_is_found_and_its_names_are_distinct() -> None:
+    of = {name: study_of(entry) for name, entry in WORLDS.items()}
+    assert {name for name, one in of.items() if one is not None} == set(studies())
+    for one in studies().values():
+        assert "none" not in one.BEHAVIOURS
+        assert one.COLLECTIVES[-1] == "none"
+        names = (*one.BEHAVIOURS, *one.COLLECTIVES)
+        assert len(set(names)) == len(names)
+
+
 # --- reproduction ---------------------------------------------------------------------------------
 
 
@@ -155,17 +227,14 @@ def by_hand(outputs: list[tuple[float, float]], **params: Any) -> Observation:
     active = np.zeros(genes.shape[:2], dtype=bool)
     active[:, 0] = True
     zeros = np.zeros(len(outputs))
-    team = Team(0, genes, active, zeros, zeros)
-    pool, (rows,) = team.as_trial()
-    keys = tuple(range(4))
-    records = tuple(rollout.record(pool, rows, world.scenarios([key])) for key in keys)
-    mind, setting = rollout.controller, setting_of(world)
-    return Observation(world, mind, team, 5, keys, records, setting, Rules(), 1)
+    pool, (rows,) = Team(0, genes, active, zeros, zeros).as_trial()
+    return record_team(rollout, pool, rows, range(4), seed=5)
 
 
 def test_a_predator_that_always_stands_is_idle_and_reproduces_it() -> None:
     seen = by_hand([(0.0, 0.0), (0.0, 0.0), (0.5, 0.5)])
-    assert [life.label for life in seen.lifetimes[:2]] == ["idle", "idle"]
+    lives = lifetimes(Predators(seen).executed, BEHAVIOURS)
+    assert [life.label for life in lives[:2]] == ["idle", "idle"]
     rows = [row for row in reproduce_individuals(seen) if row["predator"] < 2]
     assert {row["behaviour"] for row in rows} == {"idle"}
     for row in rows:
@@ -373,7 +442,7 @@ def test_table_4_5_replaces_the_specialized_by_the_heuristic(runs) -> None:
         rollout = Rollout(world, run.config.controller, n_threads=1)
         scenarios = world.scenarios([fold(run.config.run.seed, "lesion", k) for k in range(5)])
         genes, teams = run.champion.as_trial()
-        labels = [life.label for life in observe(run, 5, threads=1).lifetimes]
+        labels = observe(run, 5, threads=1).labels
         for behaviour in BEHAVIOURS:
             modes = np.array([[0 if own == behaviour else -1 for own in labels]], dtype=np.int32)
             time = rollout.evaluate(genes, teams, scenarios, modes).performance["capture_time"]

@@ -26,18 +26,27 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from conevo.analysis.behaviours import (
+from conevo.terms import NON_SPECIALIZED
+from conevo.worlds.pursuit.study.behaviours import (
     BEHAVIOURS,
     FLANKER,
     IDLE,
     KNOCKER,
+    ArenaSizes,
     Conduct,
     Rules,
-    Setting,
     spells,
 )
 
-__all__ = ["COLLECTIVES", "COMPOSITIONS", "Capture", "find_captures", "most_frequent", "name"]
+__all__ = [
+    "COLLECTIVES",
+    "COMPOSITIONS",
+    "Capture",
+    "composition",
+    "find_captures",
+    "most_frequent",
+    "name",
+]
 
 COLLECTIVES = ("entrapment", "pursuer-blocker", "spiders-fly", "role-switcher", "none")
 # How many predators of each role, least and most.
@@ -78,7 +87,7 @@ class Capture:
 def find_captures(
     record: Mapping[str, npt.NDArray[Any]],
     one: Conduct,
-    setting: Setting,
+    sizes: ArenaSizes,
     rules: Rules | None = None,
 ) -> list[Capture]:
     """Return the captures of a recorded epoch, in the order of their prey and time.
@@ -86,16 +95,16 @@ def find_captures(
     Args:
         record: x, y [T, B] and captured [T, Q].
         one: what the predators did in it.
-        setting: the arena and the robots.
+        sizes: the arena and the robots.
         rules: how long an approach is, and so on.
     """
     rules = rules or Rules()
     found = []
     for q in range(record["captured"].shape[1]):
-        body = setting.n_predators + q
+        body = sizes.n_predators + q
         walls = [record[axis][:, body] for axis in "xy"]
-        walls += [setting.arena_cm - values for values in walls]
-        at_wall = np.min(walls, axis=0) - setting.radius_cm <= rules.wall_cm
+        walls += [sizes.arena_cm - values for values in walls]
+        at_wall = np.min(walls, axis=0) - sizes.radius_cm <= rules.wall_cm
         before = 0
         for first, stop in _joined(spells(record["captured"][:, q] > 0), rules.pause):
             start = max(first - rules.approach, before)
@@ -150,6 +159,34 @@ def most_frequent(captures: Iterable[Capture]) -> tuple[str, dict[str, int]]:
     if not seen:
         return "none", counts
     return max(COLLECTIVES, key=lambda collective: counts[collective]), counts
+
+
+def composition(labels: Sequence[str], captures: Sequence[Capture]) -> dict[str, int | None]:
+    """Return how many predators belong to each collective behaviour, and to none.
+
+    Choice: a predator specialized to an individual behaviour belongs to the collective behaviour
+    that it took part in most often in that role (4.6.3); to none, and is counted as
+    non-specialized, if it never did.
+
+    Args:
+        labels: of each predator, an individual behaviour or "non-specialized".
+        captures: of its team.
+    """
+    occurs = most_frequent(captures)[1]
+    table: dict[str, int | None] = {
+        name: 0 if occurs[name] else None for name in COLLECTIVES if name != "none"
+    }
+    table[NON_SPECIALIZED] = 0
+    for predator, label in enumerate(labels):
+        parts = Counter(
+            one.collective
+            for one in captures
+            if label in one.roles[predator] and label in COMPOSITIONS.get(one.collective, ())
+        )
+        most = max(COMPOSITIONS, key=lambda name: parts[name])
+        belongs = most if parts else NON_SPECIALIZED
+        table[belongs] = (table[belongs] or 0) + 1
+    return table
 
 
 def _fits(counts: Mapping[str, int], listed: Mapping[str, tuple[int, int]]) -> bool:

@@ -5,9 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from conevo.analysis.behaviours import NONE, Conduct
-from conevo.analysis.sensors import N_SEGMENTS, Spell, average, find_spells, profile, sample
 from conevo.rng import stream
+from conevo.worlds.pursuit.study.behaviours import NONE, Conduct
+from conevo.worlds.pursuit.study.sensors import (
+    N_SEGMENTS,
+    Spell,
+    average,
+    find_spells,
+    profile,
+    sample,
+)
 
 
 def inputs(n=20, robots=2):

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from conevo.analysis.behaviours import Setting
+from conevo.worlds.pursuit.study.behaviours import ArenaSizes
 
 RADIUS, AXLE, SPEED, PREY_SPEED = 2.75, 5.3, 0.8, 0.96
 Step = tuple[float, float, int]  # left wheel, right wheel, whether the move is refused
@@ -19,9 +19,9 @@ AHEAD: Step = (1.0, 1.0, 0)
 PRESS: Step = (1.0, 1.0, 1)
 
 
-def setting(n_predators: int = 2, arena: float = 200.0) -> Setting:
+def sizes(n_predators: int = 2, arena: float = 200.0) -> ArenaSizes:
     """Return a wide arena."""
-    return Setting(n_predators, arena, 22.0, SPEED, RADIUS, AXLE)
+    return ArenaSizes(n_predators, arena, 22.0, SPEED, RADIUS, AXLE)
 
 
 def body(

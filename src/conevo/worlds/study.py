@@ -1,0 +1,134 @@
+"""What a world brings to be studied: what its robots are seen to do, besides their actions.
+
+The entry of a world names a module that has what ``WorldStudy`` lists; ``registry.study_of`` finds
+it. It tells behaviours from recorded epochs. S, castes, lesions, clones and tables are made of them
+for any world (``analysis.observed``).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, cast
+
+from conevo.errors import UsageError
+
+if TYPE_CHECKING:
+    import numpy as np
+    import numpy.typing as npt
+
+    from conevo.worlds.protocol import Scenarios, Simulator
+
+__all__ = ["Account", "AccountPart", "Seen", "StudyWords", "WorldStudy", "load_study"]
+
+NEEDED = ("BEHAVIOURS", "COLLECTIVES", "WORDS", "observe", "account")
+
+
+@dataclass(frozen=True)
+class StudyWords:
+    """The words of a study in reports and messages.
+
+    Attributes:
+        robots: what the robots are.
+        events: what collective behaviours are counted by.
+        done: what a team does in an event, "so": in one of these behaviours.
+        undone: what a team without an event did.
+    """
+
+    robots: str = "robots"
+    events: str = "occurrences"
+    done: str = "behaves so"
+    undone: str = "did nothing together"
+
+
+class AccountPart(NamedTuple):
+    """A line of an account, with the table below it, if any; numbers in it are not formatted."""
+
+    line: str
+    head: Sequence[str] = ()
+    rows: Sequence[Sequence[str | float]] = ()
+
+
+class Account(NamedTuple):
+    """What was found, to be printed: measures of the team by their names, then the rest."""
+
+    measures: Mapping[str, float]
+    parts: Sequence[AccountPart]
+
+
+class Seen(Protocol):
+    """What a team was seen to do in some recorded epochs."""
+
+    @property
+    def executed(self) -> Sequence[npt.NDArray[np.int64]]:
+        """What each robot did, window after window: index of a behaviour, -1 for none of them."""
+
+    @property
+    def collectives(self) -> tuple[str, dict[str, int]]:
+        """The most frequent collective behaviour, and how often each of them was seen."""
+
+    def together(self, keys: Sequence[int]) -> Scenarios:
+        """Return the scenarios that clones play, one per key."""
+
+    def composition(self, labels: Sequence[str]) -> dict[str, int | None]:
+        """Return how many robots belong to each collective behaviour, and to none.
+
+        Args:
+            labels: of each robot, a behaviour or "non-specialized".
+        """
+
+    def details(self, lifetimes: Sequence[dict[str, Any]]) -> dict[str, Any]:
+        """Return everything else about what was seen, as plain data.
+
+        Args:
+            lifetimes: of each robot, ``analysis.lifetimes.Lifetime`` as plain data.
+        """
+
+
+class WorldStudy(Protocol):
+    """What the module of a study has."""
+
+    BEHAVIOURS: tuple[str, ...]
+    """What a robot can be seen to do: the castes of this world, in the order of their lists."""
+    COLLECTIVES: tuple[str, ...]
+    """What robots can be seen to do together; the last one is "none" of these."""
+    WORDS: StudyWords
+
+    def observe(
+        self,
+        simulator: Simulator,
+        genes: npt.NDArray[np.float32],
+        team: npt.NDArray[np.int32],
+        keys: Sequence[int],
+        seed: int,
+        rules: Any = None,
+    ) -> Seen:
+        """Record a team and return what it is seen to do.
+
+        Args:
+            simulator: of the team's world.
+            genes: pool of genotypes [K, G].
+            team: [R, U] rows of the pool.
+            keys: of the scenarios.
+            seed: of what is drawn further.
+            rules: by which behaviours are told, those of the study by default.
+        """
+
+    def account(self, found: Mapping[str, Any]) -> Account:
+        """Return what ``Seen.details`` holds, to be printed."""
+
+
+def load_study(world: str, module: str) -> WorldStudy:
+    """Return the module of a world's study.
+
+    Raises:
+        UsageError: it cannot be imported, or lacks something.
+    """
+    try:
+        found = import_module(module)
+    except (ImportError, TypeError, ValueError) as error:
+        raise UsageError(f"world {world}: its study {module!r} is not there: {error}") from error
+    if missing := [name for name in NEEDED if not hasattr(found, name)]:
+        raise UsageError(f"world {world}: its study {module!r} has no {', no '.join(missing)}")
+    return cast("WorldStudy", found)
