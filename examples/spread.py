@@ -122,10 +122,10 @@ class SpreadSimulator:
         part = np.arange(n) // (n // rounds)  # each team's round
         starts = scenarios.starts.reshape(rounds, e, r, 2)[part].reshape(n * e, r, 2)
         modes = np.full((n, r), -1, np.int32) if heuristic is None else heuristic
-        rows = (np.repeat(one, e, axis=0) for one in (teams, modes))
+        rows, modes = np.repeat(teams, e, axis=0), np.repeat(modes, e, axis=0)
         counts = np.zeros((n * e, r, len(self.world.actions)), np.int32)
         switches, before = np.zeros((n * e, r), np.int32), None
-        for seen in self._epoch(genes, *rows, starts):
+        for seen in self._epoch(genes, rows, modes, starts):
             action = seen["action"]
             counts += action[:, :, None] == np.arange(len(self.world.actions))
             switches += False if before is None else action != before

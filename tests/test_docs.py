@@ -9,11 +9,18 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import conevo
+from conevo.analysis.sections.metrics import definitions
+from conevo.controllers.registry import controller
+from conevo.errors import UsageError
 from conevo.runs.settings import declared
 from conevo.runs.shaping import start_shaping
+from conevo.specialization.team import METRICS, Activity, Metric, measure
+from conevo.worlds.checks import random_teams
+from conevo.worlds.simulators import simulator
 
 ROOT = Path(__file__).resolve().parent.parent
 EXECUTED = (
@@ -216,21 +223,65 @@ def test_the_recipes_quote_their_examples():
     assert [text for name, text in quoted if text not in (ROOT / name).read_text()] == []
 
 
+def test_a_parameter_is_one_field_and_one_of_the_kernels(tmp_path):
+    """Do what the recipe says to a copy of an example: a wind that blows along x."""
+    text = (ROOT / "examples" / "light.py").read_text()
+    for after, added in (
+        ('    """(side) the largest step."""\n',
+         '    wind: Annotated[float, Ge(0), Le(0.1)] = 0.0\n    """(side) of a moving robot."""\n'),
+        ("    step: float\n", "    wind: float\n"),
+        ("team.x[i] + step[0]", " + p.wind"),
+    ):  # fmt: skip
+        assert text.count(after) == 1
+        text = text.replace(after, after + added)
+    path = tmp_path / "windy.py"
+    path.write_text(text)
+    calm, windy = (conevo.world(f"{path}:dark-1", wind=wind) for wind in (0, 0.05))
+    (of_wind,) = (one for one in declared(type(calm.params)) if one.name == "wind")
+    assert (of_wind.unit, of_wind.meaning) == ("side", "of a moving robot")
+    with pytest.raises(UsageError, match=r"world.wind = 1: must be less than or equal to 0.1"):
+        conevo.world(f"{path}:dark-1", wind=1)
+    genes, teams = random_teams(calm, 20)
+    still, without, blown = (
+        simulator(one, controller(world=one)).evaluate(genes, teams, one.scenarios([1]))
+        for one in (conevo.world(f"{ROOT / 'examples' / 'light.py'}:dark-1"), calm, windy)
+    )
+    assert np.array_equal(still.fitness, without.fitness)
+    assert not np.array_equal(without.fitness, blown.fitness)
+
+
+def test_a_metric_is_one_entry(monkeypatch):
+    share = Metric(lambda team: 0.25, "1 / R to 1", "share of the busiest robot", "made up")
+    monkeypatch.setitem(METRICS, "largest_share", share)
+    nothing = Activity(np.zeros((2, 3)), np.zeros(2), ["non-specialized"] * 2)
+    assert measure(nothing)["largest_share"] == 0.25
+    (table,) = definitions().exhibits
+    said = {"span": share.span, "what": share.what, "source": share.source}
+    assert {"name": "largest share"} | said in table.rows
+
+
 @pytest.mark.slow
-def test_following_the_recipes_adds_a_world_and_a_method(tmp_path):
-    """Do what CONTRIBUTING says in a copy; the contract tests enrol both by their entries."""
+def test_following_the_recipes_adds_worlds_a_method_and_a_controller(tmp_path):
+    """Do what CONTRIBUTING says in a copy; the contract tests enrol all by their entries."""
     for name in ("src", "tests", "examples"):
         shutil.copytree(ROOT / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))
     shutil.copy(ROOT / "pyproject.toml", tmp_path)
     package = tmp_path / "src" / "conevo"
-    for example, place in (("light", "worlds"), ("random_search", "evolution/methods")):
+    for example, place in (
+        ("light", "worlds"),
+        ("spread", "worlds"),
+        ("linear", "controllers"),
+        ("random_search", "evolution/methods"),
+    ):
         text = (ROOT / "examples" / f"{example}.py").read_text()
         text = re.sub(r"\n\n(def main\(\)|ENTRY = ).*", "", text, flags=re.DOTALL)
         text = text.replace("from conevo.worlds.registry import WorldEntry\n", "")
         text = text.replace("from conevo.evolution.methods.registry import MethodEntry\n", "")
         text = text.replace('"ENTRY", ', "")
         (package / place / f"{example}.py").write_text(text)
-    for mark, name, text in recipes():
+    (entry,) = (text for mark, _, text in recipes() if mark == "entry" and "light-v1" in text)
+    spread = entry.replace("light", "spread").replace("Light", "Spread").replace("dark-1", "open-1")
+    for mark, name, text in [*recipes(), ("entry", "src/conevo/worlds/registry.py", spread)]:
         if mark == "entry":
             registry = tmp_path / name
             head, end, tail = registry.read_text().partition("\n    )\n}\n")
@@ -251,6 +302,7 @@ def test_following_the_recipes_adds_a_world_and_a_method(tmp_path):
 
     assert "light-v1" in run("conevo", "list", "worlds")
     assert "random-search" in run("conevo", "list", "methods")
+    assert "Linear controller" in run("conevo", "list", "controllers")
     options = ("--preset", "smoke", "--method", "random-search")
     assert "stopped by: generations" in run("conevo", "run", "light/dark-1", *options[:2],
                                             "--method", "homcne")  # fmt: skip
@@ -258,8 +310,11 @@ def test_following_the_recipes_adds_a_world_and_a_method(tmp_path):
                                                       code=2)  # fmt: skip
     assert "stopped by: generations" in run("conevo", "run", "rover/complex-1", *options,
                                             "--set", "run.generations=2")  # fmt: skip
+    assert "stopped by: generations" in run("conevo", "run", "spread/open-1", *options,
+                                            "--set", "controller.name=linear")  # fmt: skip
     for folder, words, least in (
-        ("tests/contracts", "light-v1 or random", 17),  # eight for the world, nine for the method
+        # Eight for each world, but three are for Warp; nine for the method, ten for the controller.
+        ("tests/contracts", "light-v1 or spread-v1 or random or complex-5 and linear", 32),
         ("tests/runs", "kills and (light and homcne or random and rover)", 2),
     ):
         said = run("pytest", "-q", "-p", "no:cacheprovider", folder, "-k", words)
