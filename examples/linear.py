@@ -36,14 +36,14 @@ class LinearWeights:
     """Weights of a team's controllers; filled: 0 for a robot without one, else 1."""
 
     w: Annotated[wp.array[float], "robots", "outputs", "inputs"]
-    filled: Annotated[wp.array[int], "robots"]
+    filled: wp.array[int]
 
 
 @named_arrays
 class LinearMemory:
     """What recordings show of a team's controllers, 0 for a robot without one."""
 
-    shown: Annotated[wp.array[float], "robots"]
+    shown: Annotated[wp.array[float], "robots", "parts"]
 
 
 @wp.func
@@ -116,7 +116,7 @@ class Linear:
             memory=LinearMemory,
             shape=shape,
             shape_type=LinearShape,
-            sizes={"outputs": n_outputs, "inputs": n_inputs},
+            sizes={"outputs": n_outputs, "inputs": n_inputs, "parts": 1},
             load=load,
             clear=clear,
             think=think,

@@ -1,9 +1,11 @@
 """A method has one colour, whatever is drawn with it; a caste that of its replay."""
 
 from itertools import combinations
+from pathlib import Path
 
 from conevo import palette
 from conevo.evolution.methods.registry import METHODS
+from conevo.worlds.outside import load
 from conevo.worlds.registry import WORLDS, colours_of
 
 
@@ -34,3 +36,9 @@ def test_castes_have_the_colours_of_a_replay_and_strangers_others() -> None:
     for entry in WORLDS.values():
         assert set(colours_of(entry.name)) == set(entry.world_class.castes) - {"non-specialized"}
     assert colours_of("light-v1") == {}
+
+
+def test_a_world_without_a_module_of_drawing_has_the_colours_that_it_says_are_drawn(monkeypatch):
+    ball = load(Path(__file__).parents[1] / "examples" / "ball.py")
+    monkeypatch.setitem(WORLDS, ball.name, ball)  # as if it were of the package
+    assert colours_of("ball") == {"rest": "#9a9aa5", "push": "#d55e00"}

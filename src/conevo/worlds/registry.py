@@ -137,9 +137,12 @@ def _named(name: str) -> WorldEntry:
 def colours_of(world: str) -> dict[str, str]:
     """Return the colours of a world's castes by its name; none of a world elsewhere."""
     entry = WORLDS.get(world) or next((e for e in WORLDS.values() if e.short_name == world), None)
-    if entry is None or not entry.drawn:
+    if entry is None:
         return {}
-    return dict(import_module(entry.drawn).CASTES)
+    if entry.drawn:
+        return dict(import_module(entry.drawn).CASTES)
+    known = getattr(getattr(entry.world_class, "drawn", None), "colours", {})
+    return {name: known[name] for name in entry.world_class.castes if name in known}
 
 
 def product_of(tasks: Sequence[str]) -> Any:
