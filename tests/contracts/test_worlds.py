@@ -9,6 +9,7 @@ import pytest
 from conevo.controllers.registry import controller
 from conevo.rng import fold
 from conevo.worlds.checks import mixed_teams, random_teams
+from conevo.worlds.contract import shapes_of
 from conevo.worlds.measures import measures_of
 from conevo.worlds.registry import WORLDS, resolve, world
 from conevo.worlds.rollout import Rollout
@@ -146,9 +147,9 @@ def test_record_equals_evaluate_bit_for_bit(some_world):
         ended = np.array([early.performance[one.name][0, 0] for one in measures_of(some_world)])
         assert seen["performance"][9].tobytes() == ended.tobytes()
         if not has_own_simulator(some_world):
-            for name in some_world.simulation().recorded_at_end:
-                size = some_world.simulation().sizes.get(name, some_world.n_robots)
-                assert seen[name].shape == (size,)
+            simulation = some_world.simulation()
+            for name in simulation.recorded_at_end:
+                assert seen[name].shape == shapes_of(some_world, simulation)[name]
         action, counts = seen["action"], out.counts[n, 0]
         assert action.max() < len(some_world.actions)
         assert np.array_equal((action >= 0).sum(axis=0), counts.sum(axis=-1))
