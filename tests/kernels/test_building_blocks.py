@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from conevo.controllers.srn import Srn, SrnMemory, SrnShape, SrnWeights, clear, load, think
 from conevo.kernels import engine
+from conevo.kernels.arrays import allocate, dimensions, shapes
 from conevo.kernels.geometry import COVER_WORDS, cover_disc, covered_by_any, octant
 from conevo.kernels.outputs import sigmoid, sigmoid_of
 from conevo.kernels.random import uniform
@@ -164,12 +165,13 @@ def test_sigmoid_is_the_logistic_function_within_a_millionth():
 def run_kernel(mind, n_sensors, n_outputs, genes, slots, sensors):
     """Outputs [T, 2, O] of the second of two teams of two robots; the first one's stay empty."""
     kind = mind.mind(n_sensors, n_outputs)
-    weights, memory = SrnWeights(), SrnMemory()
-    for struct in (weights, memory):
-        for name, var in struct._cls.vars.items():
-            empty = wp.zeros(4 * kind.sizes[name], dtype=var.type.dtype, device="cpu")
-            empty.numpy()[:] = -7
-            setattr(struct, name, empty)
+    made = []
+    for struct in (SrnWeights, SrnMemory):
+        names = dimensions(struct, lambda _: ("robots",))
+        made.append(allocate(struct, shapes(names, kind.sizes | {"robots": 2}), 2, "cpu"))
+        for name in struct.vars:
+            getattr(made[-1], name).numpy()[:] = -7
+    weights, memory = made
     inputs, sums = (wp.zeros((2, n), dtype=float, device="cpu") for n in (n_sensors, n_outputs))
     outputs = wp.zeros((len(sensors), 2, n_outputs), dtype=float, device="cpu")
     given = [array(genes, float), array(slots[None], int), array(sensors, float)]
