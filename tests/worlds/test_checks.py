@@ -398,7 +398,7 @@ def test_a_sound_world_has_no_problem_and_a_wrong_name_is_one_line(
     topics = [line.split()[1] for line in out.splitlines()[:-1]]
     assert topics[:5] == ["file", "parameters", "structure", "scenarios", "memory"]
     assert topics[5:] == [*("sensors", "values", "counts", "order", "reset"),
-                          *("heuristics", "record", "random")]  # fmt: skip
+                          *("heuristics", "record", "drawn", "random")]  # fmt: skip
     for name, words in (("rovr", "did you mean 'rover'"), (f"{tmp_path}/no.py", "cannot read")):
         with pytest.raises(SystemExit) as caught:
             main(["check", name])

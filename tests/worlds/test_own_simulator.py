@@ -82,7 +82,7 @@ MISTAKES = {
     "rounds": ("[part]", "[0 * part]", "evaluate(rounds=2) gives other results"),
     "batch": ("= starts.copy(), ", "= starts + np.float32(len(starts) / 1000), ",
               "than among others"),
-    "again": ("= starts.copy(), ", "= starts + np.random.default_rng().random(), ",
+    "again": ("= starts.copy(), ", "= starts + np.random.default_rng().random() / 9, ",
               "when it is called again"),
     "shape": ("fitness=fitness.reshape(n, e, r)", "fitness=fitness.reshape(n, r, e)",
               "fitness must be"),

@@ -20,8 +20,9 @@ def check(world: str, as_json: bool) -> int:
 
     It checks parameters and their bounds, phases, fields, scenarios, sensors, outputs and counts;
     array indices, in a process of its own; whether robots visited in another order give the same
-    bits; whether record equals evaluate; and the scores of random teams. Without an environment the
-    first one is checked. The exit code is 2 if there is a problem, 3 if the machine failed.
+    bits; whether record equals evaluate; whether an epoch can be drawn; and the scores of random
+    teams. Without an environment the first one is checked. The exit code is 2 if there is a
+    problem, 3 if the machine failed.
 
     Try: conevo check examples/light.py
     """

@@ -140,7 +140,7 @@ def _check_things(things: Things, t: int) -> None:
         _channel(name, places, (k,) if places.codes.ndim == 1 else (t, k))
     _require(things.x.codes.shape == things.y.codes.shape, f"{name} with other x than y")
     _positive(f"size of {name}", things.size)
-    _require(things.shape in ("disc", "square"), f"{name} are {things.shape}")
+    _require(things.shape in ("disc", "square"), f"{name} are {things.shape}, not disc or square")
     _require(things.fade >= 1, f"{name} fade in {things.fade} frames")
     _channel(name, things.gone, (k,), (0, t + 1))
     _channel(name, things.state, (t, k), (0, len(things.states)))
@@ -248,4 +248,4 @@ def _kinds(name: str, kinds: tuple[Kind, ...]) -> None:
 
 def _colour(colour: str, or_none: bool = False) -> None:
     is_right = (or_none and not colour) or _COLOUR.fullmatch(colour) is not None
-    _require(is_right, f"{colour!r} is not a colour")
+    _require(is_right, f"{colour!r} is not a colour, as in '#d55e00'")

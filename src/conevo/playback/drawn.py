@@ -99,8 +99,15 @@ class Drawn:
 
     @property
     def plain(self) -> dict[str, Any]:
-        """It as JSON has it."""
-        found: dict[str, Any] = json.loads(json.dumps(asdict(self)))
+        """It as JSON has it.
+
+        Raises:
+            UsageError: something in it is none of JSON's kinds.
+        """
+        try:
+            found: dict[str, Any] = json.loads(json.dumps(asdict(self), allow_nan=False))
+        except (TypeError, ValueError) as error:
+            raise UsageError(f"drawn must be of plain texts and numbers: {error}") from error
         return found
 
     @staticmethod

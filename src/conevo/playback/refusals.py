@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from conevo.errors import UsageError
 
-__all__ = ["DAMAGE", "one_line", "refusal"]
+__all__ = ["DAMAGE", "DAMAGED", "one_line", "refusal"]
 
 # What damaged numbers and names make their readers raise.
 DAMAGE = (ArithmeticError, AttributeError, LookupError, TypeError, ValueError)
+DAMAGED = "the trajectory is damaged: "
 
 
 def refusal(error: Exception) -> UsageError:
     """Return the error for a damaged trajectory: one line that says what was wrong."""
-    return UsageError(f"the trajectory is damaged: {one_line(str(error) or type(error).__name__)}")
+    return UsageError(DAMAGED + one_line(str(error) or type(error).__name__))
 
 
 def one_line(text: str) -> str:

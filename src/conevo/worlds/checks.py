@@ -20,8 +20,9 @@ from conevo.parameters import wrong_values
 from conevo.rng import fold, stream
 from conevo.worlds import own_checks
 from conevo.worlds.contract import faults, scenario_faults
+from conevo.worlds.drawn_checks import drawn_in_words, of_drawing
 from conevo.worlds.protocol import World
-from conevo.worlds.registry import WorldEntry, resolve
+from conevo.worlds.registry import WorldEntry, resolve, study_of
 from conevo.worlds.rollout import Rollout
 from conevo.worlds.simulators import has_own_simulator, simulator
 from conevo.worlds.trial import Trial
@@ -34,6 +35,8 @@ RANDOM_TEAMS = 100
 TEAM_STEPS = 200_000  # that all random teams together may take
 FEW = 0.02  # share of random teams with any fitness below which that is noted
 KEYS = [fold(1, "check", k) for k in range(3)]
+
+Teams = tuple[npt.NDArray[np.float32], npt.NDArray[np.int32], npt.NDArray[np.int32]]
 
 
 @dataclass(frozen=True)
@@ -104,6 +107,8 @@ def _declared(entry: WorldEntry, environment: str) -> Iterator[Finding]:
             is_own = has_own_simulator(built)
             fine = "names, controller" if is_own else "names, controller, phases, state, scene"
             yield from _topic("structure", _of_structure(built), fine)
+    if entry.studied:
+        yield from _topic("study", _of_study(entry), entry.studied)
 
 
 def _of_structure(built: World) -> Iterator[str]:
@@ -117,6 +122,13 @@ def _of_structure(built: World) -> Iterator[str]:
             refuse_misfit(controller(world=built), built)
         except UsageError as error:
             yield str(error)
+
+
+def _of_study(entry: WorldEntry) -> Iterator[str]:
+    try:
+        study_of(entry)
+    except UsageError as error:
+        yield str(error)
 
 
 def _of_parameters(params_class: Any) -> Iterator[str]:
@@ -149,7 +161,10 @@ def _own(entry: WorldEntry, environment: str) -> Iterator[Finding]:
     teams = mixed_teams(a_world)
     fine = "the same again, alone and in rounds; all finite"
     yield from _topic("evaluate", own_checks.of_play(a_world, teams, KEYS[:2]), fine)
-    yield from _topic("record", own_checks.of_record(a_world, teams, KEYS), "equals evaluate")
+    found = list(_topic("record", own_checks.of_record(a_world, teams, KEYS), "equals evaluate"))
+    yield from found
+    if all(finding.status == "ok" for finding in found):
+        yield from _of_drawing(a_world, teams)
     yield from _of_random_teams(entry.build(environment, entry.params_class()))
 
 
@@ -240,9 +255,7 @@ def _stepped(entry: WorldEntry, environment: str) -> Iterator[Finding]:
         yield Finding("note", "heuristics", text)
 
 
-def mixed_teams(
-    a_world: World,
-) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.int32], npt.NDArray[np.int32]]:
+def mixed_teams(a_world: World) -> Teams:
     """Return teams of networks, a mixed one, and one of each heuristic controller."""
     n_heuristics = len(a_world.heuristics)
     pool, teams = random_teams(a_world, NETWORKS + 1 + n_heuristics)
@@ -255,15 +268,28 @@ def mixed_teams(
 def _rolled_out(entry: WorldEntry, environment: str) -> Iterator[Finding]:
     """Run the kernel that evolution runs."""
     a_world = _shorter(entry, environment)
-    yield from _topic("record", _of_record(a_world), "equals evaluate, bit for bit")
+    teams = mixed_teams(a_world)
+    yield from _topic("record", _of_record(a_world, teams), "equals evaluate, bit for bit")
+    yield from _of_drawing(a_world, teams)
     yield from _of_random_teams(entry.build(environment, entry.params_class()))
 
 
-def _of_record(a_world: World) -> Iterator[str]:
-    pool, teams, heuristic = mixed_teams(a_world)
-    mixed = slice(NETWORKS, NETWORKS + 1)
+def _of_drawing(a_world: World, teams: Teams) -> Iterator[Finding]:
+    """Check that an epoch can be drawn; a world without ``drawn`` need not be."""
+    pool, rows, heuristic = teams
+    played = simulator(a_world, controller(world=a_world))
+    wrong = list(of_drawing(played, pool, rows[NETWORKS], heuristic[NETWORKS], KEYS[0]))
+    if wrong and getattr(a_world, "drawn", None) is None:
+        yield Finding("note", "drawn", wrong[0])
+    else:
+        yield from _topic("drawn", iter(wrong), "" if wrong else drawn_in_words(a_world))
+
+
+def _of_record(a_world: World, mixed: Teams) -> Iterator[str]:
+    pool, teams, heuristic = mixed
+    one = slice(NETWORKS, NETWORKS + 1)
     scenarios, rollout = a_world.scenarios(KEYS[:1]), Rollout(a_world)
-    out = rollout.evaluate(pool, teams[mixed], scenarios, heuristic[mixed])
+    out = rollout.evaluate(pool, teams[one], scenarios, heuristic[one])
     seen = rollout.record(pool, teams[NETWORKS], scenarios, heuristic[NETWORKS])
     ended = np.array([values[0, 0] for values in out.performance.values()])
     if seen["fitness"][-1].tobytes() != out.fitness[0, 0].tobytes():

@@ -56,6 +56,9 @@ def _problem(entry: Any, module: ModuleType) -> str:
     names: Any = entry.environments
     if not (isinstance(names, tuple) and names and all(_is_environment(one) for one in names)):
         return "its environments must be a tuple of names, as in ('dark-1',)"
+    for of_the_package in ("drawn", "product"):
+        if getattr(entry, of_the_package):
+            return f"its ENTRY has {of_the_package}, which only a world of the package has"
     for wanted in (entry.params_name, entry.world_name):
         if not isinstance(getattr(module, str(wanted), None), type):
             return str(unknown_name("class", str(wanted), classes_of(module), "in its ENTRY"))

@@ -1,0 +1,46 @@
+"""What is to be drawn of an epoch of any world, by what is known of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from importlib import import_module
+
+from conevo.playback import plain
+from conevo.playback.about import About
+from conevo.playback.channel import Channel
+from conevo.playback.described import described
+from conevo.playback.drawn import Drawn
+from conevo.playback.parts import Parts
+from conevo.playback.refusals import DAMAGE, one_line
+from conevo.playback.schema import Playback
+from conevo.worlds.registry import WORLDS
+
+__all__ = ["drawing"]
+
+
+def drawing(about: About, channels: Mapping[str, Channel]) -> Playback:
+    """Return what is to be drawn of an epoch, not checked, and without a title and facts.
+
+    Raises:
+        UsageError: it lacks what its world needs, or what it says cannot be.
+        DAMAGE: anything of these, at numbers and names that cannot be.
+    """
+    parts = Parts(about, channels)
+    drawn = Drawn.of(about.get("drawn", {}), one_line(about["world"]))
+    return described(_robots(parts, drawn), parts, drawn)
+
+
+def _robots(parts: Parts, drawn: Drawn) -> Playback:
+    """Return the playback that the world's folder makes, or that of the world it inherits."""
+    about = parts.about
+    entry = WORLDS.get(about.get("like", about["world"]))
+    if entry is None or not entry.drawn:
+        return plain.playback(parts, drawn)
+    draw = import_module(entry.drawn).playback
+    try:
+        made: Playback = draw(parts)
+    except DAMAGE:
+        if "like" not in about:
+            raise
+        return plain.playback(parts, drawn)  # it has other actions, castes or arrays
+    return made
