@@ -15,21 +15,23 @@ import linecache
 import sys
 import threading
 import traceback
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, replace
 from importlib.util import decode_source, module_from_spec, spec_from_loader
 from pathlib import Path
 from types import ModuleType
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar, cast
 
-from conevo.errors import EnvironmentFailure, UsageError
+from conevo.errors import EnvironmentFailure, UsageError, unknown_name
 from conevo.reading import read_bytes
 
-__all__ = ["Source", "classes_of", "files_of", "is_outside", "line_of", "load"]
+__all__ = ["entry_of", "files_of", "is_outside", "line_of"]
 
 MOST_BYTES = 2**20  # of a text
 OWN = {"world": "conevo_world_", "method": "conevo_method_"}  # begin the names of their modules
 _loading = threading.RLock()
+
+Entry = TypeVar("Entry")
 
 
 @dataclass(frozen=True)
@@ -47,7 +49,7 @@ class Source:
     digest: str
 
 
-def load(path: Path, kind: Literal["world", "method"], digest: str = "") -> Source:
+def _load(path: Path, kind: Literal["world", "method"], digest: str = "") -> Source:
     """Return a file, run once in a process for each text that it and its neighbours have.
 
     Args:
@@ -73,6 +75,44 @@ def load(path: Path, kind: Literal["world", "method"], digest: str = "") -> Sour
     return Source(module, tuple(map(str, texts)), found)
 
 
+def entry_of(
+    path: Path,
+    kind: Literal["world", "method"],
+    entry_class: type[Entry],
+    classes: tuple[str, str],
+    problem: Callable[[Entry, ModuleType], str],
+    digest: str = "",
+) -> Entry:
+    """Return the entry of the world or method in a file, with its files and their digest.
+
+    Args:
+        path: the file.
+        kind: what it holds.
+        entry_class: of its ``ENTRY``.
+        classes: fields of the entry that name classes of the file.
+        problem: returns what is wrong with the entry, nothing if it can be used.
+        digest: that the files must have; any if empty.
+
+    Raises:
+        UsageError: a file cannot be read or run, holds no entry, or they have another digest.
+    """
+    source = _load(path, kind, digest)
+    entry = getattr(source.module, "ENTRY", None)
+    if entry is None:
+        wrong = f"it has no ENTRY, the {entry_class.__name__} of its {kind}"
+    elif not isinstance(entry, entry_class):
+        wrong = f"its ENTRY must be a {entry_class.__name__}, not {type(entry).__name__}"
+    else:
+        names = [str(getattr(entry, field)) for field in classes]
+        lacking = [n for n in names if not isinstance(getattr(source.module, n, None), type)]
+        wrong = _no_class(lacking[0], source.module) if lacking else problem(entry, source.module)
+    if wrong:
+        raise UsageError(f"{kind} file {path}: {wrong}")
+    found = {"module": source.module.__name__, "file": source.files[0]}
+    whole: Any = replace(cast("Any", entry), **found, files=source.files, digest=source.digest)
+    return cast("Entry", whole)
+
+
 def files_of(path: Path) -> list[Path]:
     """Return a file and the files next to it that it imports; nothing in them is run.
 
@@ -87,10 +127,11 @@ def is_outside(name: str) -> bool:
     return name.startswith(tuple(OWN.values()))
 
 
-def classes_of(module: ModuleType) -> list[str]:
-    """Return the names of the classes that such a file and its neighbours define."""
-    own = ((name, one) for name, one in vars(module).items() if isinstance(one, type))
-    return [name for name, one in own if is_outside(one.__module__)]
+def _no_class(name: str, module: ModuleType) -> str:
+    """Return that a file has no such class, with those that it and its neighbours define."""
+    classes = ((key, one) for key, one in vars(module).items() if isinstance(one, type))
+    own = [key for key, one in classes if is_outside(one.__module__)]
+    return str(unknown_name("class", name, own, "in its ENTRY"))
 
 
 def _texts(path: Path, kind: str) -> dict[Path, bytes]:

@@ -6,14 +6,12 @@ Such a world is named "FILE.py:ENVIRONMENT"; ``conevo.outside`` says what such a
 from __future__ import annotations
 
 import re
-from dataclasses import is_dataclass, replace
+from dataclasses import is_dataclass
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from conevo import outside
-from conevo.errors import UsageError, unknown_name
-from conevo.outside import classes_of
+from conevo.outside import entry_of
 from conevo.worlds.entry import WorldEntry
 
 __all__ = ["load"]
@@ -22,35 +20,12 @@ CLASS_NAMES = ("name", "actions", "castes", "performance", "heuristics")
 
 
 def load(path: Path, digest: str = "") -> WorldEntry:
-    """Return the entry of the world in a file, with the files it is made of and their digest.
-
-    Args:
-        path: the file.
-        digest: that they must have; any if empty.
-
-    Raises:
-        UsageError: a file cannot be read or run, holds no world, or they have another digest.
-    """
-    source = outside.load(path, "world", digest)
-    entry = getattr(source.module, "ENTRY", None)
-    if problem := _problem(entry, source.module):
-        raise UsageError(f"world file {path}: {problem}")
-    assert isinstance(entry, WorldEntry)
-    return replace(
-        entry,
-        module=source.module.__name__,
-        file=source.files[0],
-        files=source.files,
-        digest=source.digest,
-    )
+    """Return the entry of the world in a file; see ``conevo.outside.entry_of``."""
+    return entry_of(path, "world", WorldEntry, ("params_name", "world_name"), _problem, digest)
 
 
-def _problem(entry: Any, module: ModuleType) -> str:
+def _problem(entry: WorldEntry, module: ModuleType) -> str:
     """Return what is wrong with an entry, nothing if it can be used."""
-    if entry is None:
-        return "it has no ENTRY, the WorldEntry of its world"
-    if not isinstance(entry, WorldEntry):
-        return f"its ENTRY must be a WorldEntry, not {type(entry).__name__}"
     if not re.fullmatch(r"[a-z0-9-]+-v\d+", str(entry.name)):
         return f"its name {entry.name!r} must be lower case and end with a version, as in light-v1"
     names: Any = entry.environments
@@ -59,9 +34,6 @@ def _problem(entry: Any, module: ModuleType) -> str:
     for of_the_package in ("drawn", "product"):
         if getattr(entry, of_the_package):
             return f"its ENTRY has {of_the_package}, which only a world of the package has"
-    for wanted in (entry.params_name, entry.world_name):
-        if not isinstance(getattr(module, str(wanted), None), type):
-            return str(unknown_name("class", str(wanted), classes_of(module), "in its ENTRY"))
     params: Any = getattr(module, entry.params_name)
     made: Any = getattr(module, entry.world_name)
     if not (is_dataclass(params) and "iterations" in params.__dataclass_fields__):
