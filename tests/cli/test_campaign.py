@@ -291,7 +291,7 @@ def test_status_shows_runs_that_slurm_tasks_or_a_resume_carry_out(conevo, tmp_pa
         code, out, _ = conevo("campaign", "status", "tiny", "--runs")
         found = json.loads(conevo("campaign", "status", "tiny", "--json")[1])
     assert code == 0
-    assert "campaigns/tiny: running without a coordinator, 3 pending, 1 running\n" in out
+    assert "campaigns/tiny: running without a coordinator, 1 running, 3 pending\n" in out
     assert re.search(r"^last generation written \d+ s ago$", out, re.M)
     assert re.search(rf"^{first} +running +1 of 2 generations +\d+ s ago +0", out, re.M)
     assert re.search(rf"^{second} +pending +0", out, re.M)

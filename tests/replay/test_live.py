@@ -157,7 +157,7 @@ def test_a_damaged_line_is_one_line_and_the_others_go_on(tmp_path, line, why):
     good = write_run(tmp_path / "good")
     watched = Watched([path, good])
     runs = by_label(watched)
-    assert runs["bad"]["status"] == "unreadable"
+    assert runs["bad"]["status"] == "damaged"
     assert runs["bad"]["problem"].startswith("generations.jsonl is damaged in line 4: ")
     assert why in runs["bad"]["problem"]
     assert "\n" not in runs["bad"]["problem"]
@@ -185,7 +185,7 @@ def test_a_damaged_configuration_is_one_line(tmp_path, content, why):
     good = (path / "config.toml").read_bytes()
     (path / "config.toml").write_bytes(content)
     watched = Watched([path])
-    assert one(watched)["status"] == "unreadable"
+    assert one(watched)["status"] == "damaged"
     assert one(watched)["problem"].startswith(why)
     (path / "config.toml").write_bytes(good)
     assert (one(watched)["problem"], one(watched)["generation"]) == ("", 3)
@@ -357,7 +357,7 @@ def test_a_run_that_was_named_and_goes_away_is_one_line(tmp_path):
     one(watched)
     shutil.rmtree(path)
     run = one(watched)
-    assert (run["status"], run["problem"]) == ("unreadable", "there is no run here any more")
+    assert (run["status"], run["problem"]) == ("damaged", "there is no run here any more")
     assert run["generation"] == 0
     write_run(path, 1)
     assert (one(watched)["problem"], one(watched)["generation"]) == ("", 1)

@@ -36,11 +36,11 @@ def test_runs_of_a_campaign_stand_as_its_ledger_and_their_files_say(campaign):
     with at_work(campaign.path):
         for _ in range(3):
             state = watched.snapshot()
-    assert [run["status"] for run in state["runs"]] == ["finished", "running", "failed", "waiting"]
+    assert [run["status"] for run in state["runs"]] == ["finished", "running", "failed", "pending"]
     assert state["runs"][2]["reason"] == "out of luck"
     assert state["runs"][3]["method"] == "mesp"  # by the plan
     (group,) = state["groups"]
-    assert group["counts"] == {"finished": 1, "running": 1, "failed": 1, "waiting": 1}
+    assert group["counts"] == {"finished": 1, "running": 1, "failed": 1, "pending": 1}
     assert (group["title"], group["running"]) == ("Two methods, two seeds", True)
     # 8 seconds for each run, one core, three of them over
     assert group["ends_at"] - time.time() == pytest.approx(8 - 3 + 8, abs=1.0)
@@ -49,7 +49,7 @@ def test_runs_of_a_campaign_stand_as_its_ledger_and_their_files_say(campaign):
         "finished",
         "interrupted",
         "failed",
-        "waiting",
+        "pending",
     ]
     assert (state["groups"][0]["running"], state["groups"][0]["ends_at"]) == (False, None)
     with at_work(campaign.places.run(mesp_1)):  # a worker that outlived it
@@ -65,7 +65,7 @@ def plan_run(campaign, label):
 def test_a_finished_run_that_is_not_in_the_ledger_yet_is_finished(campaign):
     label = labels_of(campaign)[0]
     watched = Watched([campaign.path])
-    assert by_label(watched)[label]["status"] == "waiting"
+    assert by_label(watched)[label]["status"] == "pending"
     path = write_run(campaign.places.run(label), 4, method="homcne", generations=4)
     assert by_label(watched)[label]["status"] == "interrupted"
     plan_run(campaign, label)
@@ -128,7 +128,7 @@ def test_methods_are_compared_by_medians_over_team_evaluations(tmp_path):
     assert [of[at[x]] for x in (100, 200, 300)] == [3, 3, 1]
     assert median[-1] is None
     row = next(row for row in panel["rows"] if row["series"] == "mesp")
-    assert (row["of"], row["status"]) == (4, {"interrupted": 2, "finished": 1, "unreadable": 1})
+    assert (row["of"], row["status"]) == (4, {"interrupted": 2, "finished": 1, "damaged": 1})
     assert (row["performance"], row["lowest"], row["highest"]) == (7.0, 6.0, 9.0)
 
 

@@ -41,7 +41,7 @@ def evolved(tmp_path_factory):
 
 @pytest.fixture
 def runs(evolved, tmp_path):
-    """A folder with a finished run, one that is running, one interrupted, one unreadable.
+    """A folder with a finished run, one that is running, one interrupted, one damaged.
 
     A lock is held as a process at work holds it.
     """
@@ -139,9 +139,9 @@ def test_every_run_is_listed_as_it_stands(live, runs):
     assert [found[name]["method"] for name in ("done", "at work")] == ["CONE", "HomCNE"]
     assert "left" in found["at work"]["time left"] or "any moment" in found["at work"]["time left"]
     assert found["done"]["time left"] == ""
-    assert found["broken"]["status"] == "unreadable"
+    assert found["broken"]["status"] == "damaged"
     assert "damaged" in found["broken"]["run"] or "config" in found["broken"]["run"]
-    assert "1 finished, 1 running, 1 interrupted, 1 unreadable" in live.inner_text("#summary")
+    assert "1 finished, 1 running, 1 interrupted, 1 damaged" in live.inner_text("#summary")
     live.screenshot(path=runs / "overview.png")
 
 

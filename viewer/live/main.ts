@@ -126,11 +126,11 @@ function groupLine(group: Group, n: number): HTMLElement {
     bar.append(part);
   }
   const eta = group.ends_at === null ? "" : `, ${left(group.ends_at)}`;
-  const working = group.kind === "campaign" && !group.running ? " (no coordinator is running)" : "";
-  const unfinished = (group.counts.finished ?? 0) < size ? working : "";
+  const isLeft = group.kind === "campaign" && !group.running && (group.counts.finished ?? 0) < size;
+  const whose = group.counts.running ? " (running without a coordinator)" : " (not running)";
   const line = make("div", { class: "group" });
   if (n > 1 || group.title !== group.name) line.append(make("b", { title: group.path }, group.title));
-  line.append(bar, make("span", {}, `${counts(group.counts)}${eta}${unfinished}`));
+  line.append(bar, make("span", {}, `${counts(group.counts)}${eta}${isLeft ? whose : ""}`));
   if (group.problem) line.append(make("span", { class: "alert" }, group.problem));
   return line;
 }

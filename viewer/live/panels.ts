@@ -55,7 +55,7 @@ export class PanelView {
         const title = panel.by === "method" ? methodTitle(state, row.series) : row.series;
         const range = row.lowest === null ? "–" : `${number(row.lowest)} to ${number(row.highest)}`;
         const done = row.status.finished ?? 0;
-        const more = ["running", "failed", "interrupted", "unreadable"].filter((s) => row.status[s]);
+        const more = ["running", "failed", "interrupted", "damaged"].filter((s) => row.status[s]);
         const text = [`${done}/${row.of}`, ...more.map((s) => `${row.status[s]} ${s}`)].join(", ");
         return make(
           "tr",

@@ -30,7 +30,7 @@ export function place(run: Summary): string {
 
 /** Return a state with its mark. */
 export function badge(status: string): HTMLElement {
-  const known = STATES.includes(status) ? status : "waiting";
+  const known = STATES.includes(status) ? status : "pending";
   return make("span", { class: `status ${known}` }, status);
 }
 

@@ -38,9 +38,9 @@ export function clock(at: number): string {
   return `${moment.toLocaleDateString("en-GB", { day: "numeric", month: "short" })}, ${time}`;
 }
 
-export const STATES = ["finished", "running", "waiting", "interrupted", "failed", "unreadable"];
+export const STATES = ["finished", "running", "pending", "interrupted", "failed", "damaged"];
 
-/** Return how many runs are in each state: "12 finished, 2 running, 76 waiting". */
+/** Return how many runs are in each state: "12 finished, 2 running, 76 pending". */
 export function counts(found: Record<string, number>): string {
   const parts = STATES.filter((state) => found[state]).map((state) => `${found[state]} ${state}`);
   return parts.join(", ") || "no runs yet";

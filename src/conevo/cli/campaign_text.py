@@ -16,7 +16,7 @@ from conevo.campaigns.campaign import CAMPAIGNS, Campaign
 from conevo.campaigns.estimate import remaining_seconds
 from conevo.campaigns.executors.worker import usable_cores
 from conevo.campaigns.inputs import shown_as
-from conevo.campaigns.ledger import STATES, Entry
+from conevo.campaigns.ledger import Entry
 from conevo.campaigns.plan import PlannedRun
 from conevo.campaigns.plan_file import preset_names, read_preset
 from conevo.campaigns.progress import last_written, progress_of
@@ -36,6 +36,8 @@ __all__ = [
     "print_plan",
     "print_status",
 ]
+
+SHOWN = ("finished", "running", "pending", "interrupted", "failed")  # in the live page's order
 
 Rows = list[dict[str, Any]]
 
@@ -191,8 +193,7 @@ def _how_far(campaign: Campaign, entry: Entry) -> dict[str, Any]:
 def counts(entries: Mapping[str, Entry]) -> str:
     """Return how many runs are in each state: "12 finished, 2 running, 76 pending"."""
     found = Counter(entry.state for entry in entries.values())
-    order = ("finished", *(state for state in STATES if state != "finished"), "interrupted")
-    return ", ".join(f"{found[state]} {state}" for state in order if found[state])
+    return ", ".join(f"{found[state]} {state}" for state in SHOWN if found[state])
 
 
 def grid(

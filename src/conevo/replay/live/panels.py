@@ -68,7 +68,7 @@ class Panel:
     def _row(self, series: str) -> dict[str, Any]:
         """Return how the runs of a series stand, and the medians of what they came to last."""
         runs = [one.summary for one, name in self._series.items() if name == series]
-        sound = [run for run in runs if run["status"] != "unreadable"]
+        sound = [run for run in runs if run["status"] != "damaged"]
         values = {
             "performance": [next(iter(run["performance"].values()), None) for run in sound],
             "fitness": [run["fitness"] for run in sound],
@@ -88,7 +88,7 @@ class Panel:
     def _curves(self, axis: str, points: int) -> dict[str, Any]:
         """Return curves over one axis: x [G]; of every run and of every series' median, y [G]."""
         top = 0.0
-        runs = [one for one in self._series if one.summary["status"] != "unreadable"]
+        runs = [one for one in self._series if one.summary["status"] != "damaged"]
         curves = {q: [one.curve(q, axis) for one in runs] for q in QUANTITIES}
         for one, (x, _) in zip(runs, curves["fitness"], strict=True):
             budget = one.summary["budget"] if axis == "evaluations" and len(x) else 0

@@ -106,7 +106,7 @@ class Subject:
         self._logs: list[Log] = []
         self._declared: Declared | None = None
         self._key: tuple[Any, ...] = ()
-        self._status, self._reason, self._problem = "waiting", "", ""
+        self._status, self._reason, self._problem = "pending", "", ""
         self._summary: dict[str, Any] = {}
 
     # --- looking ----------------------------------------------------------------------------------
@@ -177,7 +177,7 @@ class Subject:
         if standing is not None and standing.state == "failed":
             return "failed", standing.reason
         if self._problem:
-            return "unreadable", ""
+            return "damaged", ""
         if standing is None and self._kind and stamp(self.path / SEAL) is not None:
             return "finished", ""
         if standing is not None and standing.state == "finished":
@@ -187,7 +187,7 @@ class Subject:
         if self._kind and is_locked(self.path / LOCK):
             return "running", ""
         return (
-            "waiting" if standing is not None and not self._n_generations else "interrupted"
+            "pending" if standing is not None and not self._n_generations else "interrupted"
         ), ""
 
     @property
