@@ -98,12 +98,12 @@ def test_text_is_utf_8_with_or_without_a_byte_order_mark(tmp_path: Path) -> None
     for data in ("é = 1\n".encode(), "é = 1\n".encode("utf-8-sig")):
         path.write_bytes(data)
         assert read_text(path) == "é = 1\n"
-    for encoding in ("utf-16", "utf-16-le", "utf-16-be"):
+    for encoding in ("utf-16", "utf-16-le", "utf-16-be", "utf-32"):
         data = "a = 1\n".encode(encoding)
-        words = "UTF-16" if encoding == "utf-16" else "null bytes"
         for read in (read_text, read_toml, read_json):
-            assert words in refused(read, path, data)
-    assert "byte 4 is not UTF-8" in refused(read_text, path, b"a = \xff")
+            assert f"is {encoding[:6].upper()} text; save it as" in refused(read, path, data)
+    assert "byte 4 is not UTF-8); save it as UTF-8" in refused(read_text, path, b"a = \xff")
+    assert "null bytes" in refused(read_text, path, b"a = 1\0\n")
 
 
 NESTED = b"[" * 50_000 + b"]" * 50_000

@@ -23,7 +23,7 @@ from types import ModuleType
 from typing import Any, Literal, TypeVar, cast
 
 from conevo.errors import EnvironmentFailure, UsageError, unknown_name
-from conevo.reading import read_bytes
+from conevo.reading import read_bytes, refuse_wide
 
 __all__ = ["entry_of", "files_of", "is_outside", "line_of"]
 
@@ -141,7 +141,9 @@ def _texts(path: Path, kind: str) -> dict[Path, bytes]:
     while rest:
         file = rest.pop()
         try:
-            texts[file] = read_bytes(file, MOST_BYTES, f"the {kind} file {file if texts else path}")
+            name = f"the {kind} file {file if texts else path}"
+            texts[file] = read_bytes(file, MOST_BYTES, name)
+            refuse_wide(texts[file], name)
         except EnvironmentFailure as error:
             raise UsageError(str(error)) from error
         near = {file.parent / f"{name}.py" for name in _imported(texts[file])}

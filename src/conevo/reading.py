@@ -44,6 +44,7 @@ __all__ = [
     "read_last_line",
     "read_text",
     "read_toml",
+    "refuse_wide",
     "whole_lines",
 ]
 
@@ -122,14 +123,23 @@ def read_text(path: Path, limit: int = MOST_TEXT) -> str:
     return _decode(read_bytes(path, limit), str(path))
 
 
-def _decode(content: bytes, name: str) -> str:
-    if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
+def refuse_wide(content: bytes, name: str) -> None:
+    """Raise DamagedFile if a text has two or four bytes a character, marked as such or not."""
+    evens, odds = content[::2].count(0), content[1::2].count(0)
+    if content[:4] in (b"\xff\xfe\0\0", b"\0\0\xfe\xff"):
+        raise DamagedFile(f"{name} is UTF-32 text; save it as UTF-8")
+    is_marked = content[:2] in (b"\xff\xfe", b"\xfe\xff")
+    if is_marked or (min(evens, odds) == 0 and max(evens, odds) > len(content) / 4):
         raise DamagedFile(f"{name} is UTF-16 text; save it as UTF-8")
+
+
+def _decode(content: bytes, name: str) -> str:
+    refuse_wide(content, name)
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise DamagedFile(
-            f"{name} is damaged or not a text (byte {error.start} is not UTF-8)"
+            f"{name} is damaged or not a text (byte {error.start} is not UTF-8); save it as UTF-8"
         ) from error
     if "\0" in text:
         raise DamagedFile(f"{name} is damaged or not a text (it has null bytes)")

@@ -49,6 +49,20 @@ def test_letters_that_the_terminal_lacks_are_escaped(tmp_path: Path) -> None:
     assert refused.stderr.startswith(r"conevo: error: unknown run '\u65e5'")
 
 
+def test_an_accented_path_is_as_good_as_any_in_the_locale_c(tmp_path: Path) -> None:
+    bare = {"LC_ALL": "C", "LANG": "", "PYTHONIOENCODING": ""}
+    words = " ".join(command(Path("café"), "cone", run__generations=1))
+    for line, code in ((f"$CONEVO {words} --threads 1", 0), ("$CONEVO show café", 0),
+                       ("$CONEVO list runs .", 0), ("$CONEVO show cafe", 2)):  # fmt: skip
+        done = shell(line, tmp_path, **bare)
+        assert done.returncode == code, done.stderr
+        assert done.stderr.count("\n") == (code == 2)
+        assert "caf" in done.stdout + done.stderr
+    done = shell("$CONEVO show café", tmp_path, PYTHONUTF8="0", **bare)
+    assert done.returncode == 2
+    assert done.stderr.endswith("and the locale's encoding here is ascii; set PYTHONUTF8=1\n")
+
+
 def test_a_name_that_is_not_utf_8_is_refused_before_anything_is_written(tmp_path: Path) -> None:
     words = " ".join(command(Path("run"), "cone"))
     done = shell(f"$CONEVO {words} --out $'x\\xff'", tmp_path)

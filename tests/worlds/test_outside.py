@@ -431,3 +431,11 @@ def test_the_example_is_what_the_registry_finds() -> None:
     entry, environment = resolve_world(f"{EXAMPLE}:dark-1")
     assert (entry.name, environment, entry.file) == ("light-v1", "dark-1", str(EXAMPLE))
     assert len(TEXT.splitlines()) < 200
+
+
+def test_a_file_that_is_not_utf_8_is_one_line(tmp_path: Path) -> None:
+    file = tmp_path / "wide.py"
+    for encoding in ("utf-16", "utf-16-le"):
+        file.write_text(TEXT, encoding)
+        with pytest.raises(UsageError, match=r"wide.py is UTF-16 text; save it as UTF-8$"):
+            resolve(f"{file}:dark-1")

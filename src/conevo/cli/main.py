@@ -150,6 +150,20 @@ def _count_interrupts_once() -> None:
     atexit.register(signal.signal, signal.SIGINT, signal.SIG_IGN)  # the message has been printed
 
 
+def _refuse_undecoded(word: str) -> None:
+    """Raise UsageError if a word of the command line could not be decoded."""
+    if not any("\ud800" <= letter <= "\udfff" for letter in word):
+        return
+    try:
+        text = os.fsencode(word).decode("utf-8")
+    except UnicodeError:
+        raise UsageError(f"{word!r} is not valid UTF-8, as names and settings must be") from None
+    raise UsageError(
+        f"{text!a} is UTF-8, and the locale's encoding here is {sys.getfilesystemencoding()}; set "
+        f"PYTHONUTF8=1"
+    )
+
+
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
     """Run a command line; every error is one line, every ending has its exit code.
 
@@ -160,8 +174,7 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     try:
         words = list(sys.argv[1:] if arguments is None else arguments)
         for word in words:
-            if any("\ud800" <= letter <= "\udfff" for letter in word):
-                raise UsageError(f"{word!r} is not valid UTF-8, as names and settings must be")
+            _refuse_undecoded(word)
         with cli.make_context("conevo", words) as ctx:
             code = cli.invoke(ctx)
         sys.stdout.flush()
