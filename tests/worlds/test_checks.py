@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 import re
 import subprocess
@@ -16,6 +17,7 @@ from conevo.cli.main import main
 from conevo.errors import UsageError
 from conevo.worlds import checking
 from conevo.worlds.checks import findings
+from conevo.worlds.registry import resolve
 from worlds.test_outside import TEXT, line_with, written
 
 TEAM = TEXT[TEXT.index("@wp.struct\nclass Team") : TEXT.index("@wp.func\ndef light(")]
@@ -405,3 +407,46 @@ def test_a_sound_world_has_no_problem_and_a_wrong_name_is_one_line(
         out, err = capsys.readouterr()
         assert (caught.value.code, out, err.count("\n")) == (2, "", 1)
         assert words in err
+
+
+def test_no_run_and_no_campaign_begins_with_an_index_outside_its_array(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (old, new), words = OUTSIDE["counts"]
+    file = written(tmp_path / "bad.py", (old, new))
+    (tmp_path / "plan.toml").write_text(
+        '[campaign]\nname = "bad"\npreset = "smoke"\nseeds = 1\n\n'
+        '[factors]\nworld = ["bad.py:dark-1"]\nmethod = ["homcne"]\n'
+    )
+    known = checking._place
+    monkeypatch.setattr(checking, "_place", functools.cache(known))  # compiled only once
+    for arguments in (["run", "bad.py:dark-1"], ["campaign", "start", "plan.toml"]):
+        with pytest.raises(SystemExit) as caught:
+            main(arguments)
+        out, err = capsys.readouterr()
+        assert (caught.value.code, out) == (2, "")
+        assert err == (
+            f"conevo: error: {file}:{line_with('count_action(team')}: in `{words}` an index lies "
+            f"outside its array; see also: conevo check {file}:dark-1\n"
+        )
+        assert sorted(one.name for one in tmp_path.iterdir()) == ["bad.py", "plan.toml"]
+
+
+def test_a_sound_world_is_tried_once_for_its_text_and_parameters(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    entry, environment = resolve(f"{written(tmp_path / 'light.py')}:dark-1")
+    begun = []
+    in_child = checking._in_child
+
+    def counted(*given):
+        begun.append(given)
+        return in_child(*given)
+
+    monkeypatch.setattr(checking, "_in_child", counted)
+    monkeypatch.setattr(checking.wp.config, "kernel_cache_dir", str(tmp_path))
+    few, many = entry.params_class(iterations=5), entry.params_class(iterations=6)
+    for params in (few, few, many, many, few):
+        checking.refuse_wild_indices(entry, environment, params)
+    assert [json.loads(given[-1])["iterations"] for given in begun] == [5, 6]

@@ -113,10 +113,12 @@ def _build_worlds(runs: Iterable[PlannedRun]) -> None:
     """Build the kernels of all worlds, once for all runs, and before any of them begins.
 
     Raises:
-        UsageError: a world in a file of its own, whose author made a mistake.
+        UsageError: a world in a file of its own, whose author made a mistake, such as an index
+            outside its array.
         EnvironmentFailure: compiled kernels cannot be written.
     """
     from conevo.controllers.registry import DEFAULT, controller
+    from conevo.worlds.checking import refuse_wild_indices
     from conevo.worlds.simulators import simulator
 
     for address, name in sorted(
@@ -125,6 +127,7 @@ def _build_worlds(runs: Iterable[PlannedRun]) -> None:
         entry, environment = resolve_world(address)
         built = entry.build(environment, entry.params_class())
         simulator(built, controller(name, world=built))
+        refuse_wild_indices(entry, environment, built.params)
 
 
 class Campaign:

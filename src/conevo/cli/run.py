@@ -66,6 +66,10 @@ def run(
             raise UsageError(f"--prey {prey!r}: {entry.name} has no prey to choose")
     order.take("world.prey", "--prey", prey)
     config = order.resolve(world)
+    if not dry_run and config.entry.files:
+        from conevo.worlds.checking import refuse_wild_indices
+
+        refuse_wild_indices(config.entry, config.environment, config.world_params)
     if seeds is not None:
         from conevo.cli.comparison import compare, plan_of
 

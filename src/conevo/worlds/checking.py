@@ -5,6 +5,7 @@ a line for each finding; if it dies, a second child runs a copy of the world's f
 lines, and the last mark shows where.
 """
 
+import hashlib
 import json
 import os
 import signal
@@ -13,16 +14,25 @@ import sys
 import tempfile
 import threading
 from collections.abc import Generator, Iterator
-from dataclasses import astuple
+from contextlib import suppress
+from dataclasses import asdict, astuple
+from importlib.metadata import version
 from pathlib import Path
 from typing import IO, Any
 
-from conevo.errors import EnvironmentFailure
+import warp as wp
+
+from conevo.errors import EnvironmentFailure, UsageError
+from conevo.kernels import engine
+from conevo.terms import quoted
 from conevo.worlds.checks import Finding, findings
 from conevo.worlds.marking import BYTES, MARKS, marked, read_mark, statement_at
 from conevo.worlds.registry import WorldEntry, resolve
+from conevo.worlds.simulators import has_own_simulator
 
-__all__ = ["check"]
+__all__ = ["check", "refuse_wild_indices"]
+
+Result = tuple[int | None, str]  # a child's exit status, None if it has done all; its last words
 
 MOST_SECONDS = 120  # between two findings: kernels are compiled
 STEP_SECONDS = 20  # after one that is "running": a few scenarios are drawn, or one phase is run
@@ -59,16 +69,70 @@ def check(path: str) -> Iterator[Finding]:
         yield Finding("problem", "world", f"{text}: {words}" if words else text)
 
 
+def refuse_wild_indices(entry: WorldEntry, environment: str, params: Any) -> None:
+    """Refuse a world in a file in which an index lies outside its array, before it is evolved.
+
+    Such an index goes unnoticed in evolution: it spoils results, or ends the process without a
+    word. A few short epochs are run as ``check`` runs them, once for every text of the file and all
+    parameters; what was found sound is remembered with the compiled kernels.
+
+    Args:
+        entry: of the world.
+        environment: its name.
+        params: of the world.
+
+    Raises:
+        UsageError: there is such an index.
+        EnvironmentFailure: the machine failed.
+    """
+    if not entry.files or has_own_simulator(entry.world_class):
+        return
+    given = json.dumps(asdict(params), sort_keys=True, default=str)
+    about = "\0".join((version("conevo"), entry.digest, environment, given))
+    engine.start()
+    name = f"sound-{hashlib.blake2b(about.encode(), digest_size=12).hexdigest()}"
+    mark = Path(wp.config.kernel_cache_dir) / name
+    if mark.exists():
+        return
+    address = entry.address(environment)
+    found, (status, _) = _whole(_in_child(address, {}, STEP_SECONDS, given))
+    if status is None and ("ok", "memory") in [(one.status, one.topic) for one in found]:
+        with suppress(OSError):
+            mark.touch()
+    elif (
+        status and -status in CAUSES and -status != signal.SIGKILL
+    ):  # else nothing is known: evolve, and see
+        place = _place(entry, environment, given) or f"{entry.file}: "
+        cause = CAUSES[signal.Signals(-status)]
+        raise UsageError(f"{place}{cause}; see also: conevo check {quoted(address)}")
+
+
+def _whole(steps: Generator[Finding, None, Result]) -> tuple[list[Finding], Result]:
+    """Return what a child has found, and how it ended."""
+    found = []
+    while True:
+        try:
+            found.append(next(steps))
+        except StopIteration as ended:
+            return found, ended.value
+
+
 def _in_child(
-    path: str, variables: dict[str, str], seconds: float
-) -> Generator[Finding, None, tuple[int | None, str]]:
-    """Yield the findings of a child; ``seconds`` is how long it may run without a sign of life.
+    path: str, variables: dict[str, str], seconds: float, given: str = ""
+) -> Generator[Finding, None, Result]:
+    """Yield the findings of a child.
+
+    Args:
+        path: of the world.
+        variables: of the environment, besides those of this process.
+        seconds: how long it may run without a sign of life.
+        given: parameters with which only indices are checked, as JSON; "": everything is.
 
     Returns:
         Its exit status, None if it has checked all, and the last line of its errors.
     """
     got, put = os.pipe()
-    command = [sys.executable, "-m", __name__, path, str(put)]
+    command = [sys.executable, "-m", __name__, path, str(put), given]
     with open(got) as lines, tempfile.TemporaryFile("w+") as errors:
         child = subprocess.Popen(
             command,
@@ -114,7 +178,7 @@ def _heard(child: subprocess.Popen[bytes], lines: IO[str], seconds: float) -> It
         yield said
 
 
-def _place(entry: WorldEntry, environment: str) -> str:
+def _place(entry: WorldEntry, environment: str, given: str = "") -> str:
     """Return "FILE:LINE: " of the line that ends the process, nothing if it is not in a file."""
     if not entry.files:
         return ""
@@ -125,8 +189,7 @@ def _place(entry: WorldEntry, environment: str) -> str:
         marks = Path(folder) / "marks"
         marks.write_bytes(bytes(BYTES))
         copy = f"{folder}/{Path(entry.file).name}:{environment}"
-        for _ in _in_child(copy, {MARKS: str(marks)}, AGAIN_SECONDS):
-            pass
+        _whole(_in_child(copy, {MARKS: str(marks)}, AGAIN_SECONDS, given))
         found = read_mark(marks)
     if found is None:
         return ""
@@ -134,11 +197,11 @@ def _place(entry: WorldEntry, environment: str) -> str:
     return f"{entry.files[which]}:{line}: in `{statement_at(texts[which], line)}` "
 
 
-def main(path: str, output: int) -> None:
+def main(path: str, output: int, given: str) -> None:
     """Write the findings of a world as lines of JSON."""
     with os.fdopen(output, "w", buffering=1) as lines:
         try:
-            for finding in findings(path):
+            for finding in findings(path, json.loads(given) if given else None):
                 lines.write(f"{json.dumps(astuple(finding))}\n")
             lines.write(f"{json.dumps([END, '', ''])}\n")
         except EnvironmentFailure as error:
@@ -146,4 +209,4 @@ def main(path: str, output: int) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1], int(sys.argv[2]))
+    main(sys.argv[1], int(sys.argv[2]), sys.argv[3])

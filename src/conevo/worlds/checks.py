@@ -4,7 +4,7 @@
 ``worlds.checking`` does this in a process of its own.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import MISSING, dataclass, fields, replace
 from pathlib import Path
 from typing import Any, Literal, get_type_hints
@@ -51,18 +51,22 @@ class Finding:
     text: str
 
 
-def findings(path: str) -> Iterator[Finding]:
+def findings(path: str, given: Mapping[str, Any] | None = None) -> Iterator[Finding]:
     """Yield what is found in a world; it ends where the rest depends on what is wrong.
 
     Args:
         path: "FILE.py:ENVIRONMENT" or "rover/complex-1".
+        given: parameters of a world with which only indices are checked; None: everything is.
 
     Raises:
         EnvironmentFailure: the machine failed, and nothing is known of the world.
     """
     try:
         entry, environment = resolve(path)
-        yield from _all(entry, environment)
+        if given is None:
+            yield from _all(entry, environment)
+        else:
+            yield from _stepped(_shorter(entry, environment, given))
     except EnvironmentFailure:
         raise
     except ConevoError as error:
@@ -76,7 +80,7 @@ def findings(path: str) -> Iterator[Finding]:
 
 def _all(entry: WorldEntry, environment: str) -> Iterator[Finding]:
     is_sound = True
-    groups = (_declared, _drawn, _stepped, _rolled_out)
+    groups = (_declared, _drawn, _played, _rolled_out)
     for group in (_declared, _own) if has_own_simulator(entry.world_class) else groups:
         for finding in group(entry, environment):
             is_sound = is_sound and finding.status != "problem"
@@ -236,14 +240,13 @@ def random_teams(a_world: World, n: int) -> tuple[npt.NDArray[np.float32], npt.N
     return pool.astype(np.float32), teams
 
 
-def _shorter(entry: WorldEntry, environment: str) -> World:
-    params = entry.params_class()
+def _shorter(entry: WorldEntry, environment: str, given: Mapping[str, Any] = {}) -> World:
+    params = entry.params_class(**given)
     return entry.build(environment, replace(params, iterations=min(ITERATIONS, params.iterations)))
 
 
-def _stepped(entry: WorldEntry, environment: str) -> Iterator[Finding]:
+def _stepped(a_world: World) -> Iterator[Finding]:
     """Run some epochs step by step, in a process that ends where an array has no such index."""
-    a_world = _shorter(entry, environment)
     trial = Trial(a_world, *mixed_teams(a_world), a_world.scenarios(KEYS[:2]))
     about = f"{trial.n_worlds} epochs of {a_world.params.iterations} iterations"
     for _ in trial.run():
@@ -253,6 +256,10 @@ def _stepped(entry: WorldEntry, environment: str) -> Iterator[Finding]:
         yield from _topic(topic, iter(problems), fine)
     for text in trial.unplayed_heuristics():
         yield Finding("note", "heuristics", text)
+
+
+def _played(entry: WorldEntry, environment: str) -> Iterator[Finding]:
+    yield from _stepped(_shorter(entry, environment))
 
 
 def mixed_teams(a_world: World) -> Teams:
