@@ -129,7 +129,8 @@ def refuse_wide(content: bytes, name: str) -> None:
     if content[:4] in (b"\xff\xfe\0\0", b"\0\0\xfe\xff"):
         raise DamagedFile(f"{name} is UTF-32 text; save it as UTF-8")
     is_marked = content[:2] in (b"\xff\xfe", b"\xfe\xff")
-    if is_marked or (min(evens, odds) == 0 and max(evens, odds) > len(content) / 4):
+    is_whole = len(content) % 2 == 0 == min(evens, odds)
+    if is_marked or (is_whole and max(evens, odds) > len(content) / 4):
         raise DamagedFile(f"{name} is UTF-16 text; save it as UTF-8")
 
 
