@@ -11,6 +11,7 @@ from __future__ import annotations
 import ast
 import builtins
 import hashlib
+import inspect
 import linecache
 import sys
 import threading
@@ -25,7 +26,7 @@ from typing import Any, Literal, TypeVar, cast
 from conevo.errors import EnvironmentFailure, UsageError, unknown_name
 from conevo.reading import read_bytes, refuse_wide
 
-__all__ = ["entry_of", "files_of", "is_outside", "line_of"]
+__all__ = ["entry_of", "files_of", "is_outside", "line_of", "takes"]
 
 MOST_BYTES = 2**20  # of a text
 OWN = {"world": "conevo_world_", "method": "conevo_method_"}  # begin the names of their modules
@@ -127,6 +128,15 @@ def is_outside(name: str) -> bool:
     return name.startswith(tuple(OWN.values()))
 
 
+def takes(function: Any, n: int, *names: str) -> bool:
+    """Whether a function can be called with ``n`` arguments, and further ones by their names."""
+    try:
+        inspect.signature(function).bind(*[None] * n, **dict.fromkeys(names))
+    except TypeError:
+        return False
+    return True
+
+
 def _no_class(name: str, module: ModuleType) -> str:
     """Return that a file has no such class, with those that it and its neighbours define."""
     classes = ((key, one) for key, one in vars(module).items() if isinstance(one, type))
@@ -206,9 +216,11 @@ def _run(path: Path, texts: Mapping[Path, bytes], kind: str, own: str) -> Module
     files = {file.stem: file for file in texts}
     try:
         return run(first)
-    except (Exception, SystemExit) as error:
+    except BaseException as error:
         for name in names.values():
             sys.modules.pop(name, None)
+        if isinstance(error, KeyboardInterrupt):
+            raise
         place = _place(error, texts)
         at = f"{place[0].name} " * (place[0] != first) + f"line {place[1]}: " if place else ""
         raise UsageError(f"cannot run the {kind} file {path}: {at}{_words(error)}") from error
@@ -227,7 +239,7 @@ def _place(error: BaseException, files: Iterable[Path]) -> tuple[Path, int] | No
 def _words(error: BaseException) -> str:
     """Return what an error is, in one line."""
     what = error.msg if isinstance(error, SyntaxError) else str(error)
-    return " ".join(f"{type(error).__name__}: {what}".split())
+    return " ".join(f"{type(error).__name__}: {what}".split()).removesuffix(":")
 
 
 def line_of(error: BaseException) -> str:

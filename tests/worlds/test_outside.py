@@ -359,6 +359,7 @@ BAD = {
     "raises": ("import math\n\nmath.sqrt(-1)\n", "line 3: ValueError: math domain error"),
     "lines": ("raise OSError('two\\nlines')\n", "line 1: OSError: two lines"),
     "exits": ("import sys\nsys.exit('used as a script')\n", "line 2: SystemExit: used as"),
+    "escapes": ("class Odd(BaseException): pass\nraise Odd('out')\n", "line 2: Odd: out"),
     "imports": ("import conevo_no_such_module\n", "No module named 'conevo_no_such_module'"),
     "entry": ("ENTRY = 'light-v1'\n", "must be a WorldEntry, not str"),
     "version": (TEXT.replace('"light-v1"', '"light"'), "must be lower case and end with a version"),

@@ -99,7 +99,7 @@ def carry_out(
     except _InUse:
         sys.stderr.write(f"{label} is in use by another worker, which will finish it\n")
         return False  # whoever has it writes how it ended
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         ending = {"status": "failed", **_describe(error)}
     ending |= {
         "threads": threads,
@@ -119,7 +119,7 @@ def core_seconds() -> float:
     return spent.ru_utime + spent.ru_stime
 
 
-def _describe(error: Exception) -> dict[str, str]:
+def _describe(error: BaseException) -> dict[str, str]:
     """Return whose fault an error is, what it says, and where a program's own came from."""
     if isinstance(error, ConevoError):
         origin = "machine" if isinstance(error, EnvironmentFailure) else "request"

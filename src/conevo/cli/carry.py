@@ -142,7 +142,7 @@ def carry_on(
         sys.exit(130)
     except EnvironmentFailure as error:
         raise EnvironmentFailure(f"{error}; once fixed: {advice}") from error
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         if isinstance(error, ConevoError) or not (line := line_of(error)):
             raise
         raise UsageError(

@@ -202,7 +202,7 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
             drop_output()
             sys.exit(0)
         fail(f"{error.filename}: {error.strerror}" if error.filename else str(error), 3)
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         outside = sys.modules.get("conevo.outside")
         line = outside.line_of(error) if outside else ""
         if not line:

@@ -171,7 +171,7 @@ def _rebuilt(example: Any, leaves: dict[str, Any], path: Path, prefix: str = "")
 
 
 def difference(record: Any, example: Any) -> str:
-    """Return the first array of a dataclass that has another type or other dimensions.
+    """Return the first field of a dataclass that has another type, or other dimensions.
 
     Args:
         record: as ``load_like`` returns it.
@@ -184,10 +184,13 @@ def difference(record: Any, example: Any) -> str:
 
     leaves = _leaves(record)
     for name, like in _leaves(example).items():
-        if isinstance(like, np.ndarray):
-            found = leaves.get(name)
-            if found is None or (found.dtype, found.ndim) != (like.dtype, like.ndim):
+        found = leaves.get(name)
+        if isinstance(like, np.ndarray) or isinstance(found, np.ndarray):
+            kinds = [(a.dtype, a.ndim) if isinstance(a, np.ndarray) else () for a in (found, like)]
+            if kinds[0] != kinds[1]:
                 return name
+        elif found is not None and type(found) is not type(like):
+            return name
     return ""
 
 

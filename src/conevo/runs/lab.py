@@ -5,17 +5,23 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from conevo.controllers.protocol import Controller
 from conevo.controllers.registry import genome_of
 from conevo.errors import EnvironmentFailure, UsageError
 from conevo.evolution.inheritance import breed_from, hand_on
 from conevo.evolution.protocol import Layout, Method, Progress, State
+from conevo.outside import takes
 from conevo.reading import DamagedFile
+from conevo.rng import fold
 from conevo.runs.champions import Team
 from conevo.runs.config import RunConfig
 from conevo.runs.evaluation import Evaluate, make_evaluator
-from conevo.runs.loop import check_budget, price
+from conevo.runs.loop import check_budget, price, rehearse
+from conevo.worlds.own_simulator import OwnSimulator
 from conevo.worlds.protocol import Simulator, World
 from conevo.worlds.simulators import simulator
 
@@ -188,6 +194,50 @@ class Lab:
         check_budget(self.method, state, self.config.run.budget_evaluations)
         self.world.scenarios([seed])  # says so now if there is no room for what belongs in it
         return state
+
+    def rehearsed(self, first: State) -> State:
+        """Return the state before generation 0, with which all has been tried that is from a file.
+
+        A method goes through the first generation with made-up scores, a simulator plays one team
+        in two scenarios.
+
+        Args:
+            first: the state before generation 0.
+
+        Raises:
+            UsageError: what they return is of no use.
+        """
+        if self.config.method_entry.files:
+            _refuse_unlike(rehearse(self.method, first), first, self.method.title)
+        if isinstance(self.simulator, OwnSimulator):
+            trials = self.method.ask(first)
+            keys = [fold(self.config.run.seed, "rehearsal", k) for k in range(2)]
+            twice = np.repeat(trials.teams[:1], 2, axis=0).astype(np.int32)
+            self.simulator.evaluate(trials.genes, twice, self.world.scenarios(keys), rounds=2)
+        return first
+
+
+def _refuse_unlike(state: State, first: State, title: str) -> None:
+    """Raise UsageError if a state could not be kept, or not be read back.
+
+    Args:
+        state: after a generation.
+        first: before it.
+        title: of the method.
+    """
+    from conevo.runs.checkpoint import difference, refuse_unkept
+
+    refuse_unkept(state, title)
+    if name := difference(state, first):
+        raise UsageError(
+            f"the state of {title} cannot be kept: after a generation {name} is another kind of "
+            f"array or value than at first"
+        )
+    problem: Any = getattr(state, "problem", lambda _: "")
+    if not takes(problem, 1):
+        raise UsageError(f"the state of {title} must have problem(first), or none")
+    if name := state.progress.problem(first.progress) or problem(first):
+        raise UsageError(f"the state of {title} has a wrong {name} after the first generation")
 
 
 def refuse_other_state(state: State, blank: State, path: Path) -> None:

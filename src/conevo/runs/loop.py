@@ -11,12 +11,13 @@ import numpy as np
 
 from conevo.errors import UsageError
 from conevo.evolution.protocol import Method, Progress, Scores, State, Trials
+from conevo.rng import stream
 from conevo.runs.evaluation import Evaluate, Portrait, describe
 from conevo.runs.settings import RunSettings
 from conevo.terms import counted
 from conevo.worlds.measures import Measure
 
-__all__ = ["check_budget", "evolve_generations", "has_reached", "price"]
+__all__ = ["check_budget", "evolve_generations", "has_reached", "price", "rehearse"]
 
 Record = dict[str, Any]
 OF_METHODS = {"type_c_evaluations", "sst", "gst", "recombinations"}  # every log has them
@@ -82,6 +83,27 @@ def price(method: Method, state: State) -> int:
     return int(state.progress.team_evaluations)
 
 
+def rehearse(method: Method, first: State) -> State:
+    """Return what the first generation leaves with made-up scores; nothing is evaluated.
+
+    ask and tell are pure, so a mistake in them shows before a run begins.
+
+    Raises:
+        UsageError: what they return is of no use.
+    """
+    state, has_portrait = first, False
+    made_up = stream(first.progress.root, "rehearsal")
+    while state.progress.generation == first.progress.generation:
+        trials = _asked(method, state)
+        shape = trials.teams.shape[:2]
+        scores = Scores(fitness=made_up.random(shape), specialization=made_up.random(shape))
+        state = _told(method, state, trials, scores)
+        has_portrait = has_portrait or trials.portrait
+    portrait = Portrait({}, [], [], {}) if has_portrait else None
+    _record(method, first.progress, state.progress, portrait, 0, 0.0)
+    return state
+
+
 def _asked(method: Method, state: State) -> Trials:
     """Return what a method asks for.
 
@@ -117,6 +139,14 @@ def _told(method: Method, state: State, trials: Trials, scores: Scores) -> State
             f"{method.title}: tell may end a generation and keeps the root, but generation "
             f"{before.generation} of {before.root} became {after.generation} of {after.root}"
         )
+    if trials.portrait:
+        portrayed = before.crowned(trials, scores)
+        for name in ("fittest_active", "fittest_genes"):
+            if not np.array_equal(getattr(after, name), getattr(portrayed, name)):
+                raise UsageError(
+                    f"{method.title}: tell must record the team of the portrait as the fittest "
+                    f"(Progress.crowned does)"
+                )
     return told
 
 
@@ -139,7 +169,7 @@ def _run_generation(
     evaluate: Evaluate,
     castes: tuple[str, ...],
     settings: RunSettings,
-) -> tuple[State, Portrait, int] | None:
+) -> tuple[State, Portrait | None, int] | None:
     """Return what one generation leaves, None if it cannot be paid.
 
     That is the state after it, its fittest team's portrait, and the epochs that teams played.
@@ -161,11 +191,6 @@ def _run_generation(
         if trials.portrait:
             portrait = describe(evaluation.outcome, castes)
         state = _told(method, state, trials, evaluation.scores)
-    if portrait is None:
-        raise UsageError(
-            f"{method.title} has finished generation {generation} without a portrait: "
-            f"one of its trials must ask for that of the fittest team (Trials.portrait)"
-        )
     return state, portrait, epochs
 
 
@@ -173,7 +198,7 @@ def _record(
     method: Method,
     began: Progress,
     ended: Progress,
-    portrait: Portrait,
+    portrait: Portrait | None,
     team_steps: int,
     seconds: float,
 ) -> Record:
@@ -184,8 +209,13 @@ def _record(
     some of CONE's, the log has those as null or 0.
 
     Raises:
-        UsageError: a number of the method has the name of another entry.
+        UsageError: no portrait, or a number of the method is none or has the name of another entry.
     """
+    if portrait is None:
+        raise UsageError(
+            f"{method.title} has finished generation {began.generation} without a portrait: "
+            f"one of its trials must ask for that of the fittest team (Trials.portrait)"
+        )
     record = {
         "generation": began.generation,
         "team_evaluations": int(ended.team_evaluations),
@@ -206,6 +236,9 @@ def _record(
     }
     if taken := sorted(ended.numbers.keys() & (record.keys() - OF_METHODS)):
         raise UsageError(f"{method.title} gives a number the name {taken[0]}, which the log has")
+    for name, value in ended.numbers.items():
+        if not isinstance(value, int | float | np.number):
+            raise UsageError(f"{method.title}: {name} is not a number: {value!r:.60}")
     return record | {
         name: value if isinstance(value, int) else _finite(value)
         for name, value in ended.numbers.items()

@@ -107,7 +107,7 @@ def start(
 
     path, ancestor, ancestry = beginning(config, out, origin, of_champion)
     lab = Lab.equip(config, threads, device)
-    first = lab.first_state(ancestor)
+    first = lab.rehearsed(lab.first_state(ancestor))
     about = {
         "run_id": config.run_id,
         "stem_id": config.stem_id,

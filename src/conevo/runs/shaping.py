@@ -108,7 +108,8 @@ def start_shaping(
         makes.refuse(configs)
     state: State | None = None
     for before, stage in zip([configs[0], *configs], configs, strict=False):
-        state = Lab.equip(stage, threads, device).first_state(state)
+        lab = Lab.equip(stage, threads, device)
+        state = lab.rehearsed(lab.first_state(state))
         refuse_other_controllers("a stage", before, stage)
     refuse_existing(path, is_new=True)
     with appearing(path) as draft:

@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from conevo.controllers.registry import controller
+from conevo.errors import UsageError
 from conevo.worlds.contract import faults_of_names
-from conevo.worlds.measures import measures_of
 from conevo.worlds.protocol import Outcome, Simulator, World
 from conevo.worlds.simulators import simulator
 
@@ -43,18 +43,12 @@ def of_play(a_world: World, teams: Teams, keys: list[int]) -> Iterator[str]:
     """Yield what is wrong with ``evaluate``: shapes, numbers, and what results depend on."""
     made = simulator(a_world, controller(world=a_world))
     genes, rows, modes = teams
-    n, e, r = len(rows), len(keys), a_world.n_robots
+    n = len(rows)
     scenarios = a_world.scenarios(keys)
-    out = made.evaluate(genes, rows, scenarios, modes)
-    names = [one.name for one in measures_of(a_world)]
-    shapes = {"fitness": (n, e, r), "counts": (n, e, r, len(a_world.castes)), "switches": (n, e, r)}
-    for name, shape in shapes.items():
-        if (found := np.shape(getattr(out, name))) != shape:
-            yield f"evaluate: {name} must be {list(shape)}, got {list(found)}"
-            return
-    if list(out.performance) != names:
-        given = ", ".join(out.performance)
-        yield f"evaluate: performance must have {', '.join(names)}, got {given}"
+    try:
+        out = made.evaluate(genes, rows, scenarios, modes)
+    except UsageError as error:
+        yield str(error).removeprefix(f"world {a_world.name}: ")
         return
     for name, values in (("fitness", out.fitness), *out.performance.items()):
         if not np.isfinite(values).all():
@@ -80,17 +74,12 @@ def of_record(a_world: World, teams: Teams, keys: list[int]) -> Iterator[str]:
     """Yield what is wrong with ``record``: it must show what ``evaluate`` counts."""
     made: Simulator = simulator(a_world, controller(world=a_world))
     genes, rows, modes = teams
-    scenario, t, r = a_world.scenarios(keys[:1]), a_world.params.iterations, a_world.n_robots
-    seen = made.record(genes, rows[0], scenario, modes[0])
-    for name in ("x", "y", "action", "fitness", "inputs", "outputs", "hidden", "performance"):
-        if name not in seen:
-            yield f"record must have {name}"
-            return
-    wanted = {"inputs": len(a_world.inputs), "outputs": len(a_world.outputs)}
-    for name, size in wanted.items():
-        if np.shape(seen[name]) != (t, r, size):
-            yield f"record: {name} must be {[t, r, size]}, got {list(np.shape(seen[name]))}"
-            return
+    scenario = a_world.scenarios(keys[:1])
+    try:
+        seen = made.record(genes, rows[0], scenario, modes[0])
+    except UsageError as error:
+        yield str(error).removeprefix(f"world {a_world.name}: ")
+        return
     out = made.evaluate(genes, rows[:1], scenario, modes[:1])
     if seen["fitness"][-1].tobytes() != out.fitness[0, 0].tobytes():
         yield "fitness at the end of record differs from that of evaluate"

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 from conevo.controllers.registry import refuse_misfit
-from conevo.errors import EnvironmentFailure, UsageError
+from conevo.errors import EnvironmentFailure
 
 if TYPE_CHECKING:
     from conevo.controllers.protocol import Controller
     from conevo.worlds.protocol import Simulator, World
 
 __all__ = ["has_own_simulator", "simulator"]
-
-NEEDED = ("world", "controller", "fingerprint", "n_threads", "evaluate", "record", "is_shared")
 
 
 def has_own_simulator(world: Any) -> bool:
@@ -42,10 +40,6 @@ def simulator(
         raise EnvironmentFailure(
             f"device {device!r}: {world.name} has its own simulator, on the cpu"
         )
-    made = cast("Any", world).simulator(controller, n_threads or usable_threads())
-    for name in NEEDED:
-        if not hasattr(made, name):
-            raise UsageError(
-                f"world {world.name}: its simulator, {type(made).__name__}, needs {name}"
-            )
-    return cast("Simulator", made)
+    from conevo.worlds.own_simulator import build_own
+
+    return build_own(world, controller, n_threads or usable_threads())

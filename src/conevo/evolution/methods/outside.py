@@ -5,15 +5,13 @@ Such a method is named "FILE.py:NAME"; ``conevo.outside`` says what such a file 
 
 from __future__ import annotations
 
-import inspect
 import re
 from dataclasses import is_dataclass
 from pathlib import Path
 from types import ModuleType
-from typing import Any
 
 from conevo.evolution.methods.entry import MethodEntry
-from conevo.outside import entry_of
+from conevo.outside import entry_of, takes
 
 __all__ = ["FUNCTIONS", "load"]
 
@@ -36,17 +34,8 @@ def _problem(entry: MethodEntry, module: ModuleType) -> str:
     if missing:
         return f"{entry.method_name} has no {', no '.join(missing)}"
     for name, n in FUNCTIONS.items():
-        if not _takes(getattr(made, name), [None] * (n + 1)):
+        if not takes(getattr(made, name), n + 1):
             return f"{entry.method_name}.{name} must take {n} argument{'s' * (n > 1)}"
-    if not _takes(made, [], config=None, name="", title=""):
+    if not takes(made, 0, "config", "name", "title"):
         return f"{entry.method_name} must be made of config, name and title"
     return ""
-
-
-def _takes(function: Any, values: list[Any], **named: Any) -> bool:
-    """Whether a function can be called with these arguments."""
-    try:
-        inspect.signature(function).bind(*values, **named)
-    except TypeError:
-        return False
-    return True
