@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING, Any
 
 import warp as wp
 
+from conevo.kernels.trigonometry import cosine_sine
+
 __all__ = [
     "AXLE",
     "N_SENSORS",
@@ -120,14 +122,12 @@ def drive(x: float, y: float, heading: float, left: float, right: float) -> wp.v
     half = (right - left) / (2.0 * AXLE)
     chord = 0.5 * (left + right)
     if wp.abs(half) > 1.0e-3:
-        chord = chord * wp.sin(half) / half
+        turned = cosine_sine(half)
+        chord = chord * turned[1] / half
     else:
         chord = chord * (1.0 - half * half / 6.0)
-    return wp.vec3f(
-        x + chord * wp.cos(heading + half),
-        y + chord * wp.sin(heading + half),
-        wrap(heading + 2.0 * half),
-    )
+    ahead = cosine_sine(heading + half)
+    return wp.vec3f(x + chord * ahead[0], y + chord * ahead[1], wrap(heading + 2.0 * half))
 
 
 @wp.func

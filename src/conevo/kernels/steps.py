@@ -3,6 +3,7 @@
 import warp as wp
 
 from conevo.kernels.outputs import sigmoid
+from conevo.kernels.trigonometry import cosine_sine
 
 __all__ = ["is_taken", "random_step", "steered_step"]
 
@@ -10,8 +11,8 @@ __all__ = ["is_taken", "random_step", "steered_step"]
 @wp.func
 def random_step(u: float, length: float) -> wp.vec2f:
     """Return a step of a length in the direction 2 pi ``u``."""
-    turn = u * 6.2831853
-    return wp.vec2f(length * wp.cos(turn), length * wp.sin(turn))
+    ahead = cosine_sine(u * 6.2831853)
+    return wp.vec2f(length * ahead[0], length * ahead[1])
 
 
 @wp.func

@@ -11,6 +11,7 @@ from conevo.kernels.arrays import named_arrays
 from conevo.kernels.khepera import RADIUS, eight, see_disc, see_wall, steer, wrap
 from conevo.kernels.outputs import sigmoid
 from conevo.kernels.random import uniform
+from conevo.kernels.trigonometry import arc_tangent
 
 __all__ = [
     "N_OBSTACLES",
@@ -121,16 +122,22 @@ def wheel_speed(p: PursuitConstants, b: int) -> float:
 
 @wp.func
 def look(
-    team: PursuitTeam, scene: PursuitScene, p: PursuitConstants, b: int, is_light: bool
+    team: PursuitTeam,
+    scene: PursuitScene,
+    p: PursuitConstants,
+    b: int,
+    ahead: wp.vec2f,
+    is_light: bool,
 ) -> eight:
     """Return the activations of body ``b``'s infrared or light sensors.
 
-    Infrared sees walls, obstacles and bodies; light sees prey, over the heads of others.
+    Infrared sees walls, obstacles and bodies; light sees prey, over the heads of others. ``ahead``:
+    cosine and sine of its heading.
     """
     x = team.x[b]
     y = team.y[b]
-    c = wp.cos(team.heading[b])
-    s = wp.sin(team.heading[b])
+    c = ahead[0]
+    s = ahead[1]
     seen = eight()
     limit = p.sensor_range_cm + 2.0 * RADIUS
     j = int(0)
@@ -211,7 +218,7 @@ def pursue(team: PursuitTeam, scene: PursuitScene, p: PursuitConstants, b: int, 
         team.known[b] = 0  # it is not here any more
     if team.known[b] == 0:
         return walk_randomly(team, scene, p, b, t)
-    return steer(wrap(wp.atan2(dy, dx) - team.heading[b]), p.max_speed_cm)
+    return steer(wrap(arc_tangent(dy, dx) - team.heading[b]), p.max_speed_cm)
 
 
 @wp.func

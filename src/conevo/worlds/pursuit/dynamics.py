@@ -11,6 +11,7 @@ import warp as wp
 
 from conevo.kernels.actions import begin_counting, count_action
 from conevo.kernels.khepera import RADIUS, drive
+from conevo.kernels.trigonometry import cosine_sine
 from conevo.worlds.pursuit.bodies import (
     NONE,
     PursuitConstants,
@@ -72,12 +73,13 @@ def reset(team: PursuitTeam, scene: PursuitScene, p: PursuitConstants, i: int) -
 @wp.func
 def sense(team: PursuitTeam, scene: PursuitScene, p: PursuitConstants, i: int, t: int) -> None:
     """Fill robot ``i``'s sensor inputs, and those of prey that are not the team."""
-    seen = look(team, scene, p, i, False)
+    ahead = cosine_sine(team.heading[i])
+    seen = look(team, scene, p, i, ahead, False)
     for k in range(8):
         team.inputs[i, k] = seen[k]
         team.infrared[i * 8 + k] = seen[k]
     if p.team_is_prey == 0:
-        light = look(team, scene, p, i, True)
+        light = look(team, scene, p, i, ahead, True)
         for k in range(8):
             team.inputs[i, 8 + k] = light[k]
     k = int(0)
@@ -89,7 +91,7 @@ def sense(team: PursuitTeam, scene: PursuitScene, p: PursuitConstants, i: int, t
     b = i + p.n_robots
     while b < scene.n_bodies[0]:
         if is_prey(p, b):
-            seen = look(team, scene, p, b, False)
+            seen = look(team, scene, p, b, cosine_sine(team.heading[b]), False)
             for k in range(8):
                 team.infrared[b * 8 + k] = seen[k]
         b += p.n_robots
