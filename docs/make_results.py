@@ -69,12 +69,12 @@ class Sheet:
 
 
 SHEETS = {
-    "rover-v1": Sheet(
+    "rover-v2": Sheet(
         measures=(("value", "value", ".0f"), ("area", "area", ".2f")),
         axis="red rock value, fittest team of a generation",
         ticks=(20, 50, 100, 200, 500, 1000),
     ),
-    "pursuit-v1": Sheet(
+    "pursuit-v2": Sheet(
         measures=(
             ("capture_time", "capture time", ".1f"),
             ("first_capture", "first capture", ".0f"),
@@ -86,7 +86,7 @@ SHEETS = {
         is_ratio=False,
         has_behaviours=True,
     ),
-    "gacc-v1": Sheet(
+    "gacc-v2": Sheet(
         measures=(
             ("delivered", "delivered", ".2f"),
             ("delivered_share", "of the optimum, %", ".1f"),
@@ -159,7 +159,7 @@ def measured(sheet: Sheet, performance: Row, suffix: str) -> Row:
 
 
 def sheet_of(task: str) -> Sheet:
-    """Return how runs of a task like "rover-v1/complex-5" are reported."""
+    """Return how runs of a task like "rover-v2/complex-5" are reported."""
     return SHEETS[task.partition("/")[0]]
 
 

@@ -97,7 +97,7 @@ def card(module):
 def construction_environments():
     """Return the objects, the obstacles and what is built in every environment of gathering."""
     rows = []
-    for name in WORLDS["gacc-v1"].environments:
+    for name in WORLDS["gacc-v2"].environments:
         plan = GaccWorld(name).plan
         counts = [int((plan.object_types == kind).sum()) for kind in range(len(TYPES))]
         built = [
@@ -145,7 +145,7 @@ def parameters(params):
 def team_types():
     """Return the predators and prey of every environment of pursuit-evasion (table 4.2)."""
     rows = []
-    for name in WORLDS["pursuit-v1"].environments:
+    for name in WORLDS["pursuit-v2"].environments:
         world = PursuitWorld(name)
         rows.append([f"`{name}`", world.n_robots, world.n_prey])
     return table(["environment", "predators", "prey"], rows)
@@ -154,7 +154,7 @@ def team_types():
 def shaping_experiments():
     """Return what is in the arena of every shaping experiment (section 4.3)."""
     rows = []
-    for name in WORLDS["prey-v1"].environments:
+    for name in WORLDS["prey-v2"].environments:
         scenarios = PreyWorld(name).scenarios(range(200))
         others = scenarios.n_bodies - PreyWorld(name).n_robots
         spans = [

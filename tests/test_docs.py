@@ -54,13 +54,13 @@ def test_tables_are_those_of_the_package(page):
     assert make_tables.updated(text) == text, "run: python docs/make_tables.py"
 
 
-def test_every_results_page_says_which_version_it_was_made_with():
+def test_every_results_page_says_which_versions_it_was_made_with():
     pages = sorted((ROOT / "docs" / "results").rglob("*.md"))
     assert len(pages) >= 10
     for page in pages:
         title, empty, mark = page.read_text().splitlines()[:3]
         assert (title[:2], empty) == ("# ", "")
-        assert re.match(r"> Made with conevo \d+\.\d+\.\d+ ", mark), page
+        assert re.match(r"> Made with conevo \d+\.\d+\.\d+ .*\bin `[a-z]+-v\d+`", mark), page
 
 
 def test_every_table_that_can_be_made_has_its_page():

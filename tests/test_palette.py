@@ -29,7 +29,7 @@ def test_methods_from_elsewhere_never_share_a_look() -> None:
 
 
 def test_castes_have_the_colours_of_a_replay_and_strangers_others() -> None:
-    rover = palette.caste_colours(colours_of("rover-v1"), ["hi", "idle"])
+    rover = palette.caste_colours(colours_of("rover-v2"), ["hi", "idle"])
     assert rover == palette.caste_colours(colours_of("rover"), ["idle"])
     assert list(rover) == ["low", "med", "hi", "move", "idle", "non-specialized"]
     assert len(set(rover.values())) == 6

@@ -29,15 +29,15 @@ class Task(NamedTuple):
 
 
 TASKS = {
-    "rover": Task("rover-v1", ("value", "area"), 5000.0, ("low", "med", "hi", "move")),
+    "rover": Task("rover-v2", ("value", "area"), 5000.0, ("low", "med", "hi", "move")),
     "pursuit": Task(
-        "pursuit-v1",
+        "pursuit-v2",
         ("capture_time", "first_capture", "captures"),
         1000.0,
         ("pursuer", "blocker", "flanker", "knocker", "idle"),
     ),
     "gacc": Task(
-        "gacc-v1",
+        "gacc-v2",
         ("delivered", "completed", "delivered_share"),
         None,
         (*(f"{kind}-{what}" for kind in "ABC" for what in ("detector", "gatherer")), "move"),

@@ -28,11 +28,11 @@ def test_one_run_or_stage_and_early_ends_are_named_so() -> None:
 
 
 def test_headings_differ_where_only_the_budget_does() -> None:
-    groups = [Group("rover-v1", "complex", "a"), Group("rover-v1", "complex", "b"),
-              Group("rover-v1", "simple", "c")]  # fmt: skip
+    groups = [Group("rover-v2", "complex", "a"), Group("rover-v2", "complex", "b"),
+              Group("rover-v2", "simple", "c")]  # fmt: skip
     small = DESK._replace(evaluations=(300, 320, 310.0), steps=(6000, 6400, 6200.0))
     assert headings(groups, [DESK, small, DESK]) == [
-        "rover-v1, complex, desk, 49,920 to 50,000 team evaluations of 1,250 team-steps",
-        "rover-v1, complex, desk, 300 to 320 team evaluations of 20 team-steps",
-        "rover-v1, simple, desk",
+        "rover-v2, complex, desk, 49,920 to 50,000 team evaluations of 1,250 team-steps",
+        "rover-v2, complex, desk, 300 to 320 team evaluations of 20 team-steps",
+        "rover-v2, simple, desk",
     ]

@@ -27,8 +27,8 @@ def value(
 ) -> Value:
     return Value(
         run=f"{environment}-{treatment.title}-{seed}",
-        task=f"rover-v1/{environment}",
-        world="rover-v1",
+        task=f"rover-v2/{environment}",
+        world="rover-v2",
         environment=environment,
         family="complex",
         number=1,
@@ -58,8 +58,8 @@ def test_runs_of_other_budgets_are_in_other_groups() -> None:
     values = [value("complex-1", CONE, 1, 2.0), value("complex-1", CONE, 2, 3.0, budget="night")]
     groups = group_values(values)
     assert list(groups) == [
-        Group("rover-v1", "complex", "smoke"),
-        Group("rover-v1", "complex", "night"),
+        Group("rover-v2", "complex", "smoke"),
+        Group("rover-v2", "complex", "night"),
     ]
     assert [len(of) for cells in groups.values() for of in cells.values()] == [1, 1]
 

@@ -21,7 +21,7 @@ TRUTH = {("complex-1", "mesp"): Cell(100.0), ("complex-1", "cone"): Cell(200.0)}
 
 def directed(folder: Path, truth: dict[tuple[str, str], Cell]) -> Path:
     """Write tables of a world in which a small value is good, in cm."""
-    write_tables(folder, "rover-v1", truth, 10, 0.05)
+    write_tables(folder, "rover-v2", truth, 10, 0.05)
     columns = ", ".join(f'"{name}" {kind}' for name, kind in SCHEMA["measures"].items())
     with duckdb.connect(":memory:") as connection:
         connection.execute(f"CREATE TABLE measures ({columns})")
@@ -56,7 +56,7 @@ def test_the_smaller_of_two_distances_is_the_better(tmp_path: Path) -> None:
 
 
 def test_more_is_lost_where_more_is_better(tmp_path: Path) -> None:
-    with Tables(write_tables(tmp_path, "rover-v1", TRUTH, 10, 0.05)) as tables:
+    with Tables(write_tables(tmp_path, "rover-v2", TRUTH, 10, 0.05)) as tables:
         (scope,) = scopes(tables)
         section, lost = comparisons(scope), lesions(scope)
     assert section is not None
@@ -67,7 +67,7 @@ def test_more_is_lost_where_more_is_better(tmp_path: Path) -> None:
 def test_exchange_is_next_to_every_result_of_cone(tmp_path: Path) -> None:
     idle = dataclasses.replace(TRUTH["complex-1", "cone"], exchanges=0.3, exchange_share=0.003)
     truth = TRUTH | {("complex-1", "cone"): idle}
-    with Tables(write_tables(tmp_path, "rover-v1", truth, 10, 0.05)) as tables:
+    with Tables(write_tables(tmp_path, "rover-v2", truth, 10, 0.05)) as tables:
         (scope,) = scopes(tables)
         section, reached = comparisons(scope), performance(scope)
     rows = next(one for one in reached.exhibits if one.name == "rover-complex-performance").rows
@@ -88,7 +88,7 @@ def test_the_power_of_alike_is_in_the_row_of_a_pair(tmp_path: Path) -> None:
     truth = {("complex-1", "mesp"): Cell(100.0), ("complex-1", "cone"): Cell(100.0)}
     powers = {}
     for noise in (0.05, 0.3):
-        folder = write_tables(tmp_path / str(noise), "rover-v1", truth, 10, noise)
+        folder = write_tables(tmp_path / str(noise), "rover-v2", truth, 10, noise)
         with Tables(folder) as tables:
             (scope,) = scopes(tables)
             section = comparisons(scope)

@@ -62,4 +62,4 @@ def test_a_column_has_the_same_decimals_unless_sizes_are_far_apart() -> None:
 
 
 def test_names_of_files_are_plain() -> None:
-    assert slug("rover-v1, complex: smoke") == "rover-v1-complex-smoke"
+    assert slug("rover-v2, complex: smoke") == "rover-v2-complex-smoke"

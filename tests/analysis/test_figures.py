@@ -208,7 +208,7 @@ def test_any_number_of_curves_fits(methods, panels) -> None:
     course = {line: band(1 + k / 9) for k, line in enumerate(names)}
     titles = [f"complex-{k}, {LONG}" for k in range(panels)]
     curves.lines(dict.fromkeys(titles, course), names, x_label="team evaluations", y_label="value")
-    castes = caste_colours(colours_of("gacc-v1"), ["A-gatherer", "B-gatherer", "move"])
+    castes = caste_colours(colours_of("gacc-v2"), ["A-gatherer", "B-gatherer", "move"])
     part = {name: np.full(3, 1 / len(castes)) for name in castes}
     rows = titles[:6]
     curves.stacks(

@@ -36,7 +36,7 @@ class Campaign:
     def run(self, method, number, seed, *, steps=BUDGET, tests=(5.0, 3.0), values=None, **fields):
         """Add a run: the value of a generation is its number, its test 5 and 3."""
         family = fields.get("family", "complex")
-        about = {"world": "rover-v1", "preset": "smoke", "variant": "", "measure": "main_value"}
+        about = {"world": "rover-v2", "preset": "smoke", "variant": "", "measure": "main_value"}
         about |= {"family": family, "environment": f"{family}-{number}"} | fields
         about["task"] = f"{about['world']}/{about['environment']}"
         run = "-".join(str(part) for part in (*about.values(), method, seed))
@@ -109,14 +109,14 @@ def test_whole_campaign_has_the_documented_form(campaign):
         for method in ("ccga", "cone"):
             for number in (1, 2, 10):
                 campaign.run(method, number, seed)
-            campaign.run(method, 4, seed, world="pursuit-v1", family="team", measure="capture_time")
+            campaign.run(method, 4, seed, world="pursuit-v2", family="team", measure="capture_time")
     with campaign.tables() as tables:
         data = export(tables)
         assert left_out(tables) == []
-    assert list(data) == ["pursuit-v1 team smoke", "rover-v1 complex smoke"]
-    assert list(data["rover-v1 complex smoke"]) == ["complex-1", "complex-2", "complex-10"]
-    assert list(data["pursuit-v1 team smoke"]["team-4"]) == ["ccga", "cone"]
-    one = data["pursuit-v1 team smoke"]["team-4"]["cone"]
+    assert list(data) == ["pursuit-v2 team smoke", "rover-v2 complex smoke"]
+    assert list(data["rover-v2 complex smoke"]) == ["complex-1", "complex-2", "complex-10"]
+    assert list(data["pursuit-v2 team smoke"]["team-4"]) == ["ccga", "cone"]
+    one = data["pursuit-v2 team smoke"]["team-4"]["cone"]
     assert list(one) == ["seed_1", "seed_2", "seed_3"]
     assert one["seed_2"]["absolute_metrics"] == {"capture-time": [5.0, 3.0]}
     assert_documented(data)
@@ -126,7 +126,7 @@ def test_steps_share_the_smallest_budget_and_show_the_last_generation_that_ended
     campaign.run("ccga", 1, 1, steps=800)  # generations end at 100, 200, .. 800
     campaign.run("cone", 1, 1, steps=1600)  # at 200, 400, ..
     with campaign.tables() as tables:
-        cells = export(tables)["rover-v1 complex smoke"]["complex-1"]
+        cells = export(tables)["rover-v2 complex smoke"]["complex-1"]
     curves = {}
     for method in ("ccga", "cone"):
         steps = list(cells[method]["seed_1"].values())[:-1]
@@ -141,7 +141,7 @@ def test_runs_are_named_by_seeds_and_those_that_a_cell_lacks_are_left_out(campai
     runs = [campaign.run("cone", 1, seed, tests=(float(seed),)) for seed in (17, 3, 5)]
     other = [campaign.run("ccga", 1, seed) for seed in (5, 17, 6)]
     with campaign.tables() as tables:
-        cone = export(tables)["rover-v1 complex smoke"]["complex-1"]["cone"]
+        cone = export(tables)["rover-v2 complex smoke"]["complex-1"]["cone"]
         assert left_out(tables) == sorted([runs[1], other[2]])
     values = {name: run["absolute_metrics"]["main-value"] for name, run in cone.items()}
     assert values == {"seed_5": [5.0], "seed_17": [17.0]}
@@ -162,7 +162,7 @@ def test_algorithm_that_few_tasks_have_goes(campaign):
     with campaign.tables() as tables:
         data = export(tables)
         assert left_out(tables) == [gone]
-    assert list(data["rover-v1 complex smoke"]) == ["complex-1", "complex-2", "complex-3"]
+    assert list(data["rover-v2 complex smoke"]) == ["complex-1", "complex-2", "complex-3"]
     assert_documented(data)
 
 
@@ -174,7 +174,7 @@ def test_task_that_is_not_finished_goes(campaign):
     with campaign.tables() as tables:
         data = export(tables)
         assert left_out(tables) == [gone]
-    assert list(data["rover-v1 complex smoke"]) == ["complex-1", "complex-2"]
+    assert list(data["rover-v2 complex smoke"]) == ["complex-1", "complex-2"]
     assert_documented(data)
 
 
@@ -192,9 +192,9 @@ def test_budgets_are_never_mixed(campaign):
     with campaign.tables() as tables:
         data = export(tables)
     assert list(data) == [
-        "rover-v1 complex night",
-        "rover-v1 complex smoke",
-        "rover-v1 simple smoke",
+        "rover-v2 complex night",
+        "rover-v2 complex smoke",
+        "rover-v2 simple smoke",
     ]
 
 
@@ -203,7 +203,7 @@ def test_variants_are_algorithms_without_a_comma(campaign):
     campaign.run("cone", 1, 1, variant="gst=0.1,gdm=0.2")
     with campaign.tables() as tables:
         data = export(tables)
-    assert list(data["rover-v1 complex smoke"]["complex-1"]) == ["cone", "cone gst=0.1;gdm=0.2"]
+    assert list(data["rover-v2 complex smoke"]["complex-1"]) == ["cone", "cone gst=0.1;gdm=0.2"]
     assert_documented(data)
 
 
@@ -223,7 +223,7 @@ def test_runs_that_lack_something_are_left_out(campaign, flaw):
         campaign.run("cone", 1, seed)
     gone = campaign.run("cone", 1, 3, **flaw)
     with campaign.tables() as tables:
-        assert list(export(tables)["rover-v1 complex smoke"]["complex-1"]["cone"]) == [
+        assert list(export(tables)["rover-v2 complex smoke"]["complex-1"]["cone"]) == [
             "seed_1",
             "seed_2",
         ]
@@ -253,8 +253,8 @@ def test_a_measure_of_which_smaller_is_better_is_negated(campaign):
     with campaign.tables() as tables:
         data = export(tables)
     assert_documented(data)
-    (less,) = data["rover-v1 complex smoke"]["complex-1"]["cone"].values()
+    (less,) = data["rover-v2 complex smoke"]["complex-1"]["cone"].values()
     assert less["absolute_metrics"] == {"negated-first-capture": [-5.0, -3.0]}
     assert less[f"step_{STEPS}"]["negated-first-capture"] == [1.0 - GENERATIONS]
-    (more,) = data["rover-v1 simple smoke"]["simple-2"]["cone"].values()
+    (more,) = data["rover-v2 simple smoke"]["simple-2"]["cone"].values()
     assert more["absolute_metrics"] == {"value": [5.0, 3.0]}

@@ -160,7 +160,7 @@ def test_the_numbers_are_those_of_the_tables(report, campaign) -> None:
     points = rows_of(report / "numbers/rover-complex-runs.csv")
     assert len(points) == 24
     assert {row["run"]: float(row["value"]) for row in points} == pytest.approx(
-        {one.run: one.value for one in values if one.world == "rover-v1"}, rel=1e-9
+        {one.run: one.value for one in values if one.world == "rover-v2"}, rel=1e-9
     )
 
 
@@ -265,7 +265,7 @@ def test_budgets_stand_apart(tmp_path) -> None:
     groups = [section for section in sections if section.sections]
     assert [section.name for section in groups] == ["rover-complex", "rover-complex-budget-2"]
     assert [section.title for section in groups] == [
-        f"rover-v1, complex, smoke, {budget} team evaluations of 500 team-steps"
+        f"rover-v2, complex, smoke, {budget} team evaluations of 500 team-steps"
         for budget in ("1,000", "5,000")
     ]
     assert groups[1].text[0] == (
@@ -343,7 +343,7 @@ def test_diversity_that_pays_is_that_of_the_runs_of_a_cell(campaign, report) -> 
     with Tables(campaign / "tables") as tables:
         value_of = {one.run: one.value for one in tables.values()}
         _, found = tables.query(
-            "SELECT run, value FROM metrics JOIN runs USING (run) WHERE task = 'rover-v1/complex-2'"
+            "SELECT run, value FROM metrics JOIN runs USING (run) WHERE task = 'rover-v2/complex-2'"
             " AND method = 'cone' AND metric = 'hierarchic_social_entropy'"
         )
     diversity = [value for _, value in found]

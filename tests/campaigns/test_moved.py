@@ -148,7 +148,7 @@ def test_other_code_does_not_carry_a_campaign_on_unless_it_is_accepted(
         main(start)
     with Tables(made.places.tables) as tables:
         text = " ".join(overview(tables, read_campaign(made.path)).text)
-    assert "runs of rover-v1/complex-1 that are compared here were made by different code" in text
+    assert "runs of rover-v2/complex-1 that are compared here were made by different code" in text
 
 
 def test_a_campaign_of_the_first_release_is_other_code(tmp_path: Path) -> None:

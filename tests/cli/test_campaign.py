@@ -38,7 +38,7 @@ def test_a_campaign_from_start_to_answers(conevo, tmp_path):
     assert (code, status["running"]) == (0, False)
     assert [run["state"] for run in status["runs"]] == ["finished"] * 2
     code, out, _ = conevo("campaign", "status", "tiny", "--runs")
-    assert "rover-v1-complex-1-cone-s1" in out
+    assert "rover-v2-complex-1-cone-s1" in out
     code, out, _ = conevo("query", "SELECT method, seed FROM runs ORDER BY method", "--json")
     assert [json.loads(line) for line in out.splitlines()] == [
         {"method": "cone", "seed": 1},
@@ -103,7 +103,7 @@ def test_a_plan_that_is_named_is_never_ignored(conevo, tmp_path, command):
     verb, *more = command
     code, _, err = conevo("campaign", verb, "b.toml", "--out", "c", *more)
     assert code == 2
-    assert "c holds another campaign: its run rover-v1-complex-1-homcne-s1 is one that this" in err
+    assert "c holds another campaign: its run rover-v2-complex-1-homcne-s1 is one that this" in err
     code, _, err = conevo("campaign", verb, "absent.toml", "--out", "c", *more)
     assert code in (2, 3)
     assert "absent.toml" in err
@@ -156,7 +156,8 @@ def test_failures_are_said_with_their_reason_and_can_be_tried_again(conevo, tmp_
     assert "does not pay for one generation" in out
     code, out, _ = conevo("campaign", "status", "tiny")
     assert code == 1
-    assert "failed rover-v1-complex-1-cone-s1: run.budget_evaluations = 1" in out
+    assert "failed rover-v2-complex-1-cone-s1: run.budget_evaluations = 1" in out
+    assert "its copy of" not in out  # it has none of a world of the package
     code, out, _ = conevo("campaign", "retry", "tiny", "--executor", "serial", "--json")
     assert code == 1
     assert [json.loads(line)["state"] for line in out.splitlines()] == ["failed"] * 2

@@ -94,7 +94,7 @@ def test_show_finds_a_run_by_the_beginning_of_its_name(say) -> None:
     assert f"runs/{name}: finished" in said.out
     assert "SST" in said.out
     everything = json.loads(say("show", name[:20], "--json").out)
-    assert everything["config"]["run"]["world"] == "rover-v1/complex-1"
+    assert everything["config"]["run"]["world"] == "rover-v2/complex-1"
     assert len(everything["generations"]) == 5
     assert everything["changed_files"] == []
     say(*tiny("--quiet", "--seed", "2"))
@@ -336,7 +336,7 @@ def test_a_champion_is_tested_under_changed_conditions(say) -> None:
     words = ("test", "first", "--on", "complex-2", "--set", "world.iterations=20", "--robots", "2")
     said = say(*words)
     assert (said.code, said.err) == (0, "")
-    assert "changed conditions: rover-v1/complex-2, 2 robots, world.iterations=20" in said.out
+    assert "changed conditions: rover-v2/complex-2, 2 robots, world.iterations=20" in said.out
     assert re.search(r"^change ", said.out, flags=re.MULTILINE)
     assert set(json.loads(say(*words, "--json").out)) == {"own", "changed", "conditions", "change"}
     assert say("test", "first", "--set", "run.seed=3").code == 2

@@ -39,8 +39,8 @@ def test_methods_are_compared_with_every_seed_and_more_seeds_extend_it(say, tmp_
 def test_seeds_count_from_the_one_that_is_named(say, tmp_path: Path) -> None:
     said = say(*TINY, "--seeds", "2", "--seed", "7", "--dry-run", "--json")
     assert [json.loads(line)["run"] for line in said.out.splitlines()] == [
-        "rover-v1-complex-1-cone-s7",
-        "rover-v1-complex-1-cone-s8",
+        "rover-v2-complex-1-cone-s7",
+        "rover-v2-complex-1-cone-s8",
     ]
     assert list(tmp_path.iterdir()) == []
 

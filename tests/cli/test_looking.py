@@ -94,7 +94,7 @@ def test_a_run_is_shown_without_its_world(runs: Path) -> None:
     assert "modified since the run: inputs/light.py" in out
     out, modules = look("show", str(runs / "finished"), "--json")
     assert HEAVY & modules == set()
-    assert json.loads(out)["config"]["run"]["world"] == "rover-v1/complex-1"
+    assert json.loads(out)["config"]["run"]["world"] == "rover-v2/complex-1"
 
 
 def test_a_campaign_is_looked_at_without_simulating(tmp_path: Path) -> None:
@@ -115,10 +115,10 @@ def test_a_run_by_the_first_release_is_looked_at(runs: Path, tmp_path: Path) -> 
         for key in set(session) - {"started", "from_generation", "threads"}:
             del session[key]
     file.write_text(json.dumps(about))
-    assert look("show", str(run.path))[0].startswith("rover-v1/complex-1, CONE, preset smoke, ")
+    assert look("show", str(run.path))[0].startswith("rover-v2/complex-1, CONE, preset smoke, ")
     config = run.path / "config.toml"
     text = config.read_text()
-    config.write_text(text.replace("rover-v1/complex-1", "/gone/light.py:dark-1"))
+    config.write_text(text.replace("rover-v2/complex-1", "/gone/light.py:dark-1"))
     found = conevo.Run(run.path)
     assert found.outline.task == "light.py:dark-1"
     with pytest.raises(conevo.UsageError, match=r"cannot read the world file /gone/light\.py"):

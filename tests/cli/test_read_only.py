@@ -97,7 +97,7 @@ def test_a_mounted_archive_is_read(archive, tmp_path):
     if not shutil.which("unshare") or subprocess.run(can_mount, capture_output=True).returncode:
         pytest.skip("no file system can be mounted here")
     shutil.rmtree(archive / "tiny" / "tables")
-    campaign, run = "archive/tiny", "archive/tiny/runs/rover-v1-complex-1-cone-s1"
+    campaign, run = "archive/tiny", "archive/tiny/runs/rover-v2-complex-1-cone-s1"
     commands = [
         ["campaign", "status", campaign],
         ["query", campaign, "SELECT count(*) FROM runs"],

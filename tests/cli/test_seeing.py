@@ -207,7 +207,7 @@ BAD = [
     (("replay", "none"), "unknown run 'none' in runs/"),
     (("replay", "cone", "--generation", "22"), r"has no generation 22 \(it has 0 to 21\)"),
     (("replay", "cone", "--generation", "-1"), "-1 is not in the range 0<=x<=2147483647"),
-    (("replay", "cone", "--beside", "gacc"), "cannot play rover-v1/complex-1"),
+    (("replay", "cone", "--beside", "gacc"), "cannot play rover-v2/complex-1"),
     (("replay", "cone", "--beside-generation", "0"), "--beside-generation needs --beside"),
     (("replay", "bad.npz"), "bad.npz is damaged or not a trajectory"),
     (("replay", "page.html"), "page.html is damaged or not a trajectory"),

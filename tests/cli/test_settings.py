@@ -107,7 +107,7 @@ def test_the_price_of_a_dry_run_is_what_the_run_costs(say) -> None:
 
 def test_a_dry_run_of_a_shaping_names_every_stage(say, tmp_path: Path) -> None:
     out = say("run", "rover/complex-3", "--shape", "--preset", "smoke", "--dry-run").out
-    assert [f"# rover-v1/complex-{k}, CONE" in out for k in (1, 2, 3, 4)] == [True] * 3 + [False]
+    assert [f"# rover-v2/complex-{k}, CONE" in out for k in (1, 2, 3, 4)] == [True] * 3 + [False]
     assert list(tmp_path.iterdir()) == []
 
 

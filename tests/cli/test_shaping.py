@@ -32,7 +32,7 @@ def test_a_shaping_from_run_to_the_commands_it_recommends(say, tmp_path: Path) -
     said = say(*shape("--threads", "1"))
     assert (said.code, said.err) == (0, "")
     for stage in (1, 2, 3):
-        assert f"stage {stage} of 3: rover-v1/complex-{stage}, CONE, preset smoke" in said.out
+        assert f"stage {stage} of 3: rover-v2/complex-{stage}, CONE, preset smoke" in said.out
     assert said.out.count("generation 5/5  value") == 3
     recommended = re.findall(r"^  (conevo .*)$", said.out, flags=re.MULTILINE)
     assert [line.split()[1] for line in recommended] == ["show", "replay", "test", "test"]
@@ -40,20 +40,20 @@ def test_a_shaping_from_run_to_the_commands_it_recommends(say, tmp_path: Path) -
         again = say(*shlex.split(line)[1:])
         assert again.code == 0, again.err
     (path,) = (tmp_path / "runs").iterdir()
-    assert path.name.startswith("rover-v1-complex-1-to-complex-3-cone-smoke-s1-")
+    assert path.name.startswith("rover-v2-complex-1-to-complex-3-cone-smoke-s1-")
     (row,) = json.loads(say("list", "runs", "--json").out)
     assert row == {
-        "run": f"runs/{path.name}", "world": "rover-v1/complex-1 to complex-3", "method": "cone",
+        "run": f"runs/{path.name}", "world": "rover-v2/complex-1 to complex-3", "method": "cone",
         "preset": "smoke", "seed": "1", "generations": "15 of 15 generations", "status": "finished",
     }  # fmt: skip
     stages = json.loads(say("list", "runs", f"runs/{path.name}", "--json").out)
-    assert [row["world"] for row in stages] == [f"rover-v1/complex-{k}" for k in (1, 2, 3)]
+    assert [row["world"] for row in stages] == [f"rover-v2/complex-{k}" for k in (1, 2, 3)]
 
 
 def test_show_prints_the_stages_with_what_their_champions_achieved(say, tmp_path: Path) -> None:
     say(*shape("--out", "here", "--quiet"))
     shown = say("show", "here").out
-    assert "rover-v1/complex-1 to complex-3, CONE, preset smoke, seed 1" in shown
+    assert "rover-v2/complex-1 to complex-3, CONE, preset smoke, seed 1" in shown
     assert "here: finished" in shown
     rows = [line.split() for line in shown.splitlines() if re.match(r" +\d  rover", line)]
     for row, run in zip(rows, Shaping("here").stages, strict=True):
@@ -67,7 +67,7 @@ def test_show_prints_the_stages_with_what_their_champions_achieved(say, tmp_path
     table = shown[shown.index("number  stage  task") :].splitlines()
     seen = [line.split()[:4] for line in table[1:]]
     assert seen == [
-        [str(5 * k + g), str(k + 1), f"rover-v1/complex-{k + 1}", str(g)]
+        [str(5 * k + g), str(k + 1), f"rover-v2/complex-{k + 1}", str(g)]
         for k in range(3)
         for g in (0, 1, 3, 4)
     ]
@@ -76,7 +76,7 @@ def test_show_prints_the_stages_with_what_their_champions_achieved(say, tmp_path
     everything = json.loads(say("show", "here", "--json").out)
     assert everything["generations"] == Shaping("here").generations()
     assert everything["changed_files"] == []
-    assert everything["tasks"] == [f"rover-v1/complex-{k}" for k in (1, 2, 3)]
+    assert everything["tasks"] == [f"rover-v2/complex-{k}" for k in (1, 2, 3)]
     assert [len(stage["generations"]) for stage in everything["stages"]] == [5, 5, 5]
     file = tmp_path / "here" / "stage-1" / "test.json"
     file.write_text(file.read_text() + "\n")
@@ -99,7 +99,7 @@ def test_test_takes_that_team_to_the_environment_of_every_stage(say) -> None:
     assert "The fittest team of stage 3" in said.out
     assert "2 fresh scenarios of each stage" in said.out
     rows = [line.split() for line in said.out.splitlines() if re.match(r" +\d  rover", line)]
-    assert [row[:2] for row in rows] == [[str(k), f"rover-v1/complex-{k}"] for k in (1, 2, 3)]
+    assert [row[:2] for row in rows] == [[str(k), f"rover-v2/complex-{k}"] for k in (1, 2, 3)]
     said = say("test", "here/stage-1", "--stages")
     assert (said.code, said.err) == (
         2, "conevo: error: here/stage-1 is a run; only a shaping has stages\n",
@@ -173,7 +173,7 @@ def test_a_shaping_that_has_not_begun_is_shown_and_has_no_team(say, tmp_path: Pa
 def test_shape_prey_leaves_prey_for_the_pursuit_world(say) -> None:
     said = say("shape-prey", *sets(PURSUIT), "--out", "prey", "--threads", "1")
     assert (said.code, said.err) == (0, "")
-    assert "stage 6 of 6: prey-v1/shaping-6" in said.out
+    assert "stage 6 of 6: prey-v2/shaping-6" in said.out
     use = "conevo run pursuit/team-3 --prey prey/prey.npz"
     assert f"  {use}\n" in said.out
     about = prey_sets.load("prey/prey.npz").about
@@ -186,8 +186,8 @@ def test_shape_prey_leaves_prey_for_the_pursuit_world(say) -> None:
     assert params.prey_digest == prey_sets.load("prey/prey.npz").digest
     listed = json.loads(say("list", "runs", ".", "--json").out)
     assert [row["world"] for row in listed] == [
-        "pursuit-v1/team-3",
-        "prey-v1/shaping-1 to shaping-6",
+        "pursuit-v2/team-3",
+        "prey-v2/shaping-1 to shaping-6",
     ]
 
 
@@ -214,12 +214,12 @@ def test_prey_by_name_is_short_for_a_setting(say) -> None:
 
 
 BAD = [
-    (["run", "rover/complex-1", "--shape"], "no environment comes before rover-v1/complex-1"),
+    (["run", "rover/complex-1", "--shape"], "no environment comes before rover-v2/complex-1"),
     (["run", "--shape"], "which world"),
     (["run", "rover/complex-2", "--shape", "--set", "run.epochs=0"], "run.epochs = 0 on the comm"),
     (["run", "rover/complex-2", "--shape", "--budget-evaluations", "5"], "does not pay for one"),
-    (["run", "rover/complex-2", "--prey", "random"], "rover-v1 has no prey to choose"),
-    (["run", "prey/shaping-2", "--prey", "random"], "prey-v1 has no prey to choose"),
+    (["run", "rover/complex-2", "--prey", "random"], "rover-v2 has no prey to choose"),
+    (["run", "prey/shaping-2", "--prey", "random"], "prey-v2 has no prey to choose"),
     (["run", "pursuit/team-2", "--prey", "randon"], "did you mean 'random'"),
     (["run", "pursuit/team-2", "--prey", "none.npz"], "cannot read none.npz: No such file"),
     (["shape-prey", "pursuit/team-2"], "unexpected extra argument"),

@@ -152,7 +152,7 @@ def test_the_live_view_names_all_that_is_asked_of_it(tmp_path: Path) -> None:
     assert isinstance(console.file, io.StringIO)
     shown = console.file.getvalue()
     for words in (
-        "rover-v1/complex-1, CONE, preset smoke, seed 1", "generation 5/5", "left", "value",
+        "rover-v2/complex-1, CONE, preset smoke, seed 1", "generation 5/5", "left", "value",
         "area", "best", "mean", "castes", "SST", "GST", "recombinations between populations",
         "neurons", "team evaluations/s", "(points, larger is better)",
         "degree of specialization S (0 = always the same action, 1 = switches all the time)",

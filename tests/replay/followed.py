@@ -49,7 +49,7 @@ def record(generation, **changes):
     } | changes
 
 
-def tables(method="cone", seed=1, world="rover-v1/complex-1", generations=10, budget=0):
+def tables(method="cone", seed=1, world="rover-v2/complex-1", generations=10, budget=0):
     """Return the part of a run's configuration that is shown."""
     names = {"world": world, "method": method, "preset": "desk", "seed": seed}
     return {"run": names | {"generations": generations, "budget_evaluations": budget}}
@@ -76,7 +76,7 @@ def write_run(path, n=3, is_finished=False, torn="", **settings):
 def write_shaping(path, stages):
     """Write a shaping with stages of (generations planned, generations finished); None not yet."""
     path.mkdir(parents=True)
-    worlds = [f"rover-v1/complex-{k}" for k in range(1, len(stages) + 1)]
+    worlds = [f"rover-v2/complex-{k}" for k in range(1, len(stages) + 1)]
     planned = [
         tables(world=world, generations=of) for world, (of, _) in zip(worlds, stages, strict=True)
     ]

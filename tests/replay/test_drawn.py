@@ -91,7 +91,7 @@ def test_a_subclass_is_drawn_like_the_world_it_inherits(tmp_path):
     path = tmp_path / "mine.py"
     path.write_text(SUBCLASS)
     mine, rover = epoch(f"{path}:complex-5", 80), epoch("rover/complex-5", 80)
-    assert mine.about["like"] == "rover-v1"
+    assert mine.about["like"] == "rover-v2"
     assert "like" not in rover.about
     assert "drawn" not in rover.about
     drawn, plain = playback_of(mine), playback_of(rover)

@@ -33,7 +33,7 @@ def test_a_run_stands_as_its_files_say(tmp_path):
     run = one(Watched([write_run(tmp_path / "a run", budget=1000)]))
     assert {key: run[key] for key in ("label", "task", "method", "preset", "seed")} == {
         "label": "a run",
-        "task": "rover-v1/complex-1",
+        "task": "rover-v2/complex-1",
         "method": "cone",
         "preset": "desk",
         "seed": 1,
@@ -312,7 +312,7 @@ def test_stages_are_numbered_through(tmp_path):
         run = one(watched)
     assert (run["kind"], run["stage"], run["n_stages"]) == ("shaping", 2, 3)
     assert (run["generation"], run["generations"], run["evaluations"]) == (5, 12, 500)
-    assert run["task"] == "rover-v1/complex-1 to complex-3"
+    assert run["task"] == "rover-v2/complex-1 to complex-3"
     assert (run["champion_stage"], run["champion"]) == (2, 1)
     assert run["share"] == pytest.approx((1 + 2 / 4 + 0) / 3, abs=1e-4)
     assert run["ends_at"] == 2000 + (2 + 5) * 2.0
@@ -320,8 +320,8 @@ def test_stages_are_numbered_through(tmp_path):
     assert found["number"] == [0, 1, 2, 3, 4]
     assert found["measures"]["value"] == [1.0, 2.0, 3.0, 1.0, 2.0]
     assert found["stages"] == [
-        {"stage": 1, "task": "rover-v1/complex-1", "first": 0},
-        {"stage": 2, "task": "rover-v1/complex-2", "first": 3},
+        {"stage": 1, "task": "rover-v2/complex-1", "first": 0},
+        {"stage": 2, "task": "rover-v2/complex-2", "first": 3},
     ]
     curves = watched.snapshot()["panels"][0]["over"]["evaluations"]
     at = curves["x"].index(500.0)
@@ -343,7 +343,7 @@ def test_runs_appear_and_go_in_a_folder(tmp_path):
     assert list(by_label(watched)) == ["b"]
     write_shaping(folder / "a", [(3, 1)])
     write_campaign(folder / "c")
-    assert list(by_label(watched))[:3] == ["a", "b", "c/rover-v1-complex-1-homcne-s1"]
+    assert list(by_label(watched))[:3] == ["a", "b", "c/rover-v2-complex-1-homcne-s1"]
     shutil.rmtree(folder / "b")
     shutil.rmtree(folder / "c")
     assert list(by_label(watched)) == ["a"]

@@ -108,7 +108,7 @@ def test_methods_are_compared_by_medians_over_team_evaluations(tmp_path):
     assert broken.is_dir()
     (panel,) = Watched(folders=[tmp_path]).snapshot()["panels"]
     assert (panel["task"], panel["by"], panel["measure"]) == (
-        "rover-v1/complex-1",
+        "rover-v2/complex-1",
         "method",
         "value",
     )
@@ -136,12 +136,12 @@ def test_presets_and_environments_are_never_mixed(tmp_path):
     write_run(tmp_path / "a")
     path = write_run(tmp_path / "b")
     (path / "config.toml").write_text((path / "config.toml").read_text().replace("desk", "night"))
-    write_run(tmp_path / "c", world="rover-v1/complex-2")
+    write_run(tmp_path / "c", world="rover-v2/complex-2")
     panels = Watched(folders=[tmp_path]).snapshot()["panels"]
     assert [(p["task"], p["preset"]) for p in panels] == [
-        ("rover-v1/complex-1", "desk"),
-        ("rover-v1/complex-1", "night"),
-        ("rover-v1/complex-2", "desk"),
+        ("rover-v2/complex-1", "desk"),
+        ("rover-v2/complex-1", "night"),
+        ("rover-v2/complex-2", "desk"),
     ]
 
 
@@ -149,7 +149,7 @@ def test_colours_of_methods_and_castes_do_not_depend_on_what_is_there(tmp_path):
     path = write_run(tmp_path / "a", method="new", n=0)
     append(path, record(0, castes={"hi": 1, "odd": 1, "non-specialized": 1}))
     state = Watched([path]).snapshot()
-    castes = state["castes"]["rover-v1"]
+    castes = state["castes"]["rover-v2"]
     assert castes["hi"] == rover.ACTIONS["hi"]  # as in its replay
     assert list(castes) == ["low", "med", "hi", "move", "odd", "non-specialized"]
     assert len(set(castes.values())) == 6
@@ -189,7 +189,7 @@ def test_a_damaged_campaign_is_named_and_all_others_are_shown(campaign, name, co
     assert problems.pop(campaign.path.name) or (name, content) == ("ledger.sqlite", b"")
     assert set(problems.values()) == {""}
     labels = {run["label"] for run in state["runs"]}
-    assert {"run", "other/rover-v1-complex-1-mesp-s2"} <= labels
+    assert {"run", "other/rover-v2-complex-1-mesp-s2"} <= labels
 
 
 @pytest.mark.parametrize("content", DAMAGE.values(), ids=DAMAGE)

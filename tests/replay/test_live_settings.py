@@ -71,9 +71,9 @@ def test_runs_that_differ_in_very_much_are_still_told_apart(tmp_path):
 
 def test_a_shaping_is_not_a_run_of_its_last_stage(tmp_path):
     write_shaping(tmp_path / "shaped", [(3, 3), (3, 3)])
-    write_run(tmp_path / "run", 3, world="rover-v1/complex-2", generations=3)
+    write_run(tmp_path / "run", 3, world="rover-v2/complex-2", generations=3)
     titles = [panel["task"] for panel in Watched(folders=[tmp_path]).snapshot()["panels"]]
-    assert titles == ["rover-v1/complex-2", "rover-v1/complex-1 to complex-2"]
+    assert titles == ["rover-v2/complex-2", "rover-v2/complex-1 to complex-2"]
     assert panels_in(tmp_path) == [
         ("method", "", {"cone": ["run"]}),
         ("method", "", {"cone": ["shaped"]}),

@@ -128,7 +128,7 @@ def test_parts_that_are_not_in_the_plan():
     [
         (TASKS[0], {"params": {}}, "no parameter low_range"),
         (TASKS[0], {"actions": ["low"]}, "its actions are low"),
-        (TASKS[0], {"world": "gacc-v1"}, "its actions are|is missing"),
+        (TASKS[0], {"world": "gacc-v2"}, "its actions are|is missing"),
         (TASKS[0], {"castes": [], "labels": ["hero"] * 20}, "hero"),
         (TASKS[0], {"labels": ["low"]}, None),
         (TASKS[0], {"iterations": 10}, "not \\[10"),

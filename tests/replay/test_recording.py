@@ -35,7 +35,7 @@ def test_the_champion_does_what_it_did_in_the_testing_phase(run):
         about = found.about
         assert about["scenario"] == fold(2, "test", k)
         assert about["generation"] == run.champion.generation
-        assert (about["task"], about["method"], about["seed"]) == ("rover-v1/complex-1", "cone", 2)
+        assert (about["task"], about["method"], about["seed"]) == ("rover-v2/complex-1", "cone", 2)
         for name, value in about["performance"].items():
             assert value == tested[name]["values"][k]
 
@@ -108,8 +108,8 @@ def test_two_teams_meet_the_same_scenario(run, folder):
 @pytest.mark.parametrize(
     ("task", "more", "reason"),
     [
-        ("rover/complex-2", {}, "rover-v1/complex-1 of"),
-        ("pursuit/team-3", {}, "rover-v1/complex-1 of"),
+        ("rover/complex-2", {}, "rover-v2/complex-1 of"),
+        ("pursuit/team-3", {}, "rover-v2/complex-1 of"),
         ("rover/complex-1", {"world.energy": 500.0}, r"world\.energy is 1000\.0 \(here 500\.0\)"),
     ],
 )

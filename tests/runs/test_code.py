@@ -220,7 +220,7 @@ def test_the_code_of_an_origin_is_shown_where_it_is_another(
 def test_the_world_is_described_where_no_world_is_needed(tmp_path: Path) -> None:
     header = evolve_tiny(tmp_path / "run").provenance["world"]
     assert (header["name"], header["environment"], header["n_robots"]) == (
-        "rover-v1",
+        "rover-v2",
         "complex-1",
         3,
     )

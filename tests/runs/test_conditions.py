@@ -35,7 +35,7 @@ def test_settings_and_environment_are_those_asked_for(run: conevo.Run) -> None:
     expected = play(lab.simulator, lab.world, run.champion, n_scenarios=4, seed=1)
     assert both["changed"] == expected
     assert both["own"] == run.test(4, threads=1)
-    assert both["conditions"]["task"] == "rover-v1/complex-2"
+    assert both["conditions"]["task"] == "rover-v2/complex-2"
     name = next(iter(both["change"]))
     means = [both[which]["performance"][name]["mean"] for which in ("changed", "own")]
     assert both["change"][name] == means[0] - means[1]

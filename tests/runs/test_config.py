@@ -56,7 +56,7 @@ def test_a_worlds_own_table_replaces_that_of_any_world(monkeypatch: pytest.Monke
     assert (pursuit.method_config.genotypes, pursuit.method_config.rounds) == (50, 6)
     assert resolve("pursuit/team-3", "mesp").method_config.genotypes == 9
     assert resolve("pursuit/team-3", "cone-1").method_config.rounds == 6
-    with pytest.raises(UsageError, match="no settings for method 'ccga' in 'pursuit-v1'"):
+    with pytest.raises(UsageError, match="no settings for method 'ccga' in 'pursuit-v2'"):
         resolve("pursuit/team-3", "ccga")
 
 
@@ -97,10 +97,10 @@ def test_names_on_the_command_line_win_over_the_files(tmp_path: Path) -> None:
         '[run]\nworld = "rover/simple-2"\nmethod = "mesp"\npreset = "smoke"\nseed = 9\n'
     )
     from_file = resolve(file=file)
-    assert (from_file.task, from_file.method) == ("rover-v1/simple-2", "mesp")
+    assert (from_file.task, from_file.method) == ("rover-v2/simple-2", "mesp")
     assert (from_file.preset, from_file.run.seed) == ("smoke", 9)
     mixed = resolve("rover/complex-4", "ccga", seed=2, file=file)
-    assert (mixed.task, mixed.method, mixed.preset) == ("rover-v1/complex-4", "ccga", "smoke")
+    assert (mixed.task, mixed.method, mixed.preset) == ("rover-v2/complex-4", "ccga", "smoke")
     assert mixed.run.seed == 2
 
 

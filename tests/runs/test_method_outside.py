@@ -52,7 +52,7 @@ def test_a_name_finds_the_method_wherever_it_is_named(
     )
     config = resolve(file=tmp_path / "own.toml")
     assert (config.method, config.method_config.genotypes) == (NAME, 9)
-    assert config.label.startswith(f"rover-v1-complex-1-{NAME}-desk-s1-")
+    assert config.label.startswith(f"rover-v2-complex-1-{NAME}-desk-s1-")
     monkeypatch.chdir(mine.parent)
     for name in (f"mine.py:{NAME}", f"./mine.py:{NAME}", f"{mine}:{NAME}"):
         again = resolve(TASK, name)
@@ -213,11 +213,11 @@ def test_a_session_on_the_command_line(
     assert "nothing was written" in say(capsys, *words, "--dry-run")[1]
     code, out, err = say(capsys, *words)
     assert (code, err) == (0, "")
-    assert "rover-v1/complex-1, random search, preset smoke, seed 1" in out
+    assert "rover-v2/complex-1, random search, preset smoke, seed 1" in out
     (path,) = (tmp_path / "runs").iterdir()
     mine.unlink()
     shown = say(capsys, "show", str(path))[1]
-    assert "rover-v1/complex-1, random search, preset smoke, seed 1" in shown
+    assert "rover-v2/complex-1, random search, preset smoke, seed 1" in shown
     listed = json.loads(say(capsys, "list", "runs", "--json")[1])
     assert [(row["method"], row["status"]) for row in listed] == [(NAME, "finished")]
     for line in re.findall(r"^  (conevo (?:test|resume|run) .*)$", out, flags=re.MULTILINE):

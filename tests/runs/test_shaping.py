@@ -410,7 +410,7 @@ def test_what_is_no_shaping_is_refused(tmp_path: Path) -> None:
 
 
 def test_the_family_of_a_task() -> None:
-    assert TASKS == ["rover-v1/complex-1", "rover-v1/complex-2", "rover-v1/complex-3"]
+    assert TASKS == ["rover-v2/complex-1", "rover-v2/complex-2", "rover-v2/complex-3"]
     assert tasks_up_to("prey/shaping-6") == list(PREY_TASKS)
     for task, words in (("rover/complex-1", "nothing to shape"), ("rover/complex-11", "unknown")):
         with pytest.raises(UsageError, match=words):
@@ -449,7 +449,7 @@ def test_the_six_prey_experiments_leave_a_prey_file(tmp_path: Path) -> None:
     world = conevo.world("pursuit/team-6", prey=str(shaping.product))
     assert world.params.prey_digest == prey_sets.load(shaping.product).digest  # type: ignore[attr-defined]
     with pytest.raises(
-        UsageError, match=r"stage-1: a team of \(2, .* cannot play prey-v1/shaping-1"
+        UsageError, match=r"stage-1: a team of \(2, .* cannot play prey-v2/shaping-1"
     ):
         shaping.test(threads=1)
 

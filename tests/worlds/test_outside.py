@@ -363,7 +363,7 @@ BAD = {
     "imports": ("import conevo_no_such_module\n", "No module named 'conevo_no_such_module'"),
     "entry": ("ENTRY = 'light-v1'\n", "must be a WorldEntry, not str"),
     "version": (TEXT.replace('"light-v1"', '"light"'), "must be lower case and end with a version"),
-    "taken": (TEXT.replace('"light-v1"', '"rover-v1"'), "is that of a world of the package"),
+    "taken": (TEXT.replace('"light-v1"', '"rover-v2"'), "is that of a world of the package"),
     "other": (
         TEXT.replace(ENTRY, ENTRY.replace('"light-v1"', '"dark-v1"')),
         "LightWorld is named 'light-v1', its entry 'dark-v1'",

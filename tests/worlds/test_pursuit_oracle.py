@@ -192,7 +192,7 @@ def build(a_world, genes, slots, scenarios, heuristic):
     n_inputs = len(a_world.inputs) + controller(world=a_world).n_context
     minds = oracle.networks(genes, slots, n_inputs)
     names = {"heuristic": Dodger(), "random": Walker()}
-    if a_world.name == "pursuit-v1":
+    if a_world.name == "pursuit-v2":
         minds = [m if h < 0 else Chaser() for m, h in zip(minds, heuristic, strict=True)]
         mode = a_world.params.prey
         hidden = len(scenarios.prey_in) // (b - r)
@@ -220,7 +220,7 @@ def build(a_world, genes, slots, scenarios, heuristic):
         obstacles=np.stack([scenarios.obstacle_x[0, :n], scenarios.obstacle_y[0, :n]], axis=1),
         seed=int(scenarios.seed[0]),
         clamp=scenarios.clamp,
-        mortal=[a_world.name == "prey-v1" and i < r for i in range(b)],
+        mortal=[a_world.name == "prey-v2" and i < r for i in range(b)],
     )
 
 
@@ -344,7 +344,7 @@ def compare(a_world, genes, slots, scenarios, heuristic):
             moved[q].append(0.0 if refused[t, q] else asked)
             still = oracle.immobilized(w.p, moved[q], commanded[q])
             captured[t, k] = still and oracle.surrounded(w, q)
-        if a_world.name == "pursuit-v1":
+        if a_world.name == "pursuit-v2":
             for k, q in enumerate(prey):
                 if captured[t, k] != seen["captured"][t, k]:
                     tally.near_ties += 1
@@ -356,7 +356,7 @@ def compare(a_world, genes, slots, scenarios, heuristic):
             assert (seen["fitness"][t] == captured[: t + 1].any(axis=1).sum()).all()
     out = rollout.evaluate(genes, slots[None], scenarios, heuristic[None])
     performance = {name: float(values[0, 0]) for name, values in out.performance.items()}
-    if a_world.name == "pursuit-v1":
+    if a_world.name == "pursuit-v2":
         tally.captured = int(captured.sum())
         assert performance == oracle.hunt_result(captured, refused[:, :r])
     else:

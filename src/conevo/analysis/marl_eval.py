@@ -7,7 +7,7 @@
         "absolute_metrics": {measure: [value, ...]}}}}}}
 
 ================  ==============================================================================
-environment       world, family and preset: "rover-v1 complex night" (budgets are never mixed)
+environment       world, family and preset: "rover-v2 complex night" (budgets are never mixed)
 task              "complex-5"
 algorithm         the method, and its variant if it has one
 measure           the main task performance of the world, [1] in a step; "negated-NAME" with the

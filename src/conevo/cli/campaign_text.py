@@ -134,8 +134,8 @@ def print_failed(campaign: Campaign, failed: Iterable[Entry]) -> None:
     files = set()
     for entry in failed:
         click.echo(f"failed {entry.label}: {entry.reason}")
-        file, _, environment = campaign.planned[entry.label].world.rpartition(":")
-        files |= {Path(file).name} if environment else set()
+        file, _, _ = campaign.planned[entry.label].world.rpartition(":")
+        files |= {Path(file).name} if file else set()
     for file in sorted(files):
         click.echo(
             f"the campaign keeps its copy of {file}: once yours is corrected, start another "

@@ -127,8 +127,7 @@ def carry_on(
             f"populations of its last stage: conevo run WORLD/ENVIRONMENT "
             f"--from {quoted(found.path)}"
         )
-    if not accept_other_code:
-        found.refuse_other_code()
+    found.refuse_other_code(accept_other_code)
     advice = f"conevo resume {quoted(found.path)}"
     try:
         if isinstance(found, Run):

@@ -19,7 +19,7 @@ __all__ = ["print_shaping_end", "shaping_text", "span", "stage_summary", "stages
 
 
 def span(shaping: Shaping) -> str:
-    """Return the tasks of a shaping in short: "rover-v1/complex-1 to complex-3"."""
+    """Return the tasks of a shaping in short: "rover-v2/complex-1 to complex-3"."""
     first, last = shaping.outlines[0], shaping.outlines[-1]
     return f"{first.task} to {last.environment}"
 

@@ -93,8 +93,10 @@ def test(
 
 
 def note_other_code(run: Run) -> None:
-    """Print that other code than this made a run, if it did."""
+    """Print that other code than this made a run, if it did; refuse a world no longer played."""
     from conevo.runs.code import last_code, other_code
+    from conevo.worlds.registry import refuse_earlier
 
+    refuse_earlier(run.outline.task, run.path)
     if problem := other_code(run.path, last_code(run.provenance)):
         click.echo(f"conevo: note: {problem}", err=True)

@@ -12,6 +12,7 @@ from typing import Any
 import conevo
 from conevo.errors import UsageError
 from conevo.terms import quoted
+from conevo.worlds.registry import refuse_earlier
 
 __all__ = [
     "DECIDING",
@@ -104,9 +105,17 @@ def sessions_of(provenance: Record, before: int = 0) -> list[Record]:
     ]
 
 
-def refuse_other_code(path: Path, code: str) -> None:
-    """Raise UsageError unless ``code``, of the run or shaping at ``path``, is this conevo's."""
-    if problem := other_code(path, code):
+def refuse_other_code(path: Path, task: str, code: str, is_accepted: bool) -> None:
+    """Raise UsageError unless this conevo may carry on what another one made.
+
+    Args:
+        path: of the run or shaping.
+        task: what it is a run of, in a world that is still played.
+        code: what made it so far: this conevo's, or accepted.
+        is_accepted: whether other code is.
+    """
+    refuse_earlier(task, path)
+    if not is_accepted and (problem := other_code(path, code)):
         raise UsageError(
             f"{problem}: use that version, or continue with 'conevo resume {quoted(path)} "
             f"--accept-other-code'"

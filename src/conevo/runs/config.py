@@ -6,7 +6,7 @@ Presets and files hold overrides; every value remembers its place, which errors 
 A configuration file has four tables. ``[run]`` also holds three names::
 
     [run]
-    world = "rover-v1/complex-1"
+    world = "rover-v2/complex-1"
     method = "cone"
     preset = "desk"
     seed = 1
@@ -103,7 +103,7 @@ class RunConfig:
 
     @property
     def world(self) -> str:
-        """The world's name with its version, "rover-v1"."""
+        """The world's name with its version, "rover-v2"."""
         return self.entry.name
 
     @property
@@ -113,7 +113,7 @@ class RunConfig:
 
     @property
     def task(self) -> str:
-        """World and environment in one name, "rover-v1/complex-1"."""
+        """World and environment in one name, "rover-v2/complex-1"."""
         return f"{self.world}/{self.environment}"
 
     @property

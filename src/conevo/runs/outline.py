@@ -30,7 +30,7 @@ class Outline:
     """What names a run.
 
     Attributes:
-        task: world and environment, "rover-v1/complex-1".
+        task: world and environment, "rover-v2/complex-1".
         method, preset, seed: as its configuration has them.
         generations: planned ones.
         budget_evaluations: team evaluations it may spend, 0 for any number.

@@ -296,8 +296,7 @@ class Run:
                 accept_other_code=accept_other_code,
             )
         self.refuse_finished()
-        if not accept_other_code:
-            self.refuse_other_code()
+        self.refuse_other_code(accept_other_code)
         with self._open():
             self.refuse_finished()
             lab = self._equip(threads)
@@ -342,8 +341,7 @@ class Run:
 
         length = length_of(generations, budget_evaluations, target)
         refuse_parts(self.path, length)
-        if not accept_other_code:
-            self.refuse_other_code()
+        self.refuse_other_code(accept_other_code)
         with self._open():
             self._extend(self.config.of_length(length), threads, is_later=True)
         return self
@@ -368,8 +366,7 @@ class Run:
             UsageError: as ``extend``, or the configuration is of another run.
             EnvironmentFailure: the machine refused.
         """
-        if not accept_other_code:
-            self.refuse_other_code()
+        self.refuse_other_code(accept_other_code)
         with self._open():
             self._extend(config, threads)
         return self
@@ -462,9 +459,9 @@ class Run:
                 f"with 'conevo resume {path} --generations N', N above {self.done()[0]}"
             )
 
-    def refuse_other_code(self) -> None:
-        """Raise UsageError if another conevo made the run so far."""
-        refuse_other_code(self.path, last_code(self.provenance))
+    def refuse_other_code(self, is_accepted: bool = False) -> None:
+        """Raise UsageError if other code, unless accepted, made it, or its world is not played."""
+        refuse_other_code(self.path, self.outline.task, last_code(self.provenance), is_accepted)
 
     def _equip(self, threads: int | None) -> Lab:
         """Return what the run needs, after checking that it is what it was started with."""

@@ -264,10 +264,11 @@ class Shaping:
             show = f"conevo show {quoted(self.path)}"
             raise UsageError(f"{self.path} is finished; see it with '{show}'")
 
-    def refuse_other_code(self) -> None:
-        """Raise UsageError if another conevo made the stages so far."""
+    def refuse_other_code(self, is_accepted: bool = False) -> None:
+        """Raise UsageError if other code, unless accepted, made it, or its world is not played."""
         if begun := self.stages:
-            refuse_other_code(self.path, last_code(begun[-1].provenance))
+            code = last_code(begun[-1].provenance)
+            refuse_other_code(self.path, self.outlines[0].task, code, is_accepted)
 
     def resume(
         self,
@@ -326,8 +327,7 @@ class Shaping:
             UsageError: finished, in use, or made by other code.
         """
         self.refuse_finished()
-        if not accept_other_code:
-            self.refuse_other_code()
+        self.refuse_other_code(accept_other_code)
         with self._directory.locked():
             self.refuse_finished()
             for number in range(1, len(self.outlines) + 1):

@@ -141,7 +141,9 @@ class Store(Directory):
     def _resolve(self) -> RunConfig:
         """Return what the configuration file says; name both versions if another one wrote it."""
         from conevo.runs.config import resolve
+        from conevo.worlds.registry import refuse_earlier
 
+        refuse_earlier(self.read_outline().task, self.path)
         try:
             return resolve(file=self.path / CONFIG)
         except UsageError as error:

@@ -13,7 +13,7 @@ from conevo.playback.drawn import Drawn
 from conevo.playback.parts import Parts
 from conevo.playback.refusals import DAMAGE, one_line
 from conevo.playback.schema import Playback
-from conevo.worlds.registry import WORLDS
+from conevo.worlds.registry import entry_of
 
 __all__ = ["drawing"]
 
@@ -33,7 +33,7 @@ def drawing(about: About, channels: Mapping[str, Channel]) -> Playback:
 def _robots(parts: Parts, drawn: Drawn) -> Playback:
     """Return the playback that the world's folder makes, or that of the world it inherits."""
     about = parts.about
-    entry = WORLDS.get(about.get("like", about["world"]))
+    entry = entry_of(about.get("like", about["world"]))
     if entry is None or not entry.drawn:
         return plain.playback(parts, drawn)
     draw = import_module(entry.drawn).playback

@@ -196,7 +196,7 @@ class World(Protocol):
     """One environment of a task, with its parameters.
 
     Attributes:
-        name: with its version, "rover-v1".
+        name: with its version, "rover-v2".
         inputs: S names, of what each robot senses.
         outputs: O names, of what its controller gives: any real numbers.
         controller: settings of the controller that the source gives such robots; those that another

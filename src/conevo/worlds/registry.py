@@ -19,8 +19,10 @@ __all__ = [
     "WORLDS",
     "WorldEntry",
     "colours_of",
+    "entry_of",
     "inherited",
     "product_of",
+    "refuse_earlier",
     "resolve",
     "studies",
     "study_of",
@@ -32,7 +34,7 @@ WORLDS: dict[str, WorldEntry] = {
     entry.name: entry
     for entry in (
         WorldEntry(
-            name="rover-v1",
+            name="rover-v2",
             title="Multi-rover",
             summary="20 rovers detect red rocks that only two of them together can detect",
             source="Nitschke 2009, chapter 5",
@@ -45,7 +47,7 @@ WORLDS: dict[str, WorldEntry] = {
             world_name="RoverWorld",
         ),
         WorldEntry(
-            name="pursuit-v1",
+            name="pursuit-v2",
             title="Pursuit-evasion",
             summary="2 to 6 Khepera predators immobilize one or two prey that are faster",
             source="Nitschke 2009, chapter 4",
@@ -57,7 +59,7 @@ WORLDS: dict[str, WorldEntry] = {
             world_name="PursuitWorld",
         ),
         WorldEntry(
-            name="prey-v1",
+            name="prey-v2",
             title="Prey shaping",
             summary="one or two prey learn to run fast and straight without a collision",
             source="Nitschke 2009, section 4.3",
@@ -69,7 +71,7 @@ WORLDS: dict[str, WorldEntry] = {
             world_name="PreyWorld",
         ),
         WorldEntry(
-            name="gacc-v1",
+            name="gacc-v2",
             title="Gathering and collective construction",
             summary="30 robots gather objects of three types and build with them in order",
             source="Nitschke 2009, chapter 6",
@@ -83,12 +85,16 @@ WORLDS: dict[str, WorldEntry] = {
     )
 }
 
+# Versions that are no longer played, though still drawn and reported, and the release that plays
+# them.
+EARLIER = dict.fromkeys(("rover-v1", "pursuit-v1", "prey-v1", "gacc-v1"), "0.1.0")
+
 
 def resolve(path: str, digest: str = "", is_whole: bool = True) -> tuple[WorldEntry, str]:
     """Return the entry and environment of a path.
 
     Args:
-        path: "rover/complex-1", "rover-v1/complex-1", or "FILE.py:ENVIRONMENT" for a world in a
+        path: "rover/complex-1", "rover-v2/complex-1", or "FILE.py:ENVIRONMENT" for a world in a
             file outside the package.
         digest: of that file, checked if it is given.
         is_whole: whether the path must have an environment; the world's first one if it need not.
@@ -128,15 +134,35 @@ def resolve(path: str, digest: str = "", is_whole: bool = True) -> tuple[WorldEn
 def _named(name: str) -> WorldEntry:
     """Return the entry of a world of the package, the newest version if none is named."""
     newest = {entry.short_name: entry for entry in WORLDS.values()}
+    refuse_earlier(name)
     entry = WORLDS.get(name) or newest.get(name)
     if entry is None:
         raise unknown_name("world", name, [*newest, *WORLDS])
     return entry
 
 
+def refuse_earlier(task: str, run: Path | None = None) -> None:
+    """Raise UsageError if a task, of a run if it is given, is of a version no longer played."""
+    name = task.partition("/")[0]
+    if name in EARLIER and (newest := entry_of(name)):
+        raise UsageError(
+            f"{f'{run}: ' if run else ''}this version of conevo plays {newest.name}, no longer "
+            f"{name}; conevo {EARLIER[name]} plays {name}"
+        )
+
+
+def entry_of(world: str) -> WorldEntry | None:
+    """Return the entry of a world of the package by its name; earlier versions have the newest's.
+
+    For what is drawn and reported of a world, which versions have in common.
+    """
+    short = world.rpartition("-v")[0] if world in EARLIER else world
+    return WORLDS.get(world) or next((e for e in WORLDS.values() if e.short_name == short), None)
+
+
 def colours_of(world: str) -> dict[str, str]:
     """Return the colours of a world's castes by its name; none of a world elsewhere."""
-    entry = WORLDS.get(world) or next((e for e in WORLDS.values() if e.short_name == world), None)
+    entry = entry_of(world)
     if entry is None:
         return {}
     if entry.drawn:

@@ -20,14 +20,14 @@ METHODS = ("homcne", "hetcne", "ccga", "mesp", "cone")
 VARIANTS = ("cone-1", "cone-2", "cone-3")
 EXCHANGING = ("cone", "cone-1", "cone-2")
 MEASURES = {
-    "rover-v1": ("value", "area"),
-    "pursuit-v1": ("capture_time",),
-    "gacc-v1": ("delivered",),
+    "rover-v2": ("value", "area"),
+    "pursuit-v2": ("capture_time",),
+    "gacc-v2": ("delivered",),
 }
 SPECIALISTS = {
-    "rover-v1": ("low", "hi"),
-    "pursuit-v1": ("pursuer", "blocker"),
-    "gacc-v1": ("A-detector", "B-gatherer"),
+    "rover-v2": ("low", "hi"),
+    "pursuit-v2": ("pursuer", "blocker"),
+    "gacc-v2": ("A-detector", "B-gatherer"),
 }
 
 
@@ -138,7 +138,7 @@ def gacc() -> Truth:
     return truth
 
 
-TRUTHS = {"R": ("rover-v1", rover), "P": ("pursuit-v1", pursuit), "G": ("gacc-v1", gacc)}
+TRUTHS = {"R": ("rover-v2", rover), "P": ("pursuit-v2", pursuit), "G": ("gacc-v2", gacc)}
 
 
 def write_tables(
@@ -215,7 +215,7 @@ def _about(
         "core_seconds": 1.0,
         "stopped_by": "budget",
         "measure": MEASURES[world][0],
-        "optimum": 10 * int(number) if world == "gacc-v1" else None,
+        "optimum": 10 * int(number) if world == "gacc-v2" else None,
         "n_robots": 20,
         "exchanges": cell.exchanges if method in EXCHANGING else None,
         "exchange_share": cell.exchange_share if method in EXCHANGING else None,
@@ -243,7 +243,7 @@ def _results(
     shift = 1 + noise * NormalDist().inv_cdf((seed - 0.5) / n)
     shift_of_loss = 1 + noise * NormalDist().inv_cdf(((3 * seed) % n + 0.5) / n)
     number = int(environment.rpartition("-")[2])
-    parts = 10 * number if world == "gacc-v1" else 1  # what there is to deliver
+    parts = 10 * number if world == "gacc-v2" else 1  # what there is to deliver
     value = cell.value * shift * parts
     seconds = {"area": cell.area * shift}
 
@@ -260,7 +260,7 @@ def _results(
         return
     several = seed <= round(cell.several * n)
     specialists = SPECIALISTS[world] if several else SPECIALISTS[world][:1]
-    is_predator = world == "pursuit-v1"
+    is_predator = world == "pursuit-v2"
     castes = [*specialists, *(["non-specialized"] if several else [])]
     for study in ("lesion", "clones"):
         yield from played(study, "whole", value)

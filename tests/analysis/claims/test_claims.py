@@ -148,7 +148,7 @@ def test_not_reproduced_where_one_thing_is_turned_round(identity: str, tmp_path:
     apply, told = WRONG[identity]
     apply(truth)
     verdict = judged(
-        write_tables(tmp_path, world, truth, n=20 if world == "pursuit-v1" else 10), BY_ID[identity]
+        write_tables(tmp_path, world, truth, n=20 if world == "pursuit-v2" else 10), BY_ID[identity]
     )
     assert verdict.alone == "not reproduced"
     assert told in verdict.why
@@ -173,7 +173,7 @@ FURTHER = [
 def test_each_part_counts(identity: str, apply: Change, expected: str, tmp_path: Path) -> None:
     world, truth = truth_of(BY_ID[identity])
     apply(truth)
-    n = 20 if world == "pursuit-v1" else 10
+    n = 20 if world == "pursuit-v2" else 10
     assert judged(write_tables(tmp_path, world, truth, n), BY_ID[identity]).alone == expected
 
 
@@ -187,7 +187,7 @@ def test_undecided_where_environments_are_missing(identity: str, tmp_path: Path)
     all_places = {e for p in claim.parts for s in p.statements for e in s.environments}
     few = {key: cell for key, cell in truth.items() if key[0] in kept}
     verdict = judged(
-        write_tables(tmp_path, world, few, n=20 if world == "pursuit-v1" else 10), claim
+        write_tables(tmp_path, world, few, n=20 if world == "pursuit-v2" else 10), claim
     )
     assert verdict.alone == f"undecided: {len(kept)} of {len(all_places)} environments"
     assert "no runs of" in verdict.why

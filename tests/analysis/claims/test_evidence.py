@@ -18,8 +18,8 @@ from conevo.analysis.frames import SCHEMA, Tables
 
 RUN = {
     "run": "a",
-    "task": "rover-v1/complex-1",
-    "world": "rover-v1",
+    "task": "rover-v2/complex-1",
+    "world": "rover-v2",
     "environment": "complex-1",
     "family": "complex",
     "number": 1,
@@ -205,7 +205,7 @@ def test_every_quantity_of_a_claim_is_known() -> None:
 def test_world_preset_and_variant_are_judged_apart(tmp_path: Path) -> None:
     runs, scores = [], []
     for k, change in enumerate(
-        [{}, {"preset": "desk"}, {"variant": "gst=0.1"}, {"world": "rover-v2"}, {"seed": 2}]
+        [{}, {"preset": "desk"}, {"variant": "gst=0.1"}, {"world": "rover-v3"}, {"seed": 2}]
     ):
         runs.append(RUN | {"run": str(k), "run_id": str(k)} | change)
         scores += score("test", "champion", 10 * k, run=str(k))
@@ -218,10 +218,10 @@ def test_world_preset_and_variant_are_judged_apart(tmp_path: Path) -> None:
         }
         told = verdicts(tables, CLAIMS[:1])
     assert {key: one.samples[0] for key, one in found.items()} == {
-        ("rover-v1", "desk", ""): [10.0],
-        ("rover-v1", "smoke", ""): [0.0, 40.0],
-        ("rover-v1", "smoke", "gst=0.1"): [20.0],
-        ("rover-v2", "smoke", ""): [30.0],
+        ("rover-v2", "desk", ""): [10.0],
+        ("rover-v2", "smoke", ""): [0.0, 40.0],
+        ("rover-v2", "smoke", "gst=0.1"): [20.0],
+        ("rover-v3", "smoke", ""): [30.0],
     }
     # CONE alone, so there is nothing to compare it with; but it is told which runs there are.
     assert [(one.budget, one.variant) for one in told] == [
@@ -279,7 +279,7 @@ def test_the_budget_with_most_runs_of_both_is_taken(tmp_path: Path) -> None:
 
 def test_runs_that_nobody_studied(tmp_path: Path) -> None:
     truth = {key: cell for key, cell in rover().items() if key[0] == "complex-1"}
-    write_tables(tmp_path, "rover-v1", truth, n=2, studies=False)
+    write_tables(tmp_path, "rover-v2", truth, n=2, studies=False)
     with Tables(tmp_path) as tables:
         found = {one.id: one.verdict for one in verdicts(tables) if one.id in ("R9", "R11", "R12")}
     assert found == {
@@ -291,7 +291,7 @@ def test_runs_that_nobody_studied(tmp_path: Path) -> None:
 
 def test_numbers_of_a_missing_quantity_are_told(tmp_path: Path) -> None:
     about = {("complex-1", m): Cell(100, several=1.0) for m in ("ccga", "mesp", "cone")}
-    write_tables(tmp_path, "rover-v1", about, n=2)
+    write_tables(tmp_path, "rover-v2", about, n=2)
     with Tables(tmp_path) as tables:
         (twelve,) = verdicts(tables, [one for one in CLAIMS if one.id == "R12"])
     assert twelve.n == "2"

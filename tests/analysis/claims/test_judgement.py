@@ -31,7 +31,7 @@ def evidence(
         budget = (budgets or {}).get(key, "smoke")
         runs[key] = [RunOf(f"{key}-{k}", k, budget) for k in range(1, len(sample) + 1)]
         values |= {one.run: value for one, value in zip(runs[key], sample, strict=True)}
-    return Evidence("rover-v1", "smoke", "", {quantity: values}.__getitem__, runs)
+    return Evidence("rover-v2", "smoke", "", {quantity: values}.__getitem__, runs)
 
 
 def claim(*parts: Part) -> Claim:

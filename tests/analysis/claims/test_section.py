@@ -18,7 +18,7 @@ def test_two_methods_have_the_claims_about_them_and_one_line_for_the_rest(tmp_pa
         for key, cell in rover().items()
         if key[0].startswith(("simple", "complex")) and key[1] in ("mesp", "cone")
     }
-    with Tables(write_tables(tmp_path, "rover-v1", truth, 10)) as tables:
+    with Tables(write_tables(tmp_path, "rover-v2", truth, 10)) as tables:
         section = claims(tables)
     table = section.exhibits[0]
     rows = {row["id"]: row for row in table.rows}
@@ -38,7 +38,7 @@ def test_two_methods_have_the_claims_about_them_and_one_line_for_the_rest(tmp_pa
 
 def test_the_power_of_the_rule_is_next_to_what_is_to_be_alike(tmp_path: Path) -> None:
     truth = {key: cell for key, cell in rover().items() if key[1] in ("homcne", "hetcne")}
-    with Tables(write_tables(tmp_path, "rover-v1", truth, 20, 0.1)) as tables:
+    with Tables(write_tables(tmp_path, "rover-v2", truth, 20, 0.1)) as tables:
         rows = {row["id"]: row for row in claims(tables).exhibits[0].rows}
     assert 0.25 < rows["R4"]["power"] < 0.45
     share = round(100 * rows["R4"]["power"])
@@ -49,7 +49,7 @@ def test_the_power_of_the_rule_is_next_to_what_is_to_be_alike(tmp_path: Path) ->
 
 def test_a_verdict_has_the_levels_that_it_belongs_to(tmp_path: Path) -> None:
     truth = {key: cell for key, cell in rover().items() if key[1] in ("homcne", "hetcne")}
-    folder = write_tables(tmp_path, "rover-v1", truth, 3)
+    folder = write_tables(tmp_path, "rover-v2", truth, 3)
     runs = folder / "runs.parquet"
     level = "if(seed = 1, 'gst=0.1, rounds=2', 'gst=0.3, rounds=2')"
     with duckdb.connect() as connection:
@@ -65,7 +65,7 @@ def test_a_verdict_has_the_levels_that_it_belongs_to(tmp_path: Path) -> None:
 
 def test_a_campaign_about_no_claim_has_one_line(tmp_path: Path) -> None:
     truth = {("simple-1", "cone-3"): next(iter(rover().values()))}
-    with Tables(write_tables(tmp_path, "rover-v1", truth, 2)) as tables:
+    with Tables(write_tables(tmp_path, "rover-v2", truth, 2)) as tables:
         section = claims(tables)
     assert section.exhibits == ()
     assert section.text == [

@@ -27,7 +27,7 @@ from conevo.analysis.exhibits import (
     with_values,
 )
 from conevo.analysis.sections.scope import KEYS, Scope, named, sizes, span
-from conevo.worlds.registry import WORLDS
+from conevo.worlds.registry import entry_of
 
 __all__ = ["performance"]
 
@@ -192,7 +192,7 @@ def _warnings(scope: Scope) -> list[str]:
         text.append("There is one run per cell: no deviation, no interval, and nothing is tested.")
     elif min(counts) < 2:
         text.append("Cells with a single run have no deviation, no interval and no t-test.")
-    if max(counts) < 20 and scope.group.world in WORLDS:
+    if max(counts) < 20 and entry_of(scope.group.world):
         text.append(
             f"The thesis has 20 runs per cell; here are {span(counts).removeprefix('n = ')}."
         )

@@ -58,7 +58,7 @@ HOME_REACH = 0.12  # Choice: home is sensed from everywhere; its sensors are dra
 
 
 def playback(parts: Parts) -> Playback:
-    """Return the playback of an epoch of ``gacc-v1``."""
+    """Return the playback of an epoch of ``gacc``."""
     t, r = parts.t, parts.r
     objects, building = _objects(parts), Building(parts)
     see, near = parts.param("object_range"), parts.param("robot_range")

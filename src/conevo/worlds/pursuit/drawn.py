@@ -1,4 +1,4 @@
-"""The playback of predators and prey in their arena, of the worlds pursuit-v1 and prey-v1."""
+"""The playback of predators and prey in their arena, of the worlds pursuit and prey."""
 
 from __future__ import annotations
 
@@ -51,9 +51,9 @@ EVENT_KINDS = (
 
 
 def playback(parts: Parts) -> Playback:
-    """Return the playback of an epoch of ``pursuit-v1`` or ``prey-v1``."""
+    """Return the playback of an epoch of ``pursuit`` or ``prey``."""
     t, r = parts.t, parts.r
-    is_prey = parts.about["world"] == "prey-v1"
+    is_prey = parts.about["world"].startswith("prey-v")
     n = parts.number("scene/n_bodies")
     if n < r + (not is_prey):
         raise ValueError(f"{n} bodies, of which {r} are the team's")

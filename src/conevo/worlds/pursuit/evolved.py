@@ -17,7 +17,7 @@ __all__ = ["FILE", "TASKS", "USE", "refuse", "save"]
 
 FILE = "prey.npz"
 USE = ("conevo run pursuit/team-3 --prey {file}", "set predators on the evolved prey")
-TASKS = tuple(f"prey-v1/shaping-{number}" for number in range(1, 7))
+TASKS = tuple(f"prey-v2/shaping-{number}" for number in range(1, 7))
 
 
 def refuse(stages: Sequence[Any]) -> None:

@@ -1,7 +1,7 @@
 """Prey shaping: a prey learns to run fast and straight without running into anything.
 
 =============  =========================================================================
-name           ``prey-v1``
+name           ``prey-v2``
 source         Nitschke 2009, section 4.3
 environments   ``shaping-1``: 2 to 6 obstacles; ``shaping-2``: 2 to 6 heuristic predators;
                ``shaping-3``: both; ``shaping-4..6``: the same with two prey
@@ -27,6 +27,7 @@ Choice: a predator that runs into a prey is refused like any move; that is no co
 Version history:
 
 - v1: first version.
+- v2: sine, cosine and arc tangent of kernels are the same bits on every device.
 """
 
 from collections.abc import Sequence
@@ -66,7 +67,7 @@ class PreyWorld:
     environment: str
     params: PreyParams = field(default_factory=PreyParams)
 
-    name: ClassVar[str] = "prey-v1"
+    name: ClassVar[str] = "prey-v2"
     inputs: ClassVar[tuple[str, ...]] = names_of(("infrared",), 8)
     outputs: ClassVar[tuple[str, ...]] = ("left wheel", "right wheel")
     controller: ClassVar[dict[str, Any]] = {

@@ -1,7 +1,7 @@
 """Pursuit-evasion: Khepera predators capture prey that are faster than they are.
 
 =============  =========================================================================
-name           ``pursuit-v1``
+name           ``pursuit-v2``
 source         Nitschke 2009, chapter 4, appendix B
 environments   ``team-1..10`` (table 4.2): 2, 3, 4, 5, 6 predators and one prey, then two
 robots         2 to 6 predators; the prey are opponents with controllers of their own
@@ -36,6 +36,7 @@ Choices, all declared in ``PursuitParams``, ``ArenaParams`` or here:
 Version history:
 
 - v1: first version.
+- v2: sine, cosine and arc tangent of kernels are the same bits on every device.
 """
 
 from collections.abc import Sequence
@@ -106,7 +107,7 @@ class PursuitWorld:
     environment: str
     params: PursuitParams = field(default_factory=PursuitParams)
 
-    name: ClassVar[str] = "pursuit-v1"
+    name: ClassVar[str] = "pursuit-v2"
     inputs: ClassVar[tuple[str, ...]] = names_of(("infrared", "light"), 8)
     outputs: ClassVar[tuple[str, ...]] = ("left wheel", "right wheel")
     controller: ClassVar[dict[str, Any]] = {

@@ -29,7 +29,7 @@ LANDER = 0.012  # Choice: radius; the lander only records
 
 
 def playback(parts: Parts) -> Playback:
-    """Return the playback of an epoch of ``rover-v1``."""
+    """Return the playback of an epoch of ``rover``."""
     t, r = parts.t, parts.r
     ranges = tuple(parts.param(f"{name}_range") for name in ("low", "med", "hi"))
     near = parts.param("rover_sensor_range")

@@ -1,7 +1,7 @@
 """Multi-rover: twenty rovers search canals of red rocks that only two of them together can detect.
 
 =============  =========================================================================
-name           ``rover-v1``
+name           ``rover-v2``
 source         Nitschke 2009, chapter 5
 environments   ``simple-1..10``, ``complex-1..10``, ``extended-1..10`` (section 5.1, appendix C)
 robots         20 rovers, one lander that records what they report
@@ -34,6 +34,7 @@ Choices, all declared in ``RoverParams`` or here, with their sensitivity on the 
 Version history:
 
 - v1: first version.
+- v2: sine, cosine and arc tangent of kernels are the same bits on every device.
 """
 
 from collections.abc import Sequence
@@ -165,7 +166,7 @@ class RoverWorld:
     environment: str
     params: RoverParams = field(default_factory=RoverParams)
 
-    name: ClassVar[str] = "rover-v1"
+    name: ClassVar[str] = "rover-v2"
     inputs: ClassVar[tuple[str, ...]] = names_of(("rovers", "red rocks"), 8)
     outputs: ClassVar[tuple[str, ...]] = ("low", "med", "hi", "move: dx", "move: dy")
     controller: ClassVar[dict[str, Any]] = {
