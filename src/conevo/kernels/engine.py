@@ -7,7 +7,6 @@ writes only its own robot's data, so both give the same bits.
 """
 
 import hashlib
-import linecache
 import os
 import re
 import sys
@@ -22,9 +21,9 @@ from typing import Any
 import warp as wp
 
 from conevo.errors import EnvironmentFailure, UsageError
+from conevo.kernels.phases import written
 
 __all__ = [
-    "barrier",
     "build",
     "building",
     "kernel_hash",
@@ -127,11 +126,6 @@ def _without_driver_warning() -> Iterator[None]:
                     real.write(line)
 
 
-@wp.func_native("WP_TILE_SYNC();")
-def barrier():  # type: ignore[no-untyped-def]
-    """Wait for all lanes of the block (nothing to wait for where a block has one lane)."""
-
-
 @cache
 def view_of(struct: Any, has_shared: bool = False) -> Any:
     """Return the function ``view(batch, index, n)`` that gives one of ``n`` parts of a batch.
@@ -167,11 +161,7 @@ def view_of(struct: Any, has_shared: bool = False) -> Any:
             ]
         else:
             lines += [f"    part.{name} = batch.{name}"]
-    source = "\n".join([*lines, "    return part", ""])
-    file = f"<view of {struct.key}>"  # Warp reads the source of what it compiles
-    linecache.cache[file] = (len(source), None, source.splitlines(keepends=True), file)
-    exec(compile(source, file, "exec"), scope)
-    return wp.func(scope["view"])
+    return written("view", [*lines, "    return part"], scope, f"view of {struct.key}")
 
 
 def usable_threads() -> int:

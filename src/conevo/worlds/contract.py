@@ -8,17 +8,18 @@ import warp as wp
 
 from conevo.errors import UsageError, unknown_name
 from conevo.kernels.arrays import dimensions, shapes
+from conevo.kernels.phases import Phase
 from conevo.worlds.protocol import Simulation, World
 
 __all__ = [
-    "PHASES",
-    "TEAM_PHASE",
-    "faults",
+    "STAGES",
     "dimensions_of",
+    "faults",
     "faults_of_names",
     "refuse_faults",
     "scenario_faults",
     "shapes_of",
+    "stages_of",
 ]
 
 
@@ -29,16 +30,19 @@ class _Nothing:
     number: int
 
 
-# The phases of an epoch, each with the numbers it gets after team, scene and p.
-PHASES = {
+# The stages of an epoch, each with the numbers that its function gets after team, scene and p. A
+# world may have phases over items of its own in place of a function.
+STAGES = {
     "reset": ("i",),
     "sense": ("i", "t"),
     "act": ("i", "t"),
     "commit": ("i", "t"),
+    "settle": ("t",),
     "resolve": ("i", "t"),
     "outcome": ("t_end",),
 }
-TEAM_PHASE = {"settle": ("t",)}  # a world may have it too
+OPTIONAL = ("settle",)
+NUMBERS = {"i": "q", "t": "t", "t_end": "t"}  # what a phase knows them by
 STATE = {
     "action": int,
     "heuristic": int,
@@ -69,6 +73,18 @@ def refuse_faults(world: World, simulation: Simulation) -> None:
     """
     for fault in faults(world, simulation):
         raise UsageError(f"world {world.name}: {fault}")
+
+
+def stages_of(simulation: Simulation) -> dict[str, tuple[Phase, ...]]:
+    """Return the phases of each stage of an epoch, in the order in which they run."""
+    found = {}
+    for name, takes in STAGES.items():
+        given = simulation.functions.get(name, ())
+        if isinstance(given, wp.Function):
+            items = None if "i" in takes else 1
+            given = (Phase(given, items, ", ".join(NUMBERS[one] for one in takes)),)
+        found[name] = given
+    return found
 
 
 def dimensions_of(simulation: Simulation) -> dict[str, tuple[str, ...]]:
@@ -121,25 +137,38 @@ def faults_of_names(world: World) -> Iterator[str]:
 
 
 def _of_phases(simulation: Simulation) -> Iterator[str]:
-    known = PHASES | TEAM_PHASE
-    for name in PHASES.keys() - simulation.functions.keys():
-        yield f"Simulation.functions has no phase {name!r}; a world has {', '.join(PHASES)}"
-    structs = (simulation.state, simulation.scene, simulation.params_type)
-    for name, function in simulation.functions.items():
-        if name not in known:
-            yield str(unknown_name("phase", name, known, "in Simulation.functions"))
-        elif not isinstance(function, wp.Function):
-            yield f"phase {name} must be a wp.func, not {type(function).__name__}"
+    needed = [name for name in STAGES if name not in OPTIONAL]
+    for name in needed:
+        if name not in simulation.functions:
+            yield f"Simulation.functions has no phase {name!r}; a world has {', '.join(needed)}"
+    for name, given in simulation.functions.items():
+        if name not in STAGES:
+            yield str(unknown_name("phase", name, STAGES, "in Simulation.functions"))
+        elif isinstance(given, wp.Function):
+            yield from _of_function(simulation, name, given, STAGES[name], f"phase {name}")
+        elif not (isinstance(given, tuple) and all(isinstance(one, Phase) for one in given)):
+            kind = type(given).__name__
+            yield f"phase {name} must be a wp.func, or a tuple of Phase, not {kind}"
         else:
-            wanted = ["team", "scene", "p", *known[name]]
-            given = list(function.input_types.values())
-            types = [*structs, *[int] * len(known[name])]
-            if len(given) != len(wanted) or any(map(_differ, given, types)):
-                line = f"{name}({', '.join(wanted)})"
-                yield (
-                    f"{_place(function)}: phase {name} must be declared as {line}, of types Team, "
-                    f"Scene, Params{', int' * len(known[name])}"
-                )
+            for phase in given:
+                yield from _of_function(simulation, phase.name, phase.function, ("q", "t"), name)
+                if isinstance(phase.items, wp.Function):
+                    yield from _of_function(simulation, "items", phase.items, (), f"of {name}")
+
+
+def _of_function(
+    simulation: Simulation, name: str, function: Any, numbers: tuple[str, ...], what: str
+) -> Iterator[str]:
+    """Yield a line if a function is not declared with a world's structs and these numbers."""
+    structs = (simulation.state, simulation.scene, simulation.params_type)
+    wanted = ["team", "scene", "p", *numbers]
+    given = list(function.input_types.values())
+    types = [*structs, *[int] * len(numbers)]
+    if len(given) != len(wanted) or any(map(_differ, given, types)):
+        yield (
+            f"{_place(function)}: {what} must be declared as {name}({', '.join(wanted)}), of types "
+            f"Team, Scene, Params{', int' * len(numbers)}"
+        )
 
 
 def _differ(given: Any, wanted: Any) -> bool:

@@ -75,7 +75,8 @@ class Simulation:
     params_type, params: struct type of the parameters, and the parameters.
     functions: the phases of an epoch: reset, sense, act, commit, resolve, outcome; and, of a world
         with something that robots share, settle, once for the team between commit and resolve.
-        Within a phase, robots visited in any order must give the same bits.
+        Within a phase, robots visited in any order must give the same bits. In place of a function
+        for one robot there may be phases over items of the world's own (``kernels.phases.Phase``).
     recorded: state arrays that ``Rollout.record`` keeps, iteration by iteration.
     recorded_at_end: state arrays that it keeps at the end.
     """

@@ -20,8 +20,8 @@ from conevo.errors import EnvironmentFailure, UsageError
 from conevo.kernels import engine
 from conevo.kernels.arrays import allocate, dimensions, shapes
 from conevo.kernels.devices import refuse_unknown_device
-from conevo.kernels.engine import barrier
-from conevo.worlds.contract import PHASES, refuse_faults, scenario_faults, shapes_of
+from conevo.kernels.phases import Phase, barrier, n_lanes, run_of
+from conevo.worlds.contract import STAGES, refuse_faults, scenario_faults, shapes_of, stages_of
 from conevo.worlds.measures import measures_of
 from conevo.worlds.protocol import Outcome, Scenarios, Simulation, World
 
@@ -49,14 +49,20 @@ class Job:
     teams_per_round: int
     t_begin: int
     t_end: int
+    clock: wp.array[wp.int64]
 
 
-def episode_kernel(simulation: Simulation, mind: Mind) -> Any:
-    """Return the kernel that runs a world's iterations ``t_begin`` to ``t_end``."""
-    f = simulation.functions
+def episode_kernel(simulation: Simulation, mind: Mind, timed: bool = False) -> Any:
+    """Return the kernel that runs a world's iterations ``t_begin`` to ``t_end``.
+
+    Args:
+        simulation: of the world.
+        mind: of the controller.
+        timed: whether the cycles of each phase are added up in the job's ``clock``.
+    """
     structs = (simulation.state, simulation.scene, simulation.params_type)
     brain = (mind.weights, mind.memory, mind.shape_type, mind.clear, mind.think)
-    return _episode_kernel(*structs, *brain, *(f[name] for name in PHASES), f.get("settle"))
+    return _episode_kernel(*structs, *brain, tuple(stages_of(simulation).values()), timed)
 
 
 @cache
@@ -69,17 +75,17 @@ def _episode_kernel(
     Shape: Any,
     clear: Any,
     think: Any,
-    reset: Any,
-    sense: Any,
-    act: Any,
-    commit: Any,
-    resolve: Any,
-    outcome: Any,
-    settle: Any,
+    stages: tuple[tuple[Phase, ...], ...],
+    timed: bool,
 ) -> Any:
     view_team, view_scene = engine.view_of(State), engine.view_of(Scene, has_shared=True)
     view_weights, view_memory = engine.view_of(Weights), engine.view_of(Memory)
-    settles = settle is not None
+    world = {"team": State, "scene": Scene, "p": Params}
+    runs, at = [], 0
+    for name, phases in zip(STAGES, stages, strict=True):
+        runs.append(run_of(f"run_{name}", phases, world, at if timed else None))
+        at += len(phases)
+    reset, sense, act, commit, settle, resolve, outcome = runs
 
     @wp.kernel(module="unique", module_options=engine.options, grid_stride=False)
     def episode(
@@ -88,46 +94,33 @@ def _episode_kernel(
     ) -> None:  # fmt: skip
         index, lane = wp.tid()
         b = first + index
-        lanes = wp.block_dim()
         n = b // job.n_scenarios
         place = (job.first_team + n) // job.teams_per_round * job.n_scenarios + b % job.n_scenarios
         team = view_team(batch, b, job.n_worlds)
         scene = view_scene(scenes, place, job.n_scenes)
         weights = view_weights(brains, n, job.n_teams)
         memory = view_memory(memories, b, job.n_worlds)
+        robots = job.n_robots
         if job.t_begin == 0:
-            for i in range(lane, job.n_robots, lanes):
-                reset(team, scene, p, i)
+            for i in range(lane, robots, n_lanes()):
                 clear(memory, shape, i)
                 for k in range(team.inputs.shape[1]):
                     team.inputs[i, k] = 0.0
                 for k in range(team.outputs.shape[1]):
                     team.outputs[i, k] = 0.0
                 team.heuristic[i] = job.heuristic[n, i]
-            barrier()
+            reset(team, scene, p, robots, lane, 0, job.clock)
         for t in range(job.t_begin, job.t_end):
-            for i in range(lane, job.n_robots, lanes):
-                sense(team, scene, p, i, t)
-            barrier()
-            for i in range(lane, job.n_robots, lanes):
+            sense(team, scene, p, robots, lane, t, job.clock)
+            for i in range(lane, robots, n_lanes()):
                 if team.heuristic[i] < 0:
                     think(weights, memory, shape, team.inputs, team.outputs, i)
             barrier()
-            for i in range(lane, job.n_robots, lanes):
-                act(team, scene, p, i, t)
-            barrier()
-            for i in range(lane, job.n_robots, lanes):
-                commit(team, scene, p, i, t)
-            barrier()
-            if wp.static(settles):
-                if lane == 0:
-                    settle(team, scene, p, t)
-                barrier()
-            for i in range(lane, job.n_robots, lanes):
-                resolve(team, scene, p, i, t)
-            barrier()
-        if lane == 0:
-            outcome(team, scene, p, job.t_end)
+            act(team, scene, p, robots, lane, t, job.clock)
+            commit(team, scene, p, robots, lane, t, job.clock)
+            settle(team, scene, p, robots, lane, t, job.clock)
+            resolve(team, scene, p, robots, lane, t, job.clock)
+        outcome(team, scene, p, robots, lane, job.t_end, job.clock)
 
     return episode
 

@@ -14,7 +14,8 @@ import numpy.typing as npt
 import warp as wp
 
 from conevo.kernels import engine
-from conevo.worlds.contract import PHASES
+from conevo.kernels.phases import Phase, walk_of
+from conevo.worlds.contract import STAGES, stages_of
 from conevo.worlds.protocol import Scenarios, World
 from conevo.worlds.rollout import Job, Rollout
 
@@ -35,17 +36,14 @@ def _stepping_kernel(
     Shape: Any,
     clear: Any,
     think: Any,
-    reset: Any,
-    sense: Any,
-    act: Any,
-    commit: Any,
-    resolve: Any,
-    outcome: Any,
-    settle: Any,
+    stages: tuple[tuple[Phase, ...], ...],
 ) -> Any:
     view_team, view_scene = engine.view_of(State), engine.view_of(Scene, has_shared=True)
     view_weights, view_memory = engine.view_of(Weights), engine.view_of(Memory)
-    settles = settle is not None
+    world = {"team": State, "scene": Scene, "p": Params}
+    reset, sense, act, commit, settle, resolve, outcome = (
+        walk_of(f"walk_{name}", phases, world) for name, phases in zip(STAGES, stages, strict=True)
+    )
     checked = engine.options | {"mode": "debug"}
 
     @wp.kernel(module="unique", module_options=checked, grid_stride=False)
@@ -59,32 +57,32 @@ def _stepping_kernel(
         scene = view_scene(scenes, b % job.n_scenarios, job.n_scenarios)
         weights = view_weights(brains, n, job.n_teams)
         memory = view_memory(memories, b, job.n_worlds)
-        if wp.static(settles):
-            if phase == 5:
-                settle(team, scene, p, t)
-        if phase == 7:
-            outcome(team, scene, p, t + 1)
         for k in range(order.shape[1]):
             i = order[b, k]
             if i >= 0:
                 if phase == 0:
-                    reset(team, scene, p, i)
                     clear(memory, shape, i)
                     for j in range(team.inputs.shape[1]):
                         team.inputs[i, j] = 0.0
                     for j in range(team.outputs.shape[1]):
                         team.outputs[i, j] = 0.0
                     team.heuristic[i] = job.heuristic[n, i]
-                if phase == 1:
-                    sense(team, scene, p, i, t)
                 if phase == 2 and team.heuristic[i] < 0:
                     think(weights, memory, shape, team.inputs, team.outputs, i)
-                if phase == 3:
-                    act(team, scene, p, i, t)
-                if phase == 4:
-                    commit(team, scene, p, i, t)
-                if phase == 6:
-                    resolve(team, scene, p, i, t)
+        if phase == 0:
+            reset(team, scene, p, order, b, 0)
+        if phase == 1:
+            sense(team, scene, p, order, b, t)
+        if phase == 3:
+            act(team, scene, p, order, b, t)
+        if phase == 4:
+            commit(team, scene, p, order, b, t)
+        if phase == 5:
+            settle(team, scene, p, order, b, t)
+        if phase == 6:
+            resolve(team, scene, p, order, b, t)
+        if phase == 7:
+            outcome(team, scene, p, order, b, t + 1)
 
     return step
 
@@ -109,13 +107,12 @@ class Stepper(Rollout):
         heuristic: npt.NDArray[np.int32],
     ) -> None:
         super().__init__(world, n_threads=1)
-        sim, functions, mind = self._simulation, self._simulation.functions, self._mind
+        sim, mind = self._simulation, self._mind
         with engine.building:
             self._kernel = _stepping_kernel(
                 *(sim.state, sim.scene, sim.params_type),
                 *(mind.weights, mind.memory, mind.shape_type, mind.clear, mind.think),
-                *(functions[name] for name in PHASES),
-                functions.get("settle"),
+                tuple(stages_of(sim).values()),
             )
         self.n_worlds = len(teams) * len(scenarios)
         self._scenes = self._scene(scenarios)
