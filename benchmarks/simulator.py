@@ -13,6 +13,7 @@ import time
 from collections.abc import Callable
 
 import numpy as np
+import numpy.typing as npt
 
 from conevo.controllers.registry import controller
 from conevo.controllers.srn import Srn
@@ -22,13 +23,16 @@ from conevo.worlds.registry import world as build_world
 from conevo.worlds.rollout import Rollout
 from machine import alternate, machine, spread, table
 
+Genes = npt.NDArray[np.float32]
+Rows = npt.NDArray[np.int32]
+
 SEED = 2009
 WORLDS = ("rover/complex-5", "pursuit/team-3", "gacc/complex-9")
 
 
-def workload(world: World, rollout: Rollout, batch: int) -> Callable[[], float]:
-    """Return a function that evaluates ``batch`` teams once and gives team-steps per second."""
-    genome, n_robots = rollout.genome, world.n_robots
+def random_teams(rollout: Rollout, batch: int) -> tuple[Genes, Rows]:
+    """Return a pool of random genotypes and ``batch`` teams of them, every robot different."""
+    genome, n_robots = rollout.genome, rollout.world.n_robots
     rng = stream(SEED, "genes", batch)
     slots = np.full(genome.max_parts, -1, dtype=np.int32)
     slots[: genome.n_parts] = np.arange(genome.n_parts, dtype=np.int32)
@@ -37,6 +41,12 @@ def workload(world: World, rollout: Rollout, batch: int) -> Callable[[], float]:
     teams = teams.reshape(batch, n_robots, genome.max_parts)
     n_genotypes = batch * n_robots * genome.n_parts
     genes = rng.uniform(-1.0, 1.0, (n_genotypes, genome.n_genes)).astype(np.float32)
+    return genes, teams
+
+
+def workload(world: World, rollout: Rollout, batch: int) -> Callable[[], float]:
+    """Return a function that evaluates ``batch`` teams once and gives team-steps per second."""
+    genes, teams = random_teams(rollout, batch)
     scenarios = world.scenarios([fold(SEED, "epoch", 0, 0)])
 
     def measure() -> float:

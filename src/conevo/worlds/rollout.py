@@ -20,7 +20,7 @@ from conevo.errors import EnvironmentFailure, UsageError
 from conevo.kernels import engine
 from conevo.kernels.arrays import allocate, dimensions, shapes
 from conevo.kernels.devices import refuse_unknown_device
-from conevo.kernels.phases import Phase, barrier, n_lanes, run_of
+from conevo.kernels.phases import Phase, barrier, cycles, n_lanes, run_of
 from conevo.worlds.contract import STAGES, refuse_faults, scenario_faults, shapes_of, stages_of
 from conevo.worlds.measures import measures_of
 from conevo.worlds.protocol import Outcome, Scenarios, Simulation, World
@@ -81,11 +81,12 @@ def _episode_kernel(
     view_team, view_scene = engine.view_of(State), engine.view_of(Scene, has_shared=True)
     view_weights, view_memory = engine.view_of(Weights), engine.view_of(Memory)
     world = {"team": State, "scene": Scene, "p": Params}
-    runs, at = [], 0
+    runs, at = [], 1
     for name, phases in zip(STAGES, stages, strict=True):
         runs.append(run_of(f"run_{name}", phases, world, at if timed else None))
         at += len(phases)
     reset, sense, act, commit, settle, resolve, outcome = runs
+    is_timed = timed
 
     @wp.kernel(module="unique", module_options=engine.options, grid_stride=False)
     def episode(
@@ -112,10 +113,16 @@ def _episode_kernel(
             reset(team, scene, p, robots, lane, 0, job.clock)
         for t in range(job.t_begin, job.t_end):
             sense(team, scene, p, robots, lane, t, job.clock)
+            since = wp.int64(0)
+            if wp.static(is_timed):
+                since = cycles()
             for i in range(lane, robots, n_lanes()):
                 if team.heuristic[i] < 0:
                     think(weights, memory, shape, team.inputs, team.outputs, i)
             barrier()
+            if wp.static(is_timed):
+                if lane == 0:
+                    wp.atomic_add(job.clock, 0, cycles() - since)
             act(team, scene, p, robots, lane, t, job.clock)
             commit(team, scene, p, robots, lane, t, job.clock)
             settle(team, scene, p, robots, lane, t, job.clock)
@@ -182,6 +189,7 @@ class Rollout:
         n_threads: CPU threads; all usable ones by default. Results do not depend on it.
         device: "cpu" or a CUDA device as Warp names it.
         lanes: lanes of a CPU block (for tests of the CUDA form; needs Warp's CPU blocks).
+        timed: whether ``cycles`` tells what each phase takes, for benchmarks.
 
     Raises:
         UsageError: the world lacks what the engine needs of it, the controller does not fit it, or
@@ -196,6 +204,7 @@ class Rollout:
         n_threads: int | None = None,
         device: str = "cpu",
         lanes: int = 1,
+        timed: bool = False,
     ) -> None:
         engine.start()
         self.world = world
@@ -211,7 +220,7 @@ class Rollout:
             refuse_misfit(self.controller, world)
             self.genome = genome_of(self.controller, world)
             self._mind = self.controller.mind(len(world.inputs), len(world.outputs))
-            self._kernel = episode_kernel(self._simulation, self._mind)
+            self._kernel = episode_kernel(self._simulation, self._mind, timed)
             mind = self._mind
             self._loading = loading_kernel(mind.weights, mind.shape_type, mind.load)
         self._shapes = shapes_of(world, self._simulation)
@@ -220,6 +229,9 @@ class Rollout:
             struct: shapes(dimensions(struct, lambda _: ("robots",)), sizes)
             for struct in (mind.memory, mind.weights)
         }
+        stages = stages_of(self._simulation).items()
+        self._phases = ["think", *(f"{at} {one.name}" for at, those in stages for one in those)]
+        self._clock = wp.zeros(len(self._phases) if timed else 0, dtype=wp.int64, device=device)
         self._is_built = False
         self._workspace: _Workspace | None = None
 
@@ -235,6 +247,15 @@ class Rollout:
                 engine.build(kernel, self.device, self.lanes)
             self._is_built = True
         return self
+
+    @property
+    def cycles(self) -> dict[str, int]:
+        """Cycles that each phase has taken so far, by stage and name; 0 unless timed.
+
+        Counted on the first lane of every block: with one CPU thread, on the CPU.
+        """
+        counted = self._clock.numpy().tolist() or [0] * len(self._phases)
+        return dict(zip(self._phases, counted, strict=True))
 
     @property
     def fingerprint(self) -> str:
@@ -396,6 +417,7 @@ class Rollout:
         job.n_robots = self.world.n_robots
         job.first_team = 0
         job.teams_per_round = teams_per_round
+        job.clock = self._clock
         job.t_begin, job.t_end = 0, self.world.params.iterations
         return job
 
