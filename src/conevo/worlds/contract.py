@@ -202,6 +202,12 @@ def _of_state(world: World, simulation: Simulation) -> Iterator[str]:
         for name in names:
             if name not in (*arrays, *STATE):
                 yield str(unknown_name("array", name, arrays, f"in Simulation.{what}"))
+    kept = {*simulation.recorded, *simulation.recorded_at_end, *STATE, *WIDE}
+    for name in simulation.scratch:
+        if name in kept:
+            yield f"Simulation.scratch must not have {name!r}, which is a result or recorded"
+        elif name not in arrays:
+            yield str(unknown_name("array", name, arrays, "in Simulation.scratch"))
     for name in RECORDED:
         if name not in simulation.recorded:
             yield f"Simulation.recorded must have {name!r}"

@@ -79,6 +79,8 @@ class Simulation:
         for one robot there may be phases over items of the world's own (``kernels.phases.Phase``).
     recorded: state arrays that ``Rollout.record`` keeps, iteration by iteration.
     recorded_at_end: state arrays that it keeps at the end.
+    scratch: state arrays whose content may depend on the order of items, as lists that lanes fill
+        do; no result may depend on it.
     """
 
     state: Any
@@ -89,6 +91,7 @@ class Simulation:
     recorded: tuple[str, ...]
     sizes: dict[str, int] = field(default_factory=dict)
     recorded_at_end: tuple[str, ...] = ()
+    scratch: tuple[str, ...] = ()
 
 
 def kernel_params(struct: Any, *sources: Any, **given: Any) -> Any:

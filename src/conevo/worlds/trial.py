@@ -50,6 +50,7 @@ class Trial:
         self.plain = Stepper(*self._task)
         self.n_worlds = self.plain.n_worlds
         self._simulation = world.simulation()
+        self._has_phases = isinstance(self._simulation.functions["sense"], tuple)
         self._order: list[str] = []
         self._sensors: list[str] = []
         self._counts: list[str] = []
@@ -66,7 +67,7 @@ class Trial:
             for stepper in (plain, *others.values()):
                 stepper.arrays()[name][:] = SENTINEL
         for step, t in plain.epoch(iterations):
-            if step == "sense" and t in (0, 1, iterations // 2):
+            if step == "sense" and t in (0, 1, iterations // 2) and not self._has_phases:
                 self._look_at_sensors(t)
             before = {name: values.copy() for name, values in plain.arrays().items()}
             yield
@@ -79,7 +80,7 @@ class Trial:
                     order = robots.permuted(order, axis=1)
                 yield
                 stepper.step(step, order, t)
-                if found := _differences(plain.arrays(), stepper.arrays()):
+                if found := self._differences(plain.arrays(), stepper.arrays()):
                     del others[kind]
                     if not self._order:
                         self._explain_order(step, t, found, before)
@@ -141,7 +142,7 @@ class Trial:
             for name, values in arrays.items():
                 values[:] = before[name]
             probe.step(step, _only(probe.natural, i), t)
-            for name in _differences(before, arrays):
+            for name in self._differences(before, arrays):
                 is_other = before[name].view(np.uint8) != arrays[name].view(np.uint8)
                 if name in shared:
                     common.setdefault(name, set()).add(i)
@@ -167,7 +168,10 @@ class Trial:
     def seen(self) -> Iterator[Seen]:
         """Yield topics with what is wrong, after the run."""
         n = len(self.world.inputs)
-        yield "sensors", self._sensors, f"all {n} inputs are written, and nothing else"
+        fine = f"all {n} inputs are written, and nothing else"
+        if self._has_phases:
+            fine = "not looked at: sense has phases over items of its own"
+        yield "sensors", self._sensors, fine
         yield "values", list(self._of_values()), "fitness and performance are written and finite"
         done = np.asarray(self._executed.any(axis=(0, 1)))
         idle = ", ".join(name for a, name in enumerate(self.world.actions) if not done[a])
@@ -216,7 +220,7 @@ class Trial:
             values[:] = self.plain.arrays()[name][::-1]
         for stepper in (used, fresh):
             stepper.step("reset", stepper.natural)
-        left = _differences(used.arrays(), fresh.arrays())
+        left = self._differences(used.arrays(), fresh.arrays())
         for step, t in used.epoch(self.world.params.iterations):
             used.step(step, used.natural, t)
         ended, should = used.arrays(), self.plain.arrays()
@@ -225,6 +229,15 @@ class Trial:
                 f"{', '.join(wrong)} depend on the epoch before, in the same memory; reset leaves "
                 f"{', '.join(f'`{name}`' for name in left)} as they were"
             )
+
+    def _differences(self, a: Arrays, b: Arrays) -> list[str]:
+        """Return the names of the arrays that differ, scratch left out."""
+        bits = (
+            (n, a[n].view(np.uint8), b[n].view(np.uint8))
+            for n in a
+            if n not in self._simulation.scratch
+        )
+        return [name for name, one, other in bits if not np.array_equal(one, other)]
 
     def _of_heuristics(self) -> Iterator[str]:
         names = self.world.heuristics
@@ -260,9 +273,3 @@ class Trial:
 def _only(order: Order, i: int) -> Order:
     """Return an order in which robot ``i`` alone is visited."""
     return np.where(np.arange(order.shape[1]) == 0, i, -1).astype(np.int32) + np.zeros_like(order)
-
-
-def _differences(a: Arrays, b: Arrays) -> list[str]:
-    """Return the names of the arrays that differ."""
-    bits = ((n, a[n].view(np.uint8), b[n].view(np.uint8)) for n in a)
-    return [name for name, one, other in bits if not np.array_equal(one, other)]
