@@ -12,10 +12,13 @@ An output is any real number. A world that needs a share of something squashes i
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, ClassVar, Protocol
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
 import numpy as np
 import numpy.typing as npt
+
+if TYPE_CHECKING:
+    from conevo.kernels.phases import Phase
 
 __all__ = ["Controller", "Genome", "Mind"]
 
@@ -51,12 +54,16 @@ class Mind:
         memory: struct type, likewise.
         shape: an instance of ``shape_type``: the sizes that the functions need.
         shape_type: struct type.
-        sizes: of the dimensions other than "robots" that the arrays name.
+        sizes: of the dimensions other than "robots" and "team" that the arrays name.
         load: ``load(weights, shape, i, genes, rows, n)`` builds robot i's controller from the pool
             of genotypes ``genes`` [K, G] and the rows [N, R, U] of team n, -1 for an empty slot.
         clear: ``clear(memory, shape, i)`` lets robot i remember nothing.
         think: ``think(weights, memory, shape, inputs, outputs, i)`` fills robot i's outputs [R, O]
             from its inputs [R, S] and its memory, and writes nothing of another robot.
+        shared: the same bits by phases over items of the controller's own, which the lanes of a
+            block share: functions take ``(weights, memory, shape, inputs, outputs, heuristic, q)``,
+            and leave robots alone whose ``heuristic`` is not negative. None: a lane takes a robot.
+        join: ``join(weights, shape, robots)`` does what remains when all robots are loaded.
         probe: the array [R, U or more] of the memory that shows the activation of each slot.
     """
 
@@ -69,6 +76,8 @@ class Mind:
     clear: Any
     think: Any
     probe: str
+    shared: tuple[Phase, ...] = ()
+    join: Any = None
 
 
 class Controller(Protocol):

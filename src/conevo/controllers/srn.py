@@ -24,6 +24,7 @@ from conevo.controllers.protocol import Bools, Floats, Genome, Mind
 from conevo.controllers.slots import Slots
 from conevo.kernels.arrays import named_arrays
 from conevo.kernels.outputs import sigmoid, sigmoid_of
+from conevo.kernels.phases import Phase
 from conevo.parameters import parameters
 
 __all__ = ["Srn"]
@@ -53,20 +54,23 @@ class SrnWeights:
     """Weights of a team's networks (or, flat, of a batch of teams).
 
     A chunk is 16 slots. Feeds: inputs, then context. filled: 1 where a slot holds a neuron. n_used:
-    one above the last filled slot.
+    one above the last filled slot. neurons: the filled slots of all robots, the first n_neurons.
     """
 
     w_in: Annotated[wp.array[wide_vector], "robots", "chunks", "feeds"]
     w_out: Annotated[wp.array[out_vector], "robots", "slots"]
     filled: Annotated[wp.array[wide_vector], "robots", "chunks"]
     n_used: wp.array[int]
+    neurons: Annotated[wp.array[int], "robots", "slots"]
+    n_neurons: Annotated[wp.array[int], "team"]
 
 
 @named_arrays
 class SrnMemory:
-    """Activations of a team's hidden neurons, 0 in empty slots."""
+    """Activations of a team's hidden neurons, 0 in empty slots; and those to come."""
 
     hidden: Annotated[wp.array[float], "robots", "slots"]
+    coming: Annotated[wp.array[float], "robots", "slots"]
 
 
 @wp.func
@@ -111,6 +115,7 @@ def clear(memory: SrnMemory, shape: SrnShape, i: int) -> None:
     slots = shape.n_chunks * WIDE
     for k in range(slots):
         memory.hidden[i * slots + k] = 0.0
+        memory.coming[i * slots + k] = 0.0
 
 
 @wp.func
@@ -168,6 +173,121 @@ def think(
         outputs[i, o] = out[o]
 
 
+@wp.func
+def join(weights: SrnWeights, shape: SrnShape, robots: int) -> None:
+    """List the neurons of all robots."""
+    n = int(0)
+    for slot in range(robots * shape.n_chunks * WIDE):
+        if weights.filled[slot // WIDE][slot % WIDE] > 0.0:
+            weights.neurons[n] = slot
+            n += 1
+    weights.n_neurons[0] = n
+
+
+FLOAT_AT = "return ((const float*)rows.data)[at];"
+
+
+@wp.func_native(FLOAT_AT)
+def in_at(rows: wp.array[wide_vector], at: int) -> float:  # type: ignore[empty-body]
+    """Return one weight of many vectors."""
+
+
+@wp.func_native(FLOAT_AT)
+def out_at(rows: wp.array[out_vector], at: int) -> float:  # type: ignore[empty-body]
+    """Return one weight of many vectors."""
+
+
+@wp.func
+def n_neurons(
+    weights: SrnWeights,
+    memory: SrnMemory,
+    shape: SrnShape,
+    inputs: wp.array2d[float],
+    outputs: wp.array2d[float],
+    heuristic: wp.array[int],
+) -> int:
+    """Return how many hidden neurons a team has."""
+    return weights.n_neurons[0]
+
+
+@wp.func
+def think_neuron(
+    weights: SrnWeights,
+    memory: SrnMemory,
+    shape: SrnShape,
+    inputs: wp.array2d[float],
+    outputs: wp.array2d[float],
+    heuristic: wp.array[int],
+    q: int,
+) -> None:
+    """Compute the activation that neuron ``q`` of the team will have, as ``think`` does."""
+    slot = weights.neurons[q]
+    chunk = slot // WIDE
+    i = chunk // shape.n_chunks
+    if heuristic[i] >= 0:
+        return
+    at = chunk * shape.n_inputs * WIDE + slot % WIDE
+    h = float(shape.bias)
+    j = int(0)
+    while j < shape.n_sensors:
+        h += in_at(weights.w_in, at) * inputs[i, j]
+        at += WIDE
+        j += 1
+    j = int(0)
+    while j < shape.n_context:
+        h += in_at(weights.w_in, at) * memory.hidden[i * shape.n_chunks * WIDE + j]
+        at += WIDE
+        j += 1
+    memory.coming[slot] = sigmoid(h)
+
+
+@wp.func
+def n_sums(
+    weights: SrnWeights,
+    memory: SrnMemory,
+    shape: SrnShape,
+    inputs: wp.array2d[float],
+    outputs: wp.array2d[float],
+    heuristic: wp.array[int],
+) -> int:
+    """Return how many output units a team has room for."""
+    return inputs.shape[0] * OUT
+
+
+@wp.func
+def think_sum(
+    weights: SrnWeights,
+    memory: SrnMemory,
+    shape: SrnShape,
+    inputs: wp.array2d[float],
+    outputs: wp.array2d[float],
+    heuristic: wp.array[int],
+    q: int,
+) -> None:
+    """Compute output ``q`` of the team, as ``think`` does; let a share of what comes be context.
+
+    An output reads what is coming and no context, so the two can be done side by side.
+    """
+    i = q // OUT
+    o = q % OUT
+    if heuristic[i] >= 0:
+        return
+    first = i * shape.n_chunks * WIDE
+    k = int(o)
+    while k < shape.n_chunks * WIDE:
+        memory.hidden[first + k] = memory.coming[first + k]
+        k += OUT
+    if o >= shape.n_outputs:
+        return
+    out = float(shape.bias)
+    used = weights.n_used[i]
+    k = int(0)
+    while k < used:
+        out += out_at(weights.w_out, (first + k) * OUT + o) * memory.coming[first + k]
+        k += 1
+    outputs[i, o] = out
+
+
 @parameters("controller")
 class Srn(Slots):
     """Settings of a simple recurrent network; see the module."""
@@ -213,6 +333,8 @@ class Srn(Slots):
             clear=clear,
             think=think,
             probe="hidden",
+            shared=(Phase(think_neuron, n_neurons, "q"), Phase(think_sum, n_sums, "q")),
+            join=join,
         )
 
     def forward(

@@ -61,7 +61,7 @@ def episode_kernel(simulation: Simulation, mind: Mind, timed: bool = False) -> A
         timed: whether the cycles of each phase are added up in the job's ``clock``.
     """
     structs = (simulation.state, simulation.scene, simulation.params_type)
-    brain = (mind.weights, mind.memory, mind.shape_type, mind.clear, mind.think)
+    brain = (mind.weights, mind.memory, mind.shape_type, mind.clear, mind.think, mind.shared)
     return _episode_kernel(*structs, *brain, tuple(stages_of(simulation).values()), timed)
 
 
@@ -75,6 +75,7 @@ def _episode_kernel(
     Shape: Any,
     clear: Any,
     think: Any,
+    shared: tuple[Phase, ...],
     stages: tuple[tuple[Phase, ...], ...],
     timed: bool,
 ) -> Any:
@@ -87,6 +88,11 @@ def _episode_kernel(
         at += len(phases)
     reset, sense, act, commit, settle, resolve, outcome = runs
     is_timed = timed
+    is_shared = bool(shared)
+    values, flags = wp.array2d[float], wp.array[int]
+    brain = {"weights": Weights, "memory": Memory, "shape": Shape}
+    brain |= {"inputs": values, "outputs": values, "heuristic": flags}
+    think_together = run_of("run_think", shared, brain)
 
     @wp.kernel(module="unique", module_options=engine.options, grid_stride=False)
     def episode(
@@ -116,10 +122,16 @@ def _episode_kernel(
             since = wp.int64(0)
             if wp.static(is_timed):
                 since = cycles()
-            for i in range(lane, robots, n_lanes()):
-                if team.heuristic[i] < 0:
-                    think(weights, memory, shape, team.inputs, team.outputs, i)
-            barrier()
+            if wp.static(is_shared) and n_lanes() > 1:
+                think_together(
+                    weights, memory, shape, team.inputs, team.outputs, team.heuristic,
+                    robots, lane, t, job.clock,
+                )  # fmt: skip
+            else:
+                for i in range(lane, robots, n_lanes()):
+                    if team.heuristic[i] < 0:
+                        think(weights, memory, shape, team.inputs, team.outputs, i)
+                barrier()
             if wp.static(is_timed):
                 if lane == 0:
                     wp.atomic_add(job.clock, 0, cycles() - since)
@@ -133,9 +145,10 @@ def _episode_kernel(
 
 
 @cache
-def loading_kernel(Weights: Any, Shape: Any, load: Any) -> Any:
+def loading_kernel(Weights: Any, Shape: Any, load: Any, join: Any) -> Any:
     """Return the kernel that builds the controllers of teams, a block for each team."""
     view_weights = engine.view_of(Weights)
+    joins = join is not None
 
     @wp.kernel(module="unique", module_options=engine.options, grid_stride=False)
     def loading(
@@ -145,8 +158,12 @@ def loading_kernel(Weights: Any, Shape: Any, load: Any) -> Any:
         index, lane = wp.tid()
         n = first + index
         weights = view_weights(brains, n, n_teams)
-        for i in range(lane, rows.shape[1], wp.block_dim()):
+        for i in range(lane, rows.shape[1], n_lanes()):
             load(weights, shape, i, genes, rows, n)
+        if wp.static(joins):
+            barrier()
+            if lane == 0:
+                join(weights, shape, rows.shape[1])
 
     return loading
 
@@ -222,9 +239,9 @@ class Rollout:
             self._mind = self.controller.mind(len(world.inputs), len(world.outputs))
             self._kernel = episode_kernel(self._simulation, self._mind, timed)
             mind = self._mind
-            self._loading = loading_kernel(mind.weights, mind.shape_type, mind.load)
+            self._loading = loading_kernel(mind.weights, mind.shape_type, mind.load, mind.join)
         self._shapes = shapes_of(world, self._simulation)
-        sizes = {"robots": world.n_robots} | mind.sizes
+        sizes = {"robots": world.n_robots, "team": 1} | mind.sizes
         self._mind_shapes = {
             struct: shapes(dimensions(struct, lambda _: ("robots",)), sizes)
             for struct in (mind.memory, mind.weights)
