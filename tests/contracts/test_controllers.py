@@ -114,8 +114,8 @@ def test_scenarios_share_a_teams_weights_but_not_memory(case, rollout):
     at, mind = rollout._workspace, rollout._mind
     for struct, parts in ((at.weights, n), (at.memory, n * e)):
         for name, those in dimensions(struct._cls, lambda _: ("robots",)).items():
-            size = prod(mind.sizes.get(one, r) for one in those)
-            assert those[0] == "robots"
+            size = prod((mind.sizes | {"robots": r, "team": 1})[one] for one in those)
+            assert those[0] in ("robots", "team")
             assert getattr(struct, name).size == parts * size, name
     left = getattr(at.memory, mind.probe).numpy().reshape(n, e, r, -1)
     alone = Rollout(*case, n_threads=1)

@@ -14,10 +14,11 @@ from conevo.kernels.arrays import allocate, dimensions, shapes
 from conevo.kernels.geometry import COVER_WORDS, cover_disc, covered_by_any, octant
 from conevo.kernels.outputs import sigmoid, sigmoid_of
 from conevo.kernels.random import uniform
+from conevo.kernels.views import view_of
 from oracles import rover_oracle, splitmix
 
 engine.start()
-weights_of, memory_of = engine.view_of(SrnWeights), engine.view_of(SrnMemory)
+weights_of, memory_of = view_of(SrnWeights), view_of(SrnMemory)
 
 
 @wp.kernel
@@ -168,7 +169,9 @@ def run_kernel(mind, n_sensors, n_outputs, genes, slots, sensors):
     made = []
     for struct in (SrnWeights, SrnMemory):
         names = dimensions(struct, lambda _: ("robots",))
-        made.append(allocate(struct, shapes(names, kind.sizes | {"robots": 2}), 2, "cpu"))
+        made.append(
+            allocate(struct, shapes(names, kind.sizes | {"robots": 2, "team": 1}), 2, "cpu")
+        )
         for name in struct.vars:
             getattr(made[-1], name).numpy()[:] = -7
     weights, memory = made

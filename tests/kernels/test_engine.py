@@ -14,8 +14,9 @@ import conevo
 from conevo.controllers.registry import controller
 from conevo.errors import EnvironmentFailure
 from conevo.kernels import engine
+from conevo.worlds.episode import episode_kernel, loading_kernel
 from conevo.worlds.registry import WORLDS, world
-from conevo.worlds.rollout import Rollout, episode_kernel, loading_kernel
+from conevo.worlds.rollout import Rollout
 from conevo.worlds.simulators import has_own_simulator
 
 PACKAGE = Path(conevo.__file__).parent
@@ -121,7 +122,7 @@ def test_the_cuda_form_compiles_for_sm_90_without_a_device(entry, tmp_path):
     task = first_environment(entry)
     mind = controller(world=task).mind(len(task.inputs), len(task.outputs))
     episode = episode_kernel(task.simulation(), mind)
-    loading = loading_kernel(mind.weights, mind.shape_type, mind.load)
+    loading = loading_kernel(mind)
     for kernel, size in ((episode, 20_000), (loading, 5_000)):
         files = wp.compile_aot_module(kernel.module, arch=90, module_dir=tmp_path)
         assert [f.suffixes[-2:] for f in files] == [[".sm90", ".cubin"]]

@@ -13,8 +13,8 @@ import warp as wp
 from conevo.controllers.registry import CONTROLLERS, controller
 from conevo.kernels import engine
 from conevo.kernels.random import uniform
+from conevo.worlds.episode import episode_kernel, loading_kernel
 from conevo.worlds.registry import WORLDS, world
-from conevo.worlds.rollout import episode_kernel, loading_kernel
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 TASKS = (
@@ -67,7 +67,7 @@ def kernels_of(task, mind):
     shape = mind.mind(len(task.inputs), len(task.outputs))
     return (
         episode_kernel(task.simulation(), shape),
-        loading_kernel(shape.weights, shape.shape_type, shape.load),
+        loading_kernel(shape),
     )
 
 

@@ -15,13 +15,11 @@ import threading
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from functools import cache
 from typing import Any
 
 import warp as wp
 
 from conevo.errors import EnvironmentFailure, UsageError
-from conevo.kernels.phases import written
 
 __all__ = [
     "build",
@@ -31,7 +29,6 @@ __all__ = [
     "options",
     "start",
     "usable_threads",
-    "view_of",
 ]
 
 # Measured: no adjoints and no unrolling pay; fast_math and -O3 do not. No fused
@@ -124,44 +121,6 @@ def _without_driver_warning() -> Iterator[None]:
             for line in caught:
                 if b"CUDA driver" not in line:
                     real.write(line)
-
-
-@cache
-def view_of(struct: Any, has_shared: bool = False) -> Any:
-    """Return the function ``view(batch, index, n)`` that gives one of ``n`` parts of a batch.
-
-    A batch is a struct whose arrays hold the parts one after another, along their first dimension;
-    the view has the same fields, with each array cut down to its part. Numbers are shared by all
-    parts.
-
-    The function is written out, field by field, because contiguous arrays made from pointers are
-    a quarter faster than slices (measured), and Warp has no loop over fields.
-
-    Args:
-        struct: its arrays have one or two dimensions.
-        has_shared: arrays of more than one dimension, too, are shared by all parts.
-    """
-    lines = ["def view(batch: Struct, index: int, n: int) -> Struct:", "    part = Struct()"]
-    scope: dict[str, Any] = {"Struct": struct, "wp": wp}
-    for name, var in struct.vars.items():
-        kind = var.type
-        if wp.types.is_array(kind) and (kind.ndim == 1 or not has_shared):
-            size = wp.types.type_size_in_bytes(kind.dtype)
-            scope[f"{name}_type"] = kind.dtype
-            wide = f" * batch.{name}.shape[1]" if kind.ndim == 2 else ""
-            shape = f"{name}_size, batch.{name}.shape[1]" if wide else f"{name}_size,"
-            lines += [
-                f"    {name}_size = batch.{name}.shape[0] // n",
-                f"    {name}_at = wp.uint64(index) * wp.uint64({name}_size{wide} * {size})",
-                f"    part.{name} = wp.array(",
-                f"        ptr=batch.{name}.ptr + {name}_at,",
-                f"        shape=({shape}),",
-                f"        dtype={name}_type,",
-                "    )",
-            ]
-        else:
-            lines += [f"    part.{name} = batch.{name}"]
-    return written("view", [*lines, "    return part"], scope, f"view of {struct.key}")
 
 
 def usable_threads() -> int:

@@ -144,11 +144,21 @@ def walk_of(name: str, phases: Sequence[Phase], arguments: Mapping[str, Any]) ->
     return written(name, lines, scope, f"{name} of {types}")
 
 
-def written(name: str, lines: Sequence[str], scope: dict[str, Any], title: str) -> Any:
-    """Return the Warp function of a text, which Warp reads again when it compiles it."""
+def written(
+    name: str, lines: Sequence[str], scope: dict[str, Any], title: str, is_native: bool = False
+) -> Any:
+    """Return the Warp function of a text, which Warp reads again when it compiles it.
+
+    Args:
+        name: of the function.
+        lines: of the text.
+        scope: what its names stand for.
+        title: of the text, as in messages.
+        is_native: whether it is decorated with ``wp.func_native``, which must stand in the text.
+    """
     source = "\n".join([*lines, ""])
     digest = hashlib.blake2b(source.encode(), digest_size=4).hexdigest()
     file = f"<{title} {digest}>"  # one name, one text
     linecache.cache[file] = (len(source), None, source.splitlines(keepends=True), file)
     exec(compile(source, file, "exec"), scope)
-    return wp.func(scope[name])
+    return scope[name] if is_native else wp.func(scope[name])

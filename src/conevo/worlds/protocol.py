@@ -79,6 +79,7 @@ class Simulation:
         for one robot there may be phases over items of the world's own (``kernels.phases.Phase``).
     recorded: state arrays that ``Rollout.record`` keeps, iteration by iteration.
     recorded_at_end: state arrays that it keeps at the end.
+    lanes: threads of a block on a CUDA device, a multiple of 32; results do not depend on it.
     scratch: state arrays whose content may depend on the order of items, as lists that lanes fill
         do; no result may depend on it.
     """
@@ -91,6 +92,7 @@ class Simulation:
     recorded: tuple[str, ...]
     sizes: dict[str, int] = field(default_factory=dict)
     recorded_at_end: tuple[str, ...] = ()
+    lanes: int = 32
     scratch: tuple[str, ...] = ()
 
 

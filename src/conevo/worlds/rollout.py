@@ -6,166 +6,30 @@ workspace run in parts.
 """
 
 from dataclasses import dataclass
-from functools import cache
 from typing import Any, Self
 
 import numpy as np
 import numpy.typing as npt
 import warp as wp
 
-from conevo.controllers.protocol import Controller, Mind
+from conevo.controllers.protocol import Controller
 from conevo.controllers.registry import controller as make_controller
 from conevo.controllers.registry import genome_of, refuse_misfit
 from conevo.errors import EnvironmentFailure, UsageError
 from conevo.kernels import engine
 from conevo.kernels.arrays import allocate, dimensions, shapes
 from conevo.kernels.devices import refuse_unknown_device
-from conevo.kernels.phases import Phase, barrier, cycles, n_lanes, run_of
-from conevo.worlds.contract import STAGES, refuse_faults, scenario_faults, shapes_of, stages_of
+from conevo.kernels.views import SHARED_BYTES, Near, near_arrays
+from conevo.worlds.contract import refuse_faults, scenario_faults, shapes_of, stages_of
+from conevo.worlds.episode import Job, episode_kernel, loading_kernel
 from conevo.worlds.measures import measures_of
-from conevo.worlds.protocol import Outcome, Scenarios, Simulation, World
+from conevo.worlds.protocol import Outcome, Scenarios, World
 
-__all__ = ["Rollout", "check_device", "episode_kernel", "loading_kernel"]
+__all__ = ["Rollout", "check_device"]
 
 # Worlds simulated at once: bounds memory, keeps all threads or blocks busy.
 CHUNK = 512
 CUDA_CHUNK = 8192
-
-
-@wp.struct
-class Job:
-    """What a launch is to do: which teams play, in how many scenarios, which iterations.
-
-    first_team: number of the batch's first team among all, which tells the round that a team is of.
-    """
-
-    heuristic: wp.array2d[int]
-    n_worlds: int
-    n_teams: int
-    n_scenarios: int
-    n_scenes: int
-    n_robots: int
-    first_team: int
-    teams_per_round: int
-    t_begin: int
-    t_end: int
-    clock: wp.array[wp.int64]
-
-
-def episode_kernel(simulation: Simulation, mind: Mind, timed: bool = False) -> Any:
-    """Return the kernel that runs a world's iterations ``t_begin`` to ``t_end``.
-
-    Args:
-        simulation: of the world.
-        mind: of the controller.
-        timed: whether the cycles of each phase are added up in the job's ``clock``.
-    """
-    structs = (simulation.state, simulation.scene, simulation.params_type)
-    brain = (mind.weights, mind.memory, mind.shape_type, mind.clear, mind.think, mind.shared)
-    return _episode_kernel(*structs, *brain, tuple(stages_of(simulation).values()), timed)
-
-
-@cache
-def _episode_kernel(
-    State: Any,
-    Scene: Any,
-    Params: Any,
-    Weights: Any,
-    Memory: Any,
-    Shape: Any,
-    clear: Any,
-    think: Any,
-    shared: tuple[Phase, ...],
-    stages: tuple[tuple[Phase, ...], ...],
-    timed: bool,
-) -> Any:
-    view_team, view_scene = engine.view_of(State), engine.view_of(Scene, has_shared=True)
-    view_weights, view_memory = engine.view_of(Weights), engine.view_of(Memory)
-    world = {"team": State, "scene": Scene, "p": Params}
-    runs, at = [], 1
-    for name, phases in zip(STAGES, stages, strict=True):
-        runs.append(run_of(f"run_{name}", phases, world, at if timed else None))
-        at += len(phases)
-    reset, sense, act, commit, settle, resolve, outcome = runs
-    is_timed = timed
-    is_shared = bool(shared)
-    values, flags = wp.array2d[float], wp.array[int]
-    brain = {"weights": Weights, "memory": Memory, "shape": Shape}
-    brain |= {"inputs": values, "outputs": values, "heuristic": flags}
-    think_together = run_of("run_think", shared, brain)
-
-    @wp.kernel(module="unique", module_options=engine.options, grid_stride=False)
-    def episode(
-        batch: State, scenes: Scene, p: Params, brains: Weights, memories: Memory, shape: Shape,
-        job: Job, first: int,
-    ) -> None:  # fmt: skip
-        index, lane = wp.tid()
-        b = first + index
-        n = b // job.n_scenarios
-        place = (job.first_team + n) // job.teams_per_round * job.n_scenarios + b % job.n_scenarios
-        team = view_team(batch, b, job.n_worlds)
-        scene = view_scene(scenes, place, job.n_scenes)
-        weights = view_weights(brains, n, job.n_teams)
-        memory = view_memory(memories, b, job.n_worlds)
-        robots = job.n_robots
-        if job.t_begin == 0:
-            for i in range(lane, robots, n_lanes()):
-                clear(memory, shape, i)
-                for k in range(team.inputs.shape[1]):
-                    team.inputs[i, k] = 0.0
-                for k in range(team.outputs.shape[1]):
-                    team.outputs[i, k] = 0.0
-                team.heuristic[i] = job.heuristic[n, i]
-            reset(team, scene, p, robots, lane, 0, job.clock)
-        for t in range(job.t_begin, job.t_end):
-            sense(team, scene, p, robots, lane, t, job.clock)
-            since = wp.int64(0)
-            if wp.static(is_timed):
-                since = cycles()
-            if wp.static(is_shared) and n_lanes() > 1:
-                think_together(
-                    weights, memory, shape, team.inputs, team.outputs, team.heuristic,
-                    robots, lane, t, job.clock,
-                )  # fmt: skip
-            else:
-                for i in range(lane, robots, n_lanes()):
-                    if team.heuristic[i] < 0:
-                        think(weights, memory, shape, team.inputs, team.outputs, i)
-                barrier()
-            if wp.static(is_timed):
-                if lane == 0:
-                    wp.atomic_add(job.clock, 0, cycles() - since)
-            act(team, scene, p, robots, lane, t, job.clock)
-            commit(team, scene, p, robots, lane, t, job.clock)
-            settle(team, scene, p, robots, lane, t, job.clock)
-            resolve(team, scene, p, robots, lane, t, job.clock)
-        outcome(team, scene, p, robots, lane, job.t_end, job.clock)
-
-    return episode
-
-
-@cache
-def loading_kernel(Weights: Any, Shape: Any, load: Any, join: Any) -> Any:
-    """Return the kernel that builds the controllers of teams, a block for each team."""
-    view_weights = engine.view_of(Weights)
-    joins = join is not None
-
-    @wp.kernel(module="unique", module_options=engine.options, grid_stride=False)
-    def loading(
-        brains: Weights, shape: Shape, genes: wp.array2d[float], rows: wp.array3d[int],
-        n_teams: int, first: int,
-    ) -> None:  # fmt: skip
-        index, lane = wp.tid()
-        n = first + index
-        weights = view_weights(brains, n, n_teams)
-        for i in range(lane, rows.shape[1], n_lanes()):
-            load(weights, shape, i, genes, rows, n)
-        if wp.static(joins):
-            barrier()
-            if lane == 0:
-                join(weights, shape, rows.shape[1])
-
-    return loading
 
 
 def check_device(device: str) -> None:
@@ -207,6 +71,7 @@ class Rollout:
         device: "cpu" or a CUDA device as Warp names it.
         lanes: lanes of a CPU block (for tests of the CUDA form; needs Warp's CPU blocks).
         timed: whether ``cycles`` tells what each phase takes, for benchmarks.
+        shared_bytes: shared memory that a block on a CUDA device may take.
 
     Raises:
         UsageError: the world lacks what the engine needs of it, the controller does not fit it, or
@@ -222,30 +87,39 @@ class Rollout:
         device: str = "cpu",
         lanes: int = 1,
         timed: bool = False,
+        shared_bytes: int = SHARED_BYTES,
     ) -> None:
         engine.start()
         self.world = world
         self.controller = controller or make_controller(world=world)
         self.device = device
         self.n_threads = n_threads or engine.usable_threads()
-        self.lanes = 32 if device != "cpu" else lanes
         self._chunk = CHUNK if device == "cpu" else CUDA_CHUNK
         check_device(device)
         with engine.building:
             self._simulation = world.simulation()
             refuse_faults(world, self._simulation)
+            self.lanes = lanes if device == "cpu" else self._simulation.lanes
             refuse_misfit(self.controller, world)
             self.genome = genome_of(self.controller, world)
             self._mind = self.controller.mind(len(world.inputs), len(world.outputs))
-            self._kernel = episode_kernel(self._simulation, self._mind, timed)
             mind = self._mind
-            self._loading = loading_kernel(mind.weights, mind.shape_type, mind.load, mind.join)
+            self._loading = loading_kernel(mind)
         self._shapes = shapes_of(world, self._simulation)
         sizes = {"robots": world.n_robots, "team": 1} | mind.sizes
         self._mind_shapes = {
             struct: shapes(dimensions(struct, lambda _: ("robots",)), sizes)
             for struct in (mind.memory, mind.weights)
         }
+        near: tuple[Near, Near] = ((), ())
+        if device != "cpu":
+            state, memory = self._simulation.state, mind.memory
+            shape_of = {state: self._shapes, memory: self._mind_shapes[memory]}
+            chosen = near_arrays(shape_of, shared_bytes)
+            near = chosen[state], chosen[memory]
+        with engine.building:
+            bound = 0 if device == "cpu" else self.lanes
+            self._kernel = episode_kernel(self._simulation, mind, timed, near, bound)
         stages = stages_of(self._simulation).items()
         self._phases = ["think", *(f"{at} {one.name}" for at, those in stages for one in those)]
         self._clock = wp.zeros(len(self._phases) if timed else 0, dtype=wp.int64, device=device)
@@ -277,7 +151,9 @@ class Rollout:
     @property
     def fingerprint(self) -> str:
         """Sixteen hex digits that change with anything the kernels are made of."""
-        return engine.kernel_hash(self._kernel, self._loading)
+        with engine.building:  # the form of the CPU, whatever the device and what is timed
+            episode = episode_kernel(self._simulation, self._mind)
+        return engine.kernel_hash(episode, self._loading)
 
     def evaluate(
         self,

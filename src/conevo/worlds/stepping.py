@@ -15,9 +15,11 @@ import warp as wp
 
 from conevo.kernels import engine
 from conevo.kernels.phases import Phase, walk_of
+from conevo.kernels.views import view_of
 from conevo.worlds.contract import STAGES, stages_of
+from conevo.worlds.episode import Job
 from conevo.worlds.protocol import Scenarios, World
-from conevo.worlds.rollout import Job, Rollout
+from conevo.worlds.rollout import Rollout
 
 __all__ = ["STEPS", "Stepper"]
 
@@ -38,8 +40,8 @@ def _stepping_kernel(
     think: Any,
     stages: tuple[tuple[Phase, ...], ...],
 ) -> Any:
-    view_team, view_scene = engine.view_of(State), engine.view_of(Scene, has_shared=True)
-    view_weights, view_memory = engine.view_of(Weights), engine.view_of(Memory)
+    view_team, view_scene = view_of(State), view_of(Scene, has_shared=True)
+    view_weights, view_memory = view_of(Weights), view_of(Memory)
     world = {"team": State, "scene": Scene, "p": Params}
     reset, sense, act, commit, settle, resolve, outcome = (
         walk_of(f"walk_{name}", phases, world) for name, phases in zip(STAGES, stages, strict=True)
