@@ -23,6 +23,7 @@ from conevo.controllers.protocol import Bools, Floats, Genome, Mind
 from conevo.controllers.slots import Slots
 from conevo.kernels.arrays import named_arrays
 from conevo.kernels.outputs import sigmoid, sigmoid_of
+from conevo.kernels.phases import Phase
 from conevo.parameters import parameters
 
 __all__ = ["Ctrnn"]
@@ -98,46 +99,98 @@ def clear(memory: CtrnnMemory, shape: CtrnnShape, i: int) -> None:
 
 
 @wp.func
-def think(
+def n_neurons(
     weights: CtrnnWeights,
     memory: CtrnnMemory,
     shape: CtrnnShape,
     inputs: wp.array2d[float],
     outputs: wp.array2d[float],
-    i: int,
+    heuristic: wp.array[int],
+) -> int:
+    """Return how many slots for neurons a team has."""
+    return inputs.shape[0] * shape.n_slots
+
+
+@wp.func
+def n_sums(
+    weights: CtrnnWeights,
+    memory: CtrnnMemory,
+    shape: CtrnnShape,
+    inputs: wp.array2d[float],
+    outputs: wp.array2d[float],
+    heuristic: wp.array[int],
+) -> int:
+    """Return how many outputs a team has."""
+    return inputs.shape[0] * shape.n_outputs
+
+
+@wp.func
+def step(
+    weights: CtrnnWeights,
+    memory: CtrnnMemory,
+    shape: CtrnnShape,
+    inputs: wp.array2d[float],
+    outputs: wp.array2d[float],
+    heuristic: wp.array[int],
+    q: int,
 ) -> None:
-    """Take one Euler step of robot ``i``'s neurons, then sum up its outputs."""
+    """Take one Euler step of neuron ``q`` of the team."""
+    i = q // shape.n_slots
+    if heuristic[i] >= 0 or weights.filled[q] == 0:
+        return
     first = i * shape.n_slots
-    seen = shape.n_inputs + shape.n_context
-    k = int(0)
-    while k < shape.n_slots:
-        slot = first + k
+    at = q * (shape.n_inputs + shape.n_context)
+    drive = weights.bias[q]
+    j = int(0)
+    while j < shape.n_inputs:
+        drive += weights.w_in[at + j] * inputs[i, j]
+        j += 1
+    at += shape.n_inputs
+    j = int(0)
+    while j < shape.n_context:
+        drive += weights.w_in[at + j] * memory.hidden[first + j]
+        j += 1
+    memory.state[q] = memory.state[q] + weights.rate[q] * (drive - memory.state[q])
+
+
+@wp.func
+def activate(
+    weights: CtrnnWeights,
+    memory: CtrnnMemory,
+    shape: CtrnnShape,
+    inputs: wp.array2d[float],
+    outputs: wp.array2d[float],
+    heuristic: wp.array[int],
+    q: int,
+) -> None:
+    """Let neuron ``q`` show its state: only now, since every neuron sees what was before."""
+    if heuristic[q // shape.n_slots] < 0 and weights.filled[q] != 0:
+        memory.hidden[q] = sigmoid(memory.state[q])
+
+
+@wp.func
+def sum_up(
+    weights: CtrnnWeights,
+    memory: CtrnnMemory,
+    shape: CtrnnShape,
+    inputs: wp.array2d[float],
+    outputs: wp.array2d[float],
+    heuristic: wp.array[int],
+    q: int,
+) -> None:
+    """Sum up output ``q`` of the team."""
+    i = q // shape.n_outputs
+    o = q % shape.n_outputs
+    if heuristic[i] >= 0:
+        return
+    total = float(0.0)
+    slot = i * shape.n_slots
+    last = slot + shape.n_slots
+    while slot < last:
         if weights.filled[slot] != 0:
-            drive = weights.bias[slot]
-            j = int(0)
-            while j < shape.n_inputs:
-                drive += weights.w_in[slot * seen + j] * inputs[i, j]
-                j += 1
-            j = int(0)
-            while j < shape.n_context:
-                drive += weights.w_in[slot * seen + shape.n_inputs + j] * memory.hidden[first + j]
-                j += 1
-            memory.state[slot] = memory.state[slot] + weights.rate[slot] * (
-                drive - memory.state[slot]
-            )
-        k += 1
-    for o in range(shape.n_outputs):
-        outputs[i, o] = 0.0
-    # Only now: every neuron must see the activations of the previous iteration.
-    k = int(0)
-    while k < shape.n_slots:
-        slot = first + k
-        if weights.filled[slot] != 0:
-            memory.hidden[slot] = sigmoid(memory.state[slot])
-            for o in range(shape.n_outputs):
-                weight = weights.w_out[slot * shape.n_outputs + o]
-                outputs[i, o] = outputs[i, o] + weight * memory.hidden[slot]
-        k += 1
+            total += weights.w_out[slot * shape.n_outputs + o] * memory.hidden[slot]
+        slot += 1
+    outputs[i, o] = total
 
 
 @parameters("controller")
@@ -172,7 +225,11 @@ class Ctrnn(Slots):
             sizes={"slots": self.max_hidden, "feeds": feeds, "outputs": n_outputs},
             load=load,
             clear=clear,
-            think=think,
+            think=(
+                Phase(step, n_neurons, "q"),
+                Phase(activate, n_neurons, "q"),
+                Phase(sum_up, n_sums, "q"),
+            ),
             probe="hidden",
         )
 

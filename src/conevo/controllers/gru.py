@@ -24,6 +24,7 @@ from conevo.controllers.protocol import Bools, Floats, Genome, Mind
 from conevo.controllers.slots import Slots
 from conevo.kernels.arrays import named_arrays
 from conevo.kernels.outputs import sigmoid, sigmoid_of
+from conevo.kernels.phases import Phase
 from conevo.parameters import parameters
 
 __all__ = ["Gru"]
@@ -119,57 +120,123 @@ def recurrent(shape: GruShape, slot: int, gate: int) -> int:
 
 
 @wp.func
-def think(
+def n_neurons(
     weights: GruWeights,
     memory: GruMemory,
     shape: GruShape,
     inputs: wp.array2d[float],
     outputs: wp.array2d[float],
-    i: int,
+    heuristic: wp.array[int],
+) -> int:
+    """Return how many slots for neurons a team has."""
+    return inputs.shape[0] * shape.n_slots
+
+
+@wp.func
+def n_sums(
+    weights: GruWeights,
+    memory: GruMemory,
+    shape: GruShape,
+    inputs: wp.array2d[float],
+    outputs: wp.array2d[float],
+    heuristic: wp.array[int],
+) -> int:
+    """Return how many outputs a team has."""
+    return inputs.shape[0] * shape.n_outputs
+
+
+@wp.func
+def open_gates(
+    weights: GruWeights,
+    memory: GruMemory,
+    shape: GruShape,
+    inputs: wp.array2d[float],
+    outputs: wp.array2d[float],
+    heuristic: wp.array[int],
+    q: int,
 ) -> None:
-    """Run robot ``i``'s network once: all gates, then all candidates, then all activations."""
+    """Compute the reset and the update gate of neuron ``q`` of the team."""
+    i = q // shape.n_slots
+    if heuristic[i] >= 0 or weights.filled[q] == 0:
+        return
     first = i * shape.n_slots
-    k = int(0)
-    while k < shape.n_slots:
-        slot = first + k
+    reset = drive(weights, shape, inputs, i, q, RESET)
+    update = drive(weights, shape, inputs, i, q, UPDATE)
+    at = recurrent(shape, q, RESET)
+    also = recurrent(shape, q, UPDATE)
+    j = int(0)
+    while j < shape.n_context:
+        reset += weights.w_in[at + j] * memory.hidden[first + j]
+        update += weights.w_in[also + j] * memory.hidden[first + j]
+        j += 1
+    memory.reset[q] = sigmoid(reset)
+    memory.update[q] = sigmoid(update)
+
+
+@wp.func
+def propose(
+    weights: GruWeights,
+    memory: GruMemory,
+    shape: GruShape,
+    inputs: wp.array2d[float],
+    outputs: wp.array2d[float],
+    heuristic: wp.array[int],
+    q: int,
+) -> None:
+    """Compute what neuron ``q`` may become, from all reset gates of its robot."""
+    i = q // shape.n_slots
+    if heuristic[i] >= 0 or weights.filled[q] == 0:
+        return
+    first = i * shape.n_slots
+    total = drive(weights, shape, inputs, i, q, CANDIDATE)
+    at = recurrent(shape, q, CANDIDATE)
+    j = int(0)
+    while j < shape.n_context:
+        kept = memory.reset[first + j] * memory.hidden[first + j]
+        total += weights.w_in[at + j] * kept
+        j += 1
+    memory.candidate[q] = 2.0 * sigmoid(2.0 * total) - 1.0
+
+
+@wp.func
+def activate(
+    weights: GruWeights,
+    memory: GruMemory,
+    shape: GruShape,
+    inputs: wp.array2d[float],
+    outputs: wp.array2d[float],
+    heuristic: wp.array[int],
+    q: int,
+) -> None:
+    """Let neuron ``q`` become what it may, as far as its update gate is open."""
+    if heuristic[q // shape.n_slots] < 0 and weights.filled[q] != 0:
+        z = memory.update[q]
+        memory.hidden[q] = z * memory.hidden[q] + (1.0 - z) * memory.candidate[q]
+
+
+@wp.func
+def sum_up(
+    weights: GruWeights,
+    memory: GruMemory,
+    shape: GruShape,
+    inputs: wp.array2d[float],
+    outputs: wp.array2d[float],
+    heuristic: wp.array[int],
+    q: int,
+) -> None:
+    """Sum up output ``q`` of the team."""
+    i = q // shape.n_outputs
+    o = q % shape.n_outputs
+    if heuristic[i] >= 0:
+        return
+    total = float(0.0)
+    slot = i * shape.n_slots
+    last = slot + shape.n_slots
+    while slot < last:
         if weights.filled[slot] != 0:
-            reset = drive(weights, shape, inputs, i, slot, RESET)
-            update = drive(weights, shape, inputs, i, slot, UPDATE)
-            at = recurrent(shape, slot, RESET)
-            also = recurrent(shape, slot, UPDATE)
-            j = int(0)
-            while j < shape.n_context:
-                reset += weights.w_in[at + j] * memory.hidden[first + j]
-                update += weights.w_in[also + j] * memory.hidden[first + j]
-                j += 1
-            memory.reset[slot] = sigmoid(reset)
-            memory.update[slot] = sigmoid(update)
-        k += 1
-    k = int(0)
-    while k < shape.n_slots:
-        slot = first + k
-        if weights.filled[slot] != 0:
-            total = drive(weights, shape, inputs, i, slot, CANDIDATE)
-            at = recurrent(shape, slot, CANDIDATE)
-            j = int(0)
-            while j < shape.n_context:
-                kept = memory.reset[first + j] * memory.hidden[first + j]
-                total += weights.w_in[at + j] * kept
-                j += 1
-            memory.candidate[slot] = 2.0 * sigmoid(2.0 * total) - 1.0
-        k += 1
-    for o in range(shape.n_outputs):
-        outputs[i, o] = 0.0
-    k = int(0)
-    while k < shape.n_slots:
-        slot = first + k
-        if weights.filled[slot] != 0:
-            z = memory.update[slot]
-            memory.hidden[slot] = z * memory.hidden[slot] + (1.0 - z) * memory.candidate[slot]
-            for o in range(shape.n_outputs):
-                weight = weights.w_out[slot * shape.n_outputs + o]
-                outputs[i, o] = outputs[i, o] + weight * memory.hidden[slot]
-        k += 1
+            total += weights.w_out[slot * shape.n_outputs + o] * memory.hidden[slot]
+        slot += 1
+    outputs[i, o] = total
 
 
 @parameters("controller")
@@ -202,7 +269,12 @@ class Gru(Slots):
             sizes={"slots": self.max_hidden, "gates": 3, "feeds": feeds, "outputs": n_outputs},
             load=load,
             clear=clear,
-            think=think,
+            think=(
+                Phase(open_gates, n_neurons, "q"),
+                Phase(propose, n_neurons, "q"),
+                Phase(activate, n_neurons, "q"),
+                Phase(sum_up, n_sums, "q"),
+            ),
             probe="hidden",
         )
 

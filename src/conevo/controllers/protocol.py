@@ -59,10 +59,11 @@ class Mind:
             of genotypes ``genes`` [K, G] and the rows [N, R, U] of team n, -1 for an empty slot.
         clear: ``clear(memory, shape, i)`` lets robot i remember nothing.
         think: ``think(weights, memory, shape, inputs, outputs, i)`` fills robot i's outputs [R, O]
-            from its inputs [R, S] and its memory, and writes nothing of another robot.
-        shared: the same bits by phases over items of the controller's own, which the lanes of a
-            block share: functions take ``(weights, memory, shape, inputs, outputs, heuristic, q)``,
-            and leave robots alone whose ``heuristic`` is not negative. None: a lane takes a robot.
+            from its inputs [R, S] and its memory, and writes nothing of another robot. Or phases
+            over items of the team that the lanes of a block share: their functions take
+            ``(weights, memory, shape, inputs, outputs, heuristic, q)``, and leave robots alone
+            whose ``heuristic`` is not negative.
+        shared: phases that give the bits of ``think`` where a block has many lanes.
         join: ``join(weights, shape, robots)`` does what remains when all robots are loaded.
         probe: the array [R, U or more] of the memory that shows the activation of each slot.
     """

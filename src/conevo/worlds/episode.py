@@ -12,7 +12,7 @@ from conevo.kernels.views import Near, copy_of, view_of
 from conevo.worlds.contract import STAGES, stages_of
 from conevo.worlds.protocol import Simulation
 
-__all__ = ["Job", "episode_kernel", "loading_kernel"]
+__all__ = ["Job", "episode_kernel", "given_to_think", "loading_kernel"]
 
 # Threads of a multiprocessor that has 65,536 registers, 85 for each. Choice: a prototype of the
 # rover world was fastest with 8 blocks of 96 lanes (H100).
@@ -91,11 +91,10 @@ def _episode_kernel(
         at += len(phases)
     reset, sense, act, commit, settle, resolve, outcome = runs
     is_timed = timed
-    is_shared = bool(shared)
-    values, flags = wp.array2d[float], wp.array[int]
-    brain = {"weights": Weights, "memory": Memory, "shape": Shape}
-    brain |= {"inputs": values, "outputs": values, "heuristic": flags}
-    think_together = run_of("run_think", shared, brain)
+    is_alone = not isinstance(think, tuple)
+    together = think if isinstance(think, tuple) else shared
+    is_shared = bool(together)
+    think_together = run_of("run_think", together, given_to_think(Weights, Memory, Shape))
 
     bounds = {"launch_bounds": (lanes, max(1, min(16, THREADS // lanes)))} if lanes else {}
 
@@ -132,12 +131,12 @@ def _episode_kernel(
             since = wp.int64(0)
             if wp.static(is_timed):
                 since = cycles()
-            if wp.static(is_shared) and n_lanes() > 1:
+            if wp.static(is_shared) and (wp.static(not is_alone) or n_lanes() > 1):
                 think_together(
                     weights, memory, shape, team.inputs, team.outputs, team.heuristic,
                     robots, lane, t, job.clock,
                 )  # fmt: skip
-            else:
+            elif wp.static(is_alone):
                 for i in range(lane, robots, n_lanes()):
                     if team.heuristic[i] < 0:
                         think(weights, memory, shape, team.inputs, team.outputs, i)
@@ -156,6 +155,13 @@ def _episode_kernel(
             copy_memory(memory, view_far_memory(memories, b, job.n_worlds), lane)
 
     return episode
+
+
+def given_to_think(Weights: Any, Memory: Any, Shape: Any) -> dict[str, Any]:
+    """Return the names and types of what the phases of a controller are given."""
+    values = wp.array2d[float]
+    brain = {"weights": Weights, "memory": Memory, "shape": Shape}
+    return brain | {"inputs": values, "outputs": values, "heuristic": wp.array[int]}
 
 
 def loading_kernel(mind: Mind) -> Any:

@@ -17,7 +17,7 @@ from conevo.kernels import engine
 from conevo.kernels.phases import Phase, walk_of
 from conevo.kernels.views import view_of
 from conevo.worlds.contract import STAGES, stages_of
-from conevo.worlds.episode import Job
+from conevo.worlds.episode import Job, given_to_think
 from conevo.worlds.protocol import Scenarios, World
 from conevo.worlds.rollout import Rollout
 
@@ -46,6 +46,9 @@ def _stepping_kernel(
     reset, sense, act, commit, settle, resolve, outcome = (
         walk_of(f"walk_{name}", phases, world) for name, phases in zip(STAGES, stages, strict=True)
     )
+    is_alone = not isinstance(think, tuple)
+    together = think if isinstance(think, tuple) else ()
+    think_together = walk_of("walk_think", together, given_to_think(Weights, Memory, Shape))
     checked = engine.options | {"mode": "debug"}
 
     @wp.kernel(module="unique", module_options=checked, grid_stride=False)
@@ -69,12 +72,17 @@ def _stepping_kernel(
                     for j in range(team.outputs.shape[1]):
                         team.outputs[i, j] = 0.0
                     team.heuristic[i] = job.heuristic[n, i]
-                if phase == 2 and team.heuristic[i] < 0:
-                    think(weights, memory, shape, team.inputs, team.outputs, i)
+                if wp.static(is_alone):
+                    if phase == 2 and team.heuristic[i] < 0:
+                        think(weights, memory, shape, team.inputs, team.outputs, i)
         if phase == 0:
             reset(team, scene, p, order, b, 0)
         if phase == 1:
             sense(team, scene, p, order, b, t)
+        if phase == 2:
+            think_together(
+                weights, memory, shape, team.inputs, team.outputs, team.heuristic, order, b, t
+            )
         if phase == 3:
             act(team, scene, p, order, b, t)
         if phase == 4:
