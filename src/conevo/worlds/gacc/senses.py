@@ -1,6 +1,7 @@
 """What a robot of ``worlds.gacc.world`` senses: objects and obstacles, robots, home area, demand.
 
 Nitschke 2009, sections 6.2.1 to 6.2.4, eqs 6.2 to 6.7. Eight octants each for the first three.
+Readings are kept until something that they depend on has changed.
 """
 
 from typing import TYPE_CHECKING, Any
@@ -9,16 +10,19 @@ import warp as wp
 
 from conevo.kernels.geometry import octant
 from conevo.kernels.random import uniform
-from conevo.kernels.sensing import closest_in_octants, mark
+from conevo.kernels.sensing import none_of_eight
+from conevo.kernels.sets import has, lowest, one, without_lowest
 from conevo.worlds.gacc.state import (
     MOVE,
+    NONE,
+    STALE,
     UNDETECTED,
     GaccConstants,
     GaccScene,
     GaccTeam,
     is_blocked,
-    is_lying,
 )
+from conevo.worlds.gacc.survey import notice_changes
 
 __all__ = ["sense"]
 
@@ -54,114 +58,148 @@ def look(
     """
     x = team.x[i]
     y = team.y[i]
+    walls = team.walls[i]
     closest = octants()
     reading = octants()
     for o in range(8):
         closest[o] = p.object_range_2
-    k = int(0)
-    while k < p.n_objects:
+    rest = team.things[i] & team.kinds[setting]
+    while rest != wp.uint64(0):
+        k = lowest(rest)
         dx = team.object_x[k] - x
         dy = team.object_y[k] - y
         d2 = dx * dx + dy * dy
-        if d2 < p.object_range_2 and scene.object_type[k] == setting:
-            if is_lying(team, k):
-                if is_noticed(scene, p, i, t, k) and not is_blocked(scene, x, y, dx, dy):
-                    if team.detected[k] == UNDETECTED:
-                        team.detected[k] = t  # the same from every robot that finds it now
-                    o = octant(dx, dy)
-                    if d2 < closest[o]:
-                        closest[o] = d2
-                        reading[o] = float(setting + 1) / 3.0 * nearness(p, d2)
-        k += 1
-    n = scene.left.shape[0]
-    k = int(0)
-    while k < n + 4:
+        if d2 < p.object_range_2 and is_noticed(scene, p, i, t, k):
+            o = octant(dx, dy)
+            is_new = team.detected[k] == UNDETECTED
+            if (d2 < closest[o] or is_new) and not is_blocked(scene, walls, x, y, dx, dy):
+                if is_new:
+                    team.detected[k] = t  # the same from every robot that finds it now
+                if d2 < closest[o]:
+                    closest[o] = d2
+                    reading[o] = float(setting + 1) / 3.0 * nearness(p, d2)
+        rest = without_lowest(rest)
+    while walls != wp.uint64(0):
+        k = lowest(walls)
+        dx = wp.clamp(x, scene.left[k], scene.right[k]) - x
+        dy = wp.clamp(y, scene.bottom[k], scene.top[k]) - y
+        d2 = dx * dx + dy * dy
+        if d2 < p.object_range_2 and is_noticed(scene, p, i, t, p.n_objects + k):
+            o = octant(dx, dy)
+            if d2 < closest[o]:
+                closest[o] = d2
+                reading[o] = -nearness(p, d2)
+        walls = without_lowest(walls)
+    side = int(0)
+    while side < 4:
         dx = float(0.0)
         dy = float(0.0)
-        if k < n:
-            dx = wp.clamp(x, scene.left[k], scene.right[k]) - x
-            dy = wp.clamp(y, scene.bottom[k], scene.top[k]) - y
-        elif k == n:
+        if side == 0:
             dx = 1.0 - x
-        elif k == n + 1:
+        elif side == 1:
             dy = 1.0 - y
-        elif k == n + 2:
+        elif side == 2:
             dx = -x
         else:
             dy = -y
         d2 = dx * dx + dy * dy
         if d2 < p.object_range_2:
-            if is_noticed(scene, p, i, t, p.n_objects + k):
+            if is_noticed(scene, p, i, t, p.n_objects + scene.left.shape[0] + side):
                 o = octant(dx, dy)
                 if d2 < closest[o]:
                     closest[o] = d2
                     reading[o] = -nearness(p, d2)
-        k += 1
+        side += 1
     return reading
 
 
 @wp.func
 def look_around(team: GaccTeam, scene: GaccScene, p: GaccConstants, i: int) -> octants:
-    """Return the eight robot sensors: what the closest robot carries (eq. 6.3), 0 if nothing."""
+    """Return the eight robot sensors: what the closest robot carries (eq. 6.3), 0 if nothing.
+
+    Robots that are no longer in reach are forgotten.
+    """
+    reading = octants()
+    near = team.near[i]
+    if (near & team.carriers[0]) == wp.uint64(0):
+        return reading
     x = team.x[i]
     y = team.y[i]
-    seen = wp.uint64(0)
-    j = int(0)
-    while j < p.n_robots:
+    closest = octants()
+    for o in range(8):
+        closest[o] = p.robot_range_2
+    found = none_of_eight()
+    rest = near
+    while rest != wp.uint64(0):
+        j = lowest(rest)
         dx = team.x[j] - x
         dy = team.y[j] - y
-        if dx * dx + dy * dy < p.robot_range_2 and j != i:
-            if not is_blocked(scene, x, y, dx, dy):
-                seen = mark(seen, j)
-        j += 1
-    closest = closest_in_octants(team.x, team.y, seen, x, y, p.robot_range_2)
-    reading = octants()
+        d2 = dx * dx + dy * dy
+        if d2 < p.robot_range_2:
+            o = octant(dx, dy)
+            if d2 < closest[o] and not is_blocked(scene, team.walls[i], x, y, dx, dy):
+                closest[o] = d2
+                found[o] = j
+        elif d2 >= p.near_2:
+            near = near & ~one(j)
+        rest = without_lowest(rest)
+    team.near[i] = near
     for o in range(8):
-        j = closest[o]
+        j = found[o]
         if j >= 0:
             k = team.held[j]
             if k >= 0:
-                dx = team.x[j] - x
-                dy = team.y[j] - y
-                near = nearness(p, dx * dx + dy * dy)
-                reading[o] = float(scene.object_type[k] + 1) / 3.0 * near
+                near_by = nearness(p, closest[o])
+                reading[o] = float(scene.object_type[k] + 1) / 3.0 * near_by
     return reading
 
 
 @wp.func
-def sense(team: GaccTeam, scene: GaccScene, p: GaccConstants, i: int, t: int) -> None:
-    """Fill robot ``i``'s 27 sensor inputs.
+def look_home(team: GaccTeam, p: GaccConstants, i: int) -> octants:
+    """Return the eight home sensors.
 
     Choice: the home area reads h / d in its octant, at most 1, with h half its side and d the
     distance to its centre: "inversely proportional to the distance" (6.2.4).
     """
-    if team.energy[i] <= 0.0:
-        return
-    x = team.x[i]
-    y = team.y[i]
-    things = octants()
-    a = team.action[i]
-    if a >= 0 and a < MOVE:
-        things = look(team, scene, p, i, t, a)
-    near = int(0)
-    j = int(0)
-    while j < p.n_robots:
-        dx = team.x[j] - x
-        dy = team.y[j] - y
-        near += int(dx * dx + dy * dy < p.robot_range_2)
-        j += 1
-    robots = octants()
-    if near > 1:
-        robots = look_around(team, scene, p, i)
     home = octants()
-    dx = 0.5 - x
-    dy = 0.5 - y
+    dx = 0.5 - team.x[i]
+    dy = 0.5 - team.y[i]
     d2 = dx * dx + dy * dy
     if d2 < p.home_range_2:
         home[octant(dx, dy)] = p.home / wp.max(wp.sqrt(d2), p.home)
+    return home
+
+
+@wp.func
+def show(team: GaccTeam, i: int, first: int, reading: octants) -> None:
+    """Write eight of robot ``i``'s inputs, from number ``first`` on."""
     for o in range(8):
-        team.inputs[i, o] = things[o]
-        team.inputs[i, 8 + o] = robots[o]
-        team.inputs[i, 16 + o] = home[o]
-    for kind in range(3):
-        team.inputs[i, 24 + kind] = team.demand[kind]
+        team.inputs[i, first + o] = reading[o]
+
+
+@wp.func
+def sense(team: GaccTeam, scene: GaccScene, p: GaccConstants, i: int, t: int) -> None:
+    """Fill those of robot ``i``'s 27 sensor inputs that may have changed."""
+    if team.energy[i] <= 0.0:
+        return
+    has_moved = has(team.moved[0], i)
+    is_changed = has_moved
+    if not has_moved:
+        is_changed = notice_changes(team, p, i)
+    setting = wp.where(team.action[i] < MOVE, team.action[i], NONE)
+    view = team.view[i]
+    if view != NONE and (is_changed or p.object_accuracy < 1.0):
+        view = STALE
+    if view != setting:
+        team.view[i] = setting
+        things = octants()
+        if setting != NONE:
+            things = look(team, scene, p, i, t, setting)
+        show(team, i, 0, things)
+    if has_moved or (team.near[i] & team.stirred[0]) != wp.uint64(0):
+        show(team, i, 8, look_around(team, scene, p, i))
+    if has_moved:
+        show(team, i, 16, look_home(team, p, i))
+    if team.has_news[0] != 0:
+        for kind in range(3):
+            team.inputs[i, 24 + kind] = team.demand[kind]

@@ -9,12 +9,14 @@ import warp as wp
 
 from conevo.kernels.actions import NONE
 from conevo.kernels.arrays import named_arrays
-from conevo.kernels.steps import is_taken
+from conevo.kernels.sets import lowest, one, without_lowest
 
 __all__ = [
     "CARRIED",
+    "CONSTRUCT",
     "DELIVERED",
     "DROPPED",
+    "GATHER",
     "GRIP",
     "GRIPPED",
     "HELPED",
@@ -23,17 +25,20 @@ __all__ = [
     "NONE",
     "N_ACTIONS",
     "N_CASTES",
+    "STALE",
     "UNDETECTED",
     "WAITING",
     "GaccConstants",
     "GaccScene",
     "GaccTeam",
+    "hold",
     "is_blocked",
     "is_home",
     "is_inside",
     "is_known",
-    "is_lying",
     "is_refused",
+    "is_within",
+    "release",
 ]
 
 UNDETECTED = wp.constant(2**31 - 1)
@@ -47,6 +52,9 @@ N_ACTIONS = wp.constant(7)
 # constructing, from the arrival in the home area on, once the object is delivered.
 N_CASTES = wp.constant(10)
 
+GATHER = wp.constant(4)  # gather A, B, C
+CONSTRUCT = wp.constant(7)  # construct A, B, C
+
 # The life of an object.
 LYING = wp.constant(0)
 GRIPPED = wp.constant(1)
@@ -55,6 +63,8 @@ WAITING = wp.constant(3)
 HELPED = wp.constant(4)
 DELIVERED = wp.constant(5)
 DROPPED = wp.constant(6)
+
+STALE = wp.constant(-2)  # of a view: to be looked at again
 
 
 @wp.struct
@@ -83,6 +93,9 @@ class GaccConstants:
     needs_detection: int
     min_distance_2: float
     separation_2: float
+    near_2: float  # how far other robots matter to a robot
+    reach_2: float  # how far objects do
+    walls_2: float  # how far obstacles do
 
 
 @wp.struct
@@ -104,7 +117,7 @@ class GaccScene:
 
 @named_arrays
 class GaccTeam:
-    """State of a team."""
+    """State of a team. Sets of robots, objects and obstacles are words (``kernels.sets``)."""
 
     inputs: wp.array2d[float]
     outputs: wp.array2d[float]
@@ -124,16 +137,32 @@ class GaccTeam:
     fitness: wp.array[float]
     counts: wp.array[int]
     switches: wp.array[int]
+    view: wp.array[int]  # setting whose readings the object sensors show, NONE if they are off
+    near: wp.array[wp.uint64]  # robots in reach, and some that have been since it came here
+    things: wp.array[wp.uint64]  # objects that lie in reach
+    walls: wp.array[wp.uint64]  # obstacles in reach
     object_x: Annotated[wp.array[float], "objects"]
     object_y: Annotated[wp.array[float], "objects"]
     life: Annotated[wp.array[int], "objects"]
     # iteration in which it was sensed first; "known at t" is detected < t
     detected: Annotated[wp.array[int], "objects"]
     part: Annotated[wp.array[int], "objects"]  # which part of what it has become: c * M + step
-    holders: Annotated[wp.array[int], "objects"]  # how many robots hold it
+    holders: Annotated[wp.array[wp.uint64], "objects"]  # while the referee is at it
     built: Annotated[wp.array[int], "complex_objects"]  # parts of each complex object
     missing: Annotated[wp.array[int], "complex_objects", "types"]  # parts that it lacks
     demand: Annotated[wp.array[float], "types"]
+    kinds: Annotated[wp.array[wp.uint64], "types"]  # objects of each type
+    carriers: Annotated[wp.array[wp.uint64], "team"]  # robots that hold something
+    waiting: Annotated[wp.array[wp.uint64], "team"]  # those of them in the home area
+    taken: Annotated[wp.array[wp.uint64], "team"]  # objects that are held
+    shared: Annotated[wp.array[wp.uint64], "team"]  # by several, while the referee is at it
+    lying: Annotated[wp.array[wp.uint64], "team"]  # objects that lie somewhere; nobody holds them
+    lying_home: Annotated[wp.array[wp.uint64], "team"]  # those of them in the home area
+    # What has changed since robots sensed last:
+    moved: Annotated[wp.array[wp.uint64], "team"]  # robots that have moved
+    stirred: Annotated[wp.array[wp.uint64], "team"]  # that have moved, gripped or let go
+    changed: Annotated[wp.array[wp.uint64], "team"]  # objects that lie now or do no more
+    has_news: Annotated[wp.array[int], "team"]  # of the demand
     performance: wp.array[float]  # delivered, completed, delivered_share
 
 
@@ -153,18 +182,34 @@ def is_inside(scene: GaccScene, k: int, x: float, y: float) -> bool:
 
 
 @wp.func
+def is_within(
+    xs: wp.array[float], ys: wp.array[float], robots: wp.uint64, x: float, y: float, d_2: float
+) -> bool:
+    """Return whether a robot of a set is closer to a place than a distance, given as its square."""
+    rest = robots
+    while rest != wp.uint64(0):
+        j = lowest(rest)
+        dx = xs[j] - x
+        dy = ys[j] - y
+        if dx * dx + dy * dy < d_2:
+            return True
+        rest = without_lowest(rest)
+    return False
+
+
+@wp.func
 def is_refused(
     team: GaccTeam, scene: GaccScene, p: GaccConstants, i: int, x: float, y: float
 ) -> bool:
     """Return whether robot ``i`` may not move to a place: edge, obstacle or another robot."""
     if x < 0.0 or x >= 1.0 or y < 0.0 or y >= 1.0:
         return True
-    k = int(0)
-    while k < scene.left.shape[0]:
-        if is_inside(scene, k, x, y):
+    rest = team.walls[i]
+    while rest != wp.uint64(0):
+        if is_inside(scene, lowest(rest), x, y):
             return True
-        k += 1
-    return is_taken(team.x, team.y, p.n_robots, i, x, y, p.separation_2)
+        rest = without_lowest(rest)
+    return is_within(team.x, team.y, team.near[i], x, y, p.separation_2)
 
 
 @wp.func
@@ -183,15 +228,18 @@ def within(low: float, high: float, start: float, way: float) -> wp.vec2f:
 
 
 @wp.func
-def is_blocked(scene: GaccScene, x: float, y: float, dx: float, dy: float) -> bool:
-    """Return whether an obstacle stands in the view from a place along a way."""
-    k = int(0)
-    while k < scene.left.shape[0]:
+def is_blocked(
+    scene: GaccScene, walls: wp.uint64, x: float, y: float, dx: float, dy: float
+) -> bool:
+    """Return whether an obstacle of a set stands in the view from a place along a way."""
+    rest = walls
+    while rest != wp.uint64(0):
+        k = lowest(rest)
         across = within(scene.left[k], scene.right[k], x, dx)
         along = within(scene.bottom[k], scene.top[k], y, dy)
         if wp.max(across[0], along[0]) <= wp.min(across[1], along[1]):
             return True
-        k += 1
+        rest = without_lowest(rest)
     return False
 
 
@@ -199,12 +247,22 @@ def is_blocked(scene: GaccScene, x: float, y: float, dx: float, dy: float) -> bo
 
 
 @wp.func
-def is_lying(team: GaccTeam, k: int) -> bool:
-    """Return whether object ``k`` lies somewhere and nobody holds it."""
-    return team.life[k] == LYING or team.life[k] == DROPPED
-
-
-@wp.func
 def is_known(team: GaccTeam, p: GaccConstants, k: int, t: int) -> bool:
     """Return whether a robot may grip object ``k``: it has been detected (6.2.6, 6.5.3)."""
     return team.detected[k] < t or p.needs_detection == 0
+
+
+@wp.func
+def hold(team: GaccTeam, i: int, k: int) -> None:
+    """Close robot ``i``'s gripper on object ``k``."""
+    team.held[i] = k
+    wp.atomic_or(team.carriers, 0, one(i))
+    wp.atomic_or(team.stirred, 0, one(i))
+
+
+@wp.func
+def release(team: GaccTeam, i: int) -> None:
+    """Open the gripper of robot ``i``, which holds an object."""
+    team.held[i] = NONE
+    wp.atomic_and(team.carriers, 0, ~one(i))
+    wp.atomic_or(team.stirred, 0, one(i))

@@ -107,6 +107,8 @@ Positive = Annotated[float, Gt(0)]
 NonNegative = Annotated[float, Ge(0)]
 Range = Annotated[float, Gt(0), Le(0.5)]
 
+SLACK = 1e-3  # of what is in reach of a robot: more than float32 rounds
+
 
 @parameters("world")
 class GaccParams:
@@ -317,8 +319,9 @@ class GaccWorld:
 
     def simulation(self) -> Simulation:
         """Return the Warp side of this world."""
-        plan = self.plan
+        p, plan = self.params, self.plan
         c = len(plan.parts)
+        sight = max(p.object_range, p.robot_range, p.move_range)
         return Simulation(
             state=GaccTeam,
             sizes={"objects": plan.parts.size, "complex_objects": c, "types": 3},
@@ -329,6 +332,9 @@ class GaccWorld:
                 self.params,
                 n_objects=plan.parts.size,
                 n_complex=c,
+                near_2=(max(p.robot_range, 2 * p.move_range + p.separation) + SLACK) ** 2,
+                reach_2=max(p.object_range, p.grip_distance) ** 2,
+                walls_2=(sight + SLACK) ** 2,
                 ordered=sum(1 << k for k, ordered in enumerate(plan.is_ordered) if ordered),
             ),
             functions=FUNCTIONS,
