@@ -20,7 +20,7 @@ import warp as wp
 
 import conevo
 from conevo.worlds import rollout
-from conevo.worlds.gacc import dynamics as gacc_dynamics
+from conevo.worlds.gacc import resolve as gacc_resolve
 from conevo.worlds.gacc.state import GaccConstants as Params
 from conevo.worlds.gacc.state import GaccScene as Scene
 from conevo.worlds.gacc.state import GaccTeam as Team
@@ -29,7 +29,7 @@ from teams import champion, controlled, error, keys_of, play, random_clones, ran
 TASK = "gacc/complex-1"
 SETTINGS = {"run.generations": 20, "world.iterations": 1000, "run.n_tests": 20}
 N_SCENARIOS, N_RANDOM, N_EPOCHS = 100, 100, 5
-NUMBER = gacc_dynamics.signal
+NUMBER = gacc_resolve.signal
 
 
 @wp.func
@@ -50,7 +50,7 @@ def share(team: Team, scene: Scene, p: Params) -> None:
 
 def read(signal: object) -> None:
     """Let kernels that are made from now on use a reading."""
-    gacc_dynamics.signal = signal
+    gacc_resolve.signal = signal
     rollout._episode_kernel.cache_clear()
 
 

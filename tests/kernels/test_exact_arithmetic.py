@@ -29,6 +29,7 @@ ALLOWED = """
     abs min max clamp floor ceil mod floordiv where isnan
     float int float32 int32 uint8 uint64
     bit_and bit_or bit_xor invert lshift rshift bit_count unot
+    atomic_and atomic_or
     address load array_store assign assign_inplace copy extract array_t vec_t tuple
     range iter_cmp iter_next builtin_tid1d builtin_tid2d builtin_block_dim
     WP_TILE_SYNC

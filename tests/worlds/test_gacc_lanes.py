@@ -1,0 +1,42 @@
+"""The gathering world in blocks of any number of lanes: the same bits in every iteration."""
+
+import numpy as np
+import pytest
+
+from conevo.rng import fold
+from conevo.worlds.registry import world
+from conevo.worlds.rollout import Rollout
+from worlds.gathering import SMALL, crowded, random_team
+
+PARAMS = SMALL | {"wait": 4, "energy": 1.503, "robot_range": 0.1}
+
+
+@pytest.fixture(scope="module")
+def epoch():
+    """A crowd of networks and heuristic robots that grips, builds, lets go and runs dry."""
+    a_world = world("gacc/complex-9", iterations=60, **PARAMS)
+    heuristic = (np.arange(a_world.n_robots) % 11 - 1).astype(np.int32)
+    scenarios = crowded(a_world.scenarios([fold(3, "lanes")]), 3)
+    return a_world, (*random_team(a_world, 3), scenarios, heuristic)
+
+
+@pytest.fixture(scope="module")
+def serial(epoch):
+    a_world, played = epoch
+    return Rollout(a_world, n_threads=1).record(*played)
+
+
+def test_the_epoch_has_what_lanes_share(serial):
+    assert set(np.unique(serial["life"])) == set(range(7))
+    assert (serial["energy"][-1] <= 0).any()
+    assert (serial["situation"] == 4).any()
+    assert (np.abs(serial["inputs"]).max(axis=(0, 1)) > 0).all()
+
+
+@pytest.mark.parametrize("lanes", [32, 64, 96, 128, 256])
+def test_any_number_of_lanes_gives_the_same_bits(epoch, serial, cpu_blocks, lanes):
+    a_world, played = epoch
+    with cpu_blocks():
+        seen = Rollout(a_world, n_threads=1, lanes=lanes).record(*played)
+    for name, values in serial.items():
+        assert values.tobytes() == seen[name].tobytes(), name
