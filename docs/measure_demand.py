@@ -19,7 +19,7 @@ import numpy as np
 import warp as wp
 
 import conevo
-from conevo.worlds import rollout
+from conevo.worlds import episode
 from conevo.worlds.gacc import resolve as gacc_resolve
 from conevo.worlds.gacc.state import GaccConstants as Params
 from conevo.worlds.gacc.state import GaccScene as Scene
@@ -51,7 +51,7 @@ def share(team: Team, scene: Scene, p: Params) -> None:
 def read(signal: object) -> None:
     """Let kernels that are made from now on use a reading."""
     gacc_resolve.signal = signal
-    rollout._episode_kernel.cache_clear()
+    episode._episode_kernel.cache_clear()
 
 
 def main() -> None:

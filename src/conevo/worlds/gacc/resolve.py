@@ -135,7 +135,7 @@ def count_holders(team: GaccTeam, scene: GaccScene, p: GaccConstants, q: int, t:
 def judge(team: GaccTeam, scene: GaccScene, p: GaccConstants, q: int, t: int) -> None:
     """Build or refuse what several hold in the home area: objects compete for places in a plan."""
     team.waiting[0] = wp.uint64(0)
-    has_built = bool(False)
+    has_built = int(0)
     rest = team.shared[0]
     team.shared[0] = wp.uint64(0)
     while rest != wp.uint64(0):
@@ -147,7 +147,7 @@ def judge(team: GaccTeam, scene: GaccScene, p: GaccConstants, q: int, t: int) ->
             if c >= 0:
                 if int(wp.bit_count(team.holders[k])) >= 2 + kind:
                     build(team, scene, p, k, c)
-                    has_built = True
+                    has_built = 1
             else:
                 those = team.holders[k]
                 while those != wp.uint64(0):
@@ -155,7 +155,7 @@ def judge(team: GaccTeam, scene: GaccScene, p: GaccConstants, q: int, t: int) ->
                     team.situation[lowest(those)] = 4
                     those = without_lowest(those)
                 team.holders[k] = wp.uint64(0)
-    if has_built:
+    if has_built != 0:
         signal(team, scene, p)
 
 

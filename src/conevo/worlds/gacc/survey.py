@@ -97,18 +97,15 @@ def notice_changes(team: GaccTeam, p: GaccConstants, i: int) -> bool:
     """Return whether an object in reach of robot ``i`` lies there now, or does no more; note it."""
     things = team.things[i]
     rest = team.changed[0]
-    is_changed = bool(False)
     while rest != wp.uint64(0):
         k = lowest(rest)
         dx = team.object_x[k] - team.x[i]
         dy = team.object_y[k] - team.y[i]
-        if has(things, k):
-            is_changed = True
-            things = things & ~one(k)
-        if dx * dx + dy * dy <= p.reach_2 and has(team.lying[0], k):
-            is_changed = True
+        things = things & ~one(k)
+        if has(team.lying[0], k) and dx * dx + dy * dy <= p.reach_2:
             things = things | one(k)
         rest = without_lowest(rest)
-    if is_changed:
-        team.things[i] = things
-    return is_changed
+    if things == team.things[i]:
+        return False
+    team.things[i] = things
+    return True
