@@ -37,8 +37,11 @@ def sector(x: wp.array[float], y: wp.array[float], o: wp.array[int]):
 def cover(grids: wp.array[wp.uint64], discs: wp.array[wp.vec3f], gained: wp.array[int]):
     for k in range(discs.shape[0]):
         d = discs[k]
-        gained[k] = cover_disc(grids, (k % 2) * COVER_WORDS, d[0], d[1], d[2])
-    gained[discs.shape[0]] = covered_by_any(grids, 2)
+        for part in range(1 + k % 3):
+            n = cover_disc(grids, (k % 2) * COVER_WORDS, d[0], d[1], d[2], part, 1 + k % 3)
+            gained[k] = gained[k] + n
+    for word in range(COVER_WORDS):
+        gained[discs.shape[0]] = gained[discs.shape[0]] + covered_by_any(grids, 2, word)
 
 
 @wp.kernel

@@ -72,7 +72,7 @@ def test_edited_kernels_are_never_stale_and_unchanged_ones_never_compiled_again(
     edits = [
         # a constant, a function called by a function, the body of a phase, an imported constant
         (
-            "worlds/rover/dynamics.py",
+            "worlds/rover/state.py",
             "ROCK_CELLS = wp.constant(40)",
             "ROCK_CELLS = wp.constant(20)",
         ),

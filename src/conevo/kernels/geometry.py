@@ -40,8 +40,12 @@ def _span(first: int, last: int) -> wp.uint64:
 
 
 @wp.func
-def cover_disc(grid: wp.array[wp.uint64], base: int, x: float, y: float, r: float) -> int:
+def cover_disc(
+    grid: wp.array[wp.uint64], base: int, x: float, y: float, r: float, part: int, n_parts: int
+) -> int:
     """Mark the cells whose centre lies in the disc; return how many were not marked before.
+
+    The rows of the disc may be done in parts.
 
     Args:
         grid: words of one or more coverage grids, ``COVER_WORDS`` each.
@@ -49,12 +53,14 @@ def cover_disc(grid: wp.array[wp.uint64], base: int, x: float, y: float, r: floa
         x: first coordinate of the disc's centre, in sides of the square.
         y: second coordinate.
         r: radius, in sides of the square.
+        part: which part of the disc, from 0.
+        n_parts: how many parts there are, 1 for the whole disc at once.
     """
     n = float(COVER_CELLS)
-    row_0 = wp.max(int(wp.ceil((y - r) * n - 0.5)), 0)
-    row_1 = wp.min(int(wp.floor((y + r) * n - 0.5)), COVER_CELLS - 1)
+    row = int(wp.max(int(wp.ceil((y - r) * n - 0.5)), 0) + part)
+    last_row = wp.min(int(wp.floor((y + r) * n - 0.5)), COVER_CELLS - 1)
     gained = int(0)
-    for row in range(row_0, row_1 + 1):
+    while row <= last_row:
         dy = (float(row) + 0.5) / n - y
         rest = r * r - dy * dy
         if rest > 0.0:
@@ -68,16 +74,16 @@ def cover_disc(grid: wp.array[wp.uint64], base: int, x: float, y: float, r: floa
                 if fresh != wp.uint64(0):
                     grid[k] = old | fresh
                     gained = gained + int(wp.bit_count(fresh))
+        row += n_parts
     return gained
 
 
 @wp.func
-def covered_by_any(grids: wp.array[wp.uint64], n_grids: int) -> int:
-    """Return how many cells are marked in at least one of the first ``n_grids`` grids."""
-    total = int(0)
-    for word in range(COVER_WORDS):
-        bits = wp.uint64(0)
-        for g in range(n_grids):
-            bits = bits | grids[g * COVER_WORDS + word]
-        total = total + int(wp.bit_count(bits))
-    return total
+def covered_by_any(grids: wp.array[wp.uint64], n_grids: int, word: int) -> int:
+    """Return how many cells of a word are marked in at least one of the first ``n_grids`` grids."""
+    bits = wp.uint64(0)
+    g = int(0)
+    while g < n_grids:
+        bits = bits | grids[g * COVER_WORDS + word]
+        g += 1
+    return int(wp.bit_count(bits))

@@ -34,7 +34,8 @@ Choices, all declared in ``RoverParams`` or here, with their sensitivity on the 
 Version history:
 
 - v1: first version.
-- v2: sine, cosine and arc tangent of kernels are the same bits on every device.
+- v2: sine, cosine and arc tangent of kernels are the same bits on every device; what rocks add
+  to sensors and fitness is in integers, in 2^-16 and 2^-32, so that any order gives the same sum.
 """
 
 from collections.abc import Sequence
@@ -54,7 +55,10 @@ from conevo.worlds.protocol import Scenarios, Simulation, kernel_params, names_o
 from conevo.worlds.rover import canals, rocks
 from conevo.worlds.rover.dynamics import (
     FUNCTIONS,
+    LISTS,
     ROCK_CELLS,
+    SCRATCH,
+    SURVEYED,
     RoverConstants,
     RoverScene,
     RoverTeam,
@@ -242,13 +246,25 @@ class RoverWorld:
 
     def simulation(self) -> Simulation:
         """Return the Warp side of this world."""
+        n_rocks = sum(rocks.mix(self.environment))
         return Simulation(
             state=RoverTeam,
-            sizes={"rocks": sum(rocks.mix(self.environment)), "words": int(COVER_WORDS)},
+            sizes={"rocks": n_rocks, "words": int(COVER_WORDS), "octants": 8, "lists": LISTS},
             scene=RoverScene,
             params_type=RoverConstants,
-            params=kernel_params(RoverConstants, self.params),
+            params=kernel_params(RoverConstants, self.params, **self._reaches()),
             functions=FUNCTIONS,
             recorded=("x", "y", "action", "setting", "energy", "covered", "value", "fitness"),
             recorded_at_end=("detected",),
+            scratch=SCRATCH,
         )
+
+    def _reaches(self) -> dict[str, float]:
+        """Return how far away, squared, rovers may be that meet before the next survey."""
+        p = self.params
+        steps = 2 * int(SURVEYED) * p.move_range
+        reaches = {
+            "crowd_2": max(p.rover_sensor_range, p.separation),
+            "company_2": 2 * max(p.ranges),
+        }
+        return {name: (1.001 * (reach + steps)) ** 2 for name, reach in reaches.items()}

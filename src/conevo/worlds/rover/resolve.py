@@ -1,0 +1,241 @@
+"""What comes of a detection: the area that it covers, and rocks that two rovers detect together."""
+
+import warp as wp
+
+from conevo.kernels.actions import NONE
+from conevo.kernels.geometry import COVER_CELLS, COVER_WORDS, cover_disc
+from conevo.kernels.phases import Phase
+from conevo.kernels.random import uniform
+from conevo.kernels.sets import lowest, one, without_lowest
+from conevo.worlds.rover.sense import ROWS, SUBS, share, take_off
+from conevo.worlds.rover.state import (
+    COVERING,
+    DETECTING,
+    PARTS,
+    ROCK_CELLS,
+    UNIT,
+    RoverConstants,
+    RoverScene,
+    RoverTeam,
+    is_activation,
+    n_parts,
+    of_setting,
+    rock_cell,
+)
+
+__all__ = ["RESOLVE"]
+
+
+@wp.func
+def partner(rock_type: int, setting: int) -> int:
+    """Return the setting a second rover needs to detect such a rock with this one, or NONE."""
+    if rock_type == 4:
+        return setting
+    if rock_type == setting or rock_type == setting + 1:
+        return wp.where(rock_type < 2, rock_type, rock_type + 1) - setting
+    return NONE
+
+
+@wp.func
+def enlist(team: RoverTeam, scene: RoverScene, p: RoverConstants, i: int, t: int) -> None:
+    """List rover ``i`` if it covers new cells, and if it may detect a rock with another.
+
+    Its mates are looked up only if it or one of its company has changed; and it is not listed while
+    no rock is left that it and a mate may detect.
+    """
+    a = team.action[i]
+    if not is_activation(a):
+        return
+    r = of_setting(p.ranges, a)
+    if team.covered_range[i] < r:
+        team.covered_range[i] = r
+        team.covering[wp.atomic_add(team.n_listed, COVERING, 1)] = i
+    if (team.changed[0] & (team.company[i] | one(i))) != wp.uint64(0):
+        find_mates(team, p, i, r)
+    if team.hopeful[i] != 0:
+        team.hopeful[i] = 0
+        team.detecting[wp.atomic_add(team.n_listed, DETECTING, 1)] = i
+
+
+@wp.func
+def find_mates(team: RoverTeam, p: RoverConstants, i: int, r: float) -> None:
+    """Find the rovers that may detect rocks with rover ``i``, and the cells that both reach."""
+    a = team.action[i]
+    x = team.x[i]
+    y = team.y[i]
+    left = float(2.0)
+    right = float(-2.0)
+    low = float(2.0)
+    high = float(-2.0)
+    mates = wp.uint64(0)
+    rest = team.company[i]
+    while rest != wp.uint64(0):
+        j = lowest(rest)
+        rest = without_lowest(rest)
+        b = team.action[j]
+        if is_activation(b) and wp.abs(b - a) <= 1:
+            dx = team.x[j] - x
+            dy = team.y[j] - y
+            s = of_setting(p.ranges, b)
+            if dx * dx + dy * dy < (r + s) * (r + s):
+                mates = mates | one(j)
+                left = wp.min(left, team.x[j] - s)
+                right = wp.max(right, team.x[j] + s)
+                low = wp.min(low, team.y[j] - s)
+                high = wp.max(high, team.y[j] + s)
+    team.mates[i] = mates
+    team.hopeful[i] = int(mates != wp.uint64(0))
+    team.box[i] = (
+        rock_cell(wp.max(left, x - r))
+        | (rock_cell(wp.min(right, x + r)) << 8)
+        | (rock_cell(wp.max(low, y - r)) << 16)
+        | (rock_cell(wp.min(high, y + r)) << 24)
+    )
+
+
+@wp.func
+def n_detecting(team: RoverTeam, scene: RoverScene, p: RoverConstants) -> int:
+    """Return the number of items of ``detect``."""
+    return (team.n_listed[COVERING] + team.n_listed[DETECTING]) * n_parts()
+
+
+@wp.func
+def detect(team: RoverTeam, scene: RoverScene, p: RoverConstants, q: int, t: int) -> None:
+    """Do a part of what a listed rover covers, or of what it detects."""
+    at = int(q)
+    part = int(0)
+    if n_parts() > 1:
+        at = q // PARTS
+        part = q % PARTS
+    n = team.n_listed[COVERING]
+    if at < n:
+        i = team.covering[at]
+        r = team.covered_range[i]
+        grid = i * COVER_WORDS
+        cells = cover_disc(team.cover, grid, team.x[i], team.y[i], r, part, n_parts())
+        if cells > 0:
+            wp.atomic_add(team.covered, i, cells)
+    else:
+        pair(team, scene, p, team.detecting[at - n], part, t)
+
+
+@wp.func
+def pair(team: RoverTeam, scene: RoverScene, p: RoverConstants, i: int, part: int, t: int) -> None:
+    """Find the rocks that rover ``i`` detects with a mate, and what it gains.
+
+    Both rovers of a pair find the detection by themselves; ``detected[k]`` becomes t, whoever is
+    first.
+    """
+    rows = int(1)
+    subs = int(1)
+    if n_parts() > 1:
+        rows = ROWS
+        subs = SUBS
+    x = team.x[i]
+    y = team.y[i]
+    a = team.action[i]
+    r = of_setting(p.ranges, a)
+    box = team.box[i]
+    first = box & 255
+    last = (box >> 8) & 255
+    row = int(((box >> 16) & 255) + part // subs)
+    last_row = box >> 24
+    while row <= last_row:
+        k = int(scene.cell[row * ROCK_CELLS + first] + part % subs)
+        end = scene.cell[row * ROCK_CELLS + last + 1]
+        while k < end:
+            dx = scene.rock_x[k] - x
+            dy = scene.rock_y[k] - y
+            d2 = dx * dx + dy * dy
+            if d2 < r * r:
+                need = partner(scene.rock_type[k], a)
+                if need != NONE and team.detected[k] >= t:
+                    fit = fitting(team, scene, p, team.mates[i], need, k)
+                    if fit != wp.uint64(0):
+                        if succeed(scene, p, i, a, fit, need, k, t):
+                            gain(team, scene, p, i, k, d2, t)
+                        else:
+                            team.hopeful[i] = 1
+            k += subs
+        row += rows
+
+
+@wp.func
+def fitting(
+    team: RoverTeam, scene: RoverScene, p: RoverConstants, mates: wp.uint64, need: int, k: int
+) -> wp.uint64:
+    """Return the mates that have the needed setting and rock ``k`` in range."""
+    r = of_setting(p.ranges, need)
+    found = wp.uint64(0)
+    rest = mates
+    while rest != wp.uint64(0):
+        j = lowest(rest)
+        rest = without_lowest(rest)
+        if team.action[j] == need:
+            dx = scene.rock_x[k] - team.x[j]
+            dy = scene.rock_y[k] - team.y[j]
+            if dx * dx + dy * dy < r * r:
+                found = found | one(j)
+    return found
+
+
+@wp.func
+def succeed(
+    scene: RoverScene,
+    p: RoverConstants,
+    i: int,
+    a: int,
+    mates: wp.uint64,
+    need: int,
+    k: int,
+    t: int,
+) -> bool:
+    """Return whether rover ``i`` succeeds on rock ``k``, and one of the mates too."""
+    if uniform(scene.seed[0], t, k, i) >= of_setting(p.accuracy, a):
+        return False
+    rest = mates
+    while rest != wp.uint64(0):
+        if uniform(scene.seed[0], t, k, lowest(rest)) < of_setting(p.accuracy, need):
+            return True
+        rest = without_lowest(rest)
+    return False
+
+
+@wp.func
+def gain(
+    team: RoverTeam, scene: RoverScene, p: RoverConstants, i: int, k: int, d2: float, t: int
+) -> None:
+    """Let rover ``i`` have detected rock ``k``; the first to say so takes it off all that is kept.
+
+    Choice: the sum of value d_min^2 / d^2 over what a rover detects in an iteration is in integers,
+    each rock cut to 2^-32.
+    """
+    value = scene.rock_value[k]
+    wp.atomic_add(team.gain, i, int(value))
+    near = share(p, value, d2) * UNIT * UNIT
+    wp.atomic_add(team.gain_near, i, wp.int64(near))
+    if wp.atomic_min(team.detected, k, t) > t:
+        take_off(team, scene, p, i, k)
+
+
+@wp.func
+def n_crediting(team: RoverTeam, scene: RoverScene, p: RoverConstants) -> int:
+    """Return the number of items of ``credit``."""
+    return team.n_listed[DETECTING]
+
+
+@wp.func
+def credit(team: RoverTeam, scene: RoverScene, p: RoverConstants, q: int, t: int) -> None:
+    """Credit a listed rover with what it has detected, and let it pay for the report."""
+    i = team.detecting[q]
+    if team.gain[i] > 0:
+        area = float(team.covered[i]) / float(COVER_CELLS * COVER_CELLS)
+        near = float(team.gain_near[i]) / (UNIT * UNIT * p.min_distance_2)
+        team.value[i] = team.value[i] + float(team.gain[i])
+        team.fitness[i] = team.fitness[i] + near * area
+        team.energy[i] = team.energy[i] - p.report_cost
+        team.gain[i] = 0
+        team.gain_near[i] = wp.int64(0)
+
+
+RESOLVE = (Phase(enlist), Phase(detect, n_detecting), Phase(credit, n_crediting))

@@ -1,0 +1,159 @@
+"""What the kernels of the multi-rover world work on: constants, a scenario, a team's state."""
+
+from typing import Annotated
+
+import warp as wp
+
+from conevo.kernels.actions import NONE
+from conevo.kernels.arrays import named_arrays
+from conevo.kernels.phases import n_lanes
+from conevo.worlds.rover import canals
+
+__all__ = [
+    "CANAL_CELLS",
+    "COVERING",
+    "DETECTING",
+    "LISTS",
+    "MOVE",
+    "N_ACTIONS",
+    "PARTS",
+    "ROCK_CELLS",
+    "SCANNING",
+    "SURVEYED",
+    "UNIT",
+    "RoverConstants",
+    "RoverScene",
+    "RoverTeam",
+    "is_activation",
+    "n_parts",
+    "of_setting",
+    "rock_cell",
+]
+
+N_ACTIONS = wp.constant(4)
+MOVE = wp.constant(3)
+ROCK_CELLS = wp.constant(40)  # grid over the rocks; 0.025 wide, so a disc needs few cells
+CANAL_CELLS = wp.constant(canals.N_CELLS)
+UNIT = wp.constant(2.0**16)  # sums of sensors are integers in 1 / UNIT: at most 5000 * UNIT
+
+# The lists of an iteration: who scans rocks, who covers cells, who may detect with another.
+LISTS = wp.constant(3)
+SCANNING = wp.constant(0)
+COVERING = wp.constant(1)
+DETECTING = wp.constant(2)
+
+# Every so many iterations each rover's company is looked up: who may be near until the next time.
+SURVEYED = wp.constant(8)
+PARTS = wp.constant(32)  # that lanes cut a scan into: 8 rows x 4 rocks, or 32 rows of cells
+
+
+@wp.struct
+class RoverConstants:
+    """What the kernels need of ``RoverParams``, by its names; ``NAME_2`` is a square.
+
+    crowd_2, company_2: squared distance within which another rover may be sensed or be in the way,
+    and within which its detection may overlap, before the next survey.
+    """
+
+    n_robots: int
+    energy: float
+    ranges: wp.vec3f
+    accuracy: wp.vec3f
+    cost: wp.vec3f
+    rover_sensor_range_2: float
+    rover_sensor_cost: float
+    move_range: float
+    move_cost: float
+    report_cost: float
+    min_distance_2: float
+    separation_2: float
+    crowd_2: float
+    company_2: float
+    fitness_is_product: int
+
+
+@wp.struct
+class RoverScene:
+    """A scenario: rocks sorted by grid cell, canals, starts. Flat over the scenarios of a batch."""
+
+    rock_x: wp.array[float]
+    rock_y: wp.array[float]
+    rock_value: wp.array[float]
+    rock_type: wp.array[int]
+    cell: wp.array[int]
+    canal: wp.array2d[wp.uint8]  # [rows, columns], the same in all scenarios
+    start_x: wp.array[float]
+    start_y: wp.array[float]
+    seed: wp.array[wp.uint64]
+
+
+@named_arrays
+class RoverTeam:
+    """State of a team. Sets of robots are words, a bit for each."""
+
+    inputs: wp.array2d[float]
+    outputs: wp.array2d[float]
+    x: wp.array[float]
+    y: wp.array[float]
+    to_x: wp.array[float]
+    to_y: wp.array[float]
+    action: wp.array[int]  # executed in the previous iteration, NONE if it did nothing
+    chosen: wp.array[int]
+    setting: wp.array[int]
+    heuristic: wp.array[int]
+    energy: wp.array[float]
+    # iteration of detection; "undetected at t" is detected >= t
+    detected: Annotated[wp.array[int], "rocks"]
+    cover: Annotated[wp.array[wp.uint64], "robots", "words"]
+    covered: wp.array[int]
+    covered_range: wp.array[float]  # largest disc already marked at the present place
+    value: wp.array[float]
+    fitness: wp.array[float]
+    counts: wp.array[int]
+    switches: wp.array[int]
+    performance: wp.array[float]  # value, area
+    # What is kept. changed: who has moved or does something else than in the previous iteration.
+    changed: Annotated[wp.array[wp.uint64], "team"]
+    crowd: wp.array[wp.uint64]  # who may be sensed, or be in the way
+    company: wp.array[wp.uint64]  # whose detection may overlap
+    mates: wp.array[wp.uint64]  # whose detection does overlap, with a setting that may fit
+    box: wp.array[int]  # first and last column and row of cells where both reach
+    hopeful: wp.array[int]  # whether a rock was left there that both may detect
+    sees_rovers: wp.array[int]  # whether a rover sensor is not 0
+    looked: wp.array[int]  # setting with which ``rocks`` was summed up at this place, or NONE
+    rocks: Annotated[wp.array[int], "robots", "octants"]  # in 1 / UNIT
+    shown: wp.array[int]  # what the rock sensors read: OFF, OLD or NEW
+    closest: Annotated[wp.array[float], "robots", "octants"]  # squared distance of a rover
+    # What an iteration or the outcome adds up, in integers.
+    gain: wp.array[int]
+    gain_near: wp.array[wp.int64]  # in 1 / UNIT^2
+    total: Annotated[wp.array[int], "measures"]
+    # Lists of the iteration, and their lengths.
+    n_listed: Annotated[wp.array[int], "lists"]
+    scanning: wp.array[int]
+    covering: wp.array[int]
+    detecting: wp.array[int]
+
+
+@wp.func
+def n_parts() -> int:
+    """Return how many items one scan is: a single one if one lane does all."""
+    return wp.where(n_lanes() == 1, 1, PARTS)
+
+
+@wp.func
+def rock_cell(v: float) -> int:
+    """Return the row or column of the rock grid that a coordinate lies in."""
+    return wp.clamp(int(v * float(ROCK_CELLS)), 0, ROCK_CELLS - 1)
+
+
+@wp.func
+def is_activation(a: int) -> bool:
+    """Return whether an action is a detection with one of the three settings."""
+    return a != NONE and a != MOVE
+
+
+@wp.func
+def of_setting(of: wp.vec3f, a: int) -> float:
+    """Return one of three numbers; no array is kept for it, as ``of[a]`` would."""
+    return wp.where(a == 0, of[0], wp.where(a == 1, of[1], of[2]))
