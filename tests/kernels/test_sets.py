@@ -18,7 +18,7 @@ def walk(some: wp.array[wp.uint64], members: wp.array[int], found: wp.array[int]
     some[0] = all_of_them
     for k in range(64):
         found[k] = int(has(all_of_them, k))
-    at = 64
+    at = found.shape[0] // 2
     while all_of_them != wp.uint64(0):
         found[at] = lowest(all_of_them)
         all_of_them = without_lowest(all_of_them)
