@@ -226,7 +226,8 @@ def test_khepera_sensors_are_the_kernels():
     assert float(khepera.RADIUS) == pursuit.RADIUS
     infrared, light = playback_of(epoch("pursuit/team-7")).sensor_groups
     for k in range(8):
-        way = khepera.LOOK_X[k], khepera.LOOK_Y[k]
+        m, side = (k, 1) if k < 4 else (7 - k, -1)  # those on the right mirror those on the left
+        way = khepera.LOOK_X[m], side * khepera.LOOK_Y[m]
         assert (math.cos(light.angles[k]), math.sin(light.angles[k])) == pytest.approx(way)
     assert infrared.angles == light.angles
     assert infrared.turns

@@ -18,7 +18,13 @@ from conevo.parameters import parameters
 from conevo.rng import stream
 from conevo.terms import counted
 from conevo.worlds.protocol import Scenarios, Simulation, World, kernel_params
-from conevo.worlds.pursuit.bodies import N_OBSTACLES, PursuitConstants, PursuitScene, PursuitTeam
+from conevo.worlds.pursuit.bodies import (
+    N_OBSTACLES,
+    SLOTS,
+    PursuitConstants,
+    PursuitScene,
+    PursuitTeam,
+)
 
 __all__ = ["ArenaParams", "ArenaScenarios", "draw_scenarios", "simulate"]
 
@@ -52,6 +58,16 @@ class ArenaParams:
     def prey_speed_cm(self) -> float:
         """Speed of a prey at full command, cm per iteration."""
         return self.max_speed_cm * self.prey_speed
+
+    @property
+    def sight_cm(self) -> float:
+        """Distance up to which a body may be seen, between centres."""
+        return self.sensor_range_cm + 2 * float(RADIUS)
+
+    @property
+    def touch_cm(self) -> float:
+        """Distance up to which two bodies, or their moves, may meet; and a little more."""
+        return 2 * (float(RADIUS) + max(self.max_speed_cm, self.prey_speed_cm)) + 0.1
 
     @property
     def cone(self) -> tuple[float, float]:
@@ -182,7 +198,9 @@ def simulate(
     robots = world.n_robots
     p = kernel_params(PursuitConstants, world.params, world, team_is_prey=team_is_prey, **given)
     prey = 1 if team_is_prey else bodies - robots
-    sizes = {"bodies": bodies, "sensors": 8, "prey": prey, "window": p.capture_window}
+    slots = max(1, -(-p.prey_hidden // int(SLOTS))) * int(SLOTS)
+    sizes = {"bodies": bodies, "sensors": 8, "wheels": 2, "prey": prey, "slots": slots}
+    sizes["window"] = p.capture_window
     return Simulation(
         state=PursuitTeam,
         sizes=sizes,

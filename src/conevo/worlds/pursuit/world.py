@@ -36,7 +36,8 @@ Choices, all declared in ``PursuitParams``, ``ArenaParams`` or here:
 Version history:
 
 - v1: first version.
-- v2: sine, cosine and arc tangent of kernels are the same bits on every device.
+- v2: sine, cosine and arc tangent of kernels are the same bits on every device; the ways of a prey
+  are summed up in integers.
 """
 
 from collections.abc import Sequence
