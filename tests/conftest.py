@@ -2,6 +2,7 @@
 
 import os
 from contextlib import contextmanager
+from types import SimpleNamespace
 
 import pytest
 
@@ -23,6 +24,22 @@ def pytest_collection_modifyitems(config, items):
     if gone:
         config.hook.pytest_deselected(items=gone)
         items[:] = [item for item in items if item not in set(gone)]
+
+
+@pytest.fixture
+def two_cards(monkeypatch):
+    """Pretend that this machine has two CUDA devices; the CPU plays what they are given."""
+    from conevo.worlds import rollout
+
+    known = [SimpleNamespace(alias=f"cuda:{k}") for k in range(2)]
+    monkeypatch.setattr("warp.get_cuda_devices", lambda: known)
+    real = rollout.Rollout
+
+    def on_the_cpu(world, controller=None, n_threads=None, device="cpu"):
+        assert device in ("cpu", "cuda", "cuda:0", "cuda:1")
+        return real(world, controller, n_threads)
+
+    monkeypatch.setattr(rollout, "Rollout", on_the_cpu)
 
 
 @pytest.fixture

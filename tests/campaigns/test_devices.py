@@ -10,24 +10,19 @@ import pytest
 import conevo
 from campaigns.plans import tiny_campaign
 from conevo.campaigns import devices, slurm, work
-from conevo.campaigns.devices import next_device, parse_devices
+from conevo.campaigns.devices import devices_here, next_device, parse_devices
 from conevo.campaigns.executors.protocol import Ending, Job
 from conevo.campaigns.executors.registry import make_executor
 from conevo.campaigns.executors.worker import worker_command
+from conevo.cli.campaign_run import ready
 from conevo.cli.main import main
 from conevo.errors import EnvironmentFailure, UsageError
+from conevo.runs.time_limit import TimeLimit
 
 
 @pytest.fixture
 def campaign(tmp_path):
     return tiny_campaign(tmp_path / "campaigns")
-
-
-@pytest.fixture
-def two_gpus(monkeypatch):
-    """Pretend that this machine has two GPUs; nothing is compiled for them."""
-    known = [SimpleNamespace(alias=f"cuda:{k}") for k in range(2)]
-    monkeypatch.setattr("warp.get_cuda_devices", lambda: known)
 
 
 class Recorder:
@@ -52,7 +47,7 @@ class Recorder:
 @pytest.mark.parametrize(
     ("text", "expected"),
     [("cpu", ("cpu",)), ("cuda", ("cuda",)), ("cuda:1", ("cuda:1",)),
-     ("cuda:0, cuda:3", ("cuda:0", "cuda:3"))],
+     ("cuda:0, cuda:3", ("cuda:0", "cuda:3")), ("auto", ("auto",))],
 )  # fmt: skip
 def test_devices_are_named_as_warp_does(text, expected):
     assert parse_devices(text) == expected
@@ -62,12 +57,13 @@ def test_devices_are_named_as_warp_does(text, expected):
     ("text", "says"),
     [
         ("", "'' is not a device"),
-        ("gpu", "'gpu' is not a device; allowed: cpu, cuda, cuda:0, or several"),
+        ("gpu", "'gpu' is not a device; allowed: auto, cpu, cuda, cuda:0, or several"),
         ("cuda:0,", "'' is not a device"),
         ("cuda:0;reboot", "is not a device"),
         ("cuda:1,cuda:1", "a device is listed twice"),
         ("cpu,cuda:0", "several devices are written cuda:0,cuda:1"),
         ("cuda,cuda:0", "several devices are written cuda:0,cuda:1"),
+        ("auto,cuda:0", "several devices are written cuda:0,cuda:1"),
     ],
 )
 def test_what_is_not_a_device_is_refused(text, says):
@@ -79,6 +75,7 @@ def test_workers_use_devices_in_turn():
     assert next_device(["cuda:0", "cuda:1"], []) == "cuda:0"
     assert next_device(["cuda:0", "cuda:1"], ["cuda:0"]) == "cuda:1"
     assert next_device(["cuda:0", "cuda:1"], ["cuda:1", "cuda:0", "cuda:1"]) == "cuda:0"
+    assert next_device([], [None, None]) is None
 
 
 def test_every_worker_slot_has_a_device(campaign):
@@ -102,6 +99,9 @@ def test_the_device_reaches_the_run_that_is_begun(campaign, monkeypatch):
     monkeypatch.setattr(sys.stdin, "isatty", lambda: True, raising=False)
     work.main()
     assert asked == ["cuda:1", 1]  # nothing was begun, and so nothing finished
+    monkeypatch.setattr(sys, "argv", ["work", *worker_command(Job(campaign.path, label, 1))[-3:]])
+    work.main()
+    assert asked[2:] == ["cpu", 1]  # where none is named
 
 
 def test_a_device_that_is_not_here_ends_a_campaign_before_a_run_is_begun(campaign, capsys):
@@ -118,27 +118,54 @@ def test_a_device_that_is_not_here_ends_a_campaign_before_a_run_is_begun(campaig
     assert not (campaign.path / "ledger.sqlite").exists()
 
 
-def test_devices_that_are_here_are_accepted(two_gpus):
+def test_devices_that_are_here_are_accepted(two_cards):
     assert make_executor("processes", 2, devices=("cuda:0", "cuda:1")).cores == 2
     with pytest.raises(EnvironmentFailure, match="'cuda:2': allowed here: cpu, cuda:0, cuda:1"):
         make_executor("processes", 2, devices=("cuda:2",))
 
 
-def test_a_run_goes_on_where_it_was_begun_or_says_that_it_cannot(campaign):
-    label = next(iter(campaign.planned))
+def test_auto_is_every_card_or_the_cpu(two_cards, monkeypatch):
+    assert devices_here(("auto",)) == ("cuda:0", "cuda:1")
+    asked = {"executor": "processes", "cores": 2, "threads": 1, "address": None, "store": None}
+    asked |= {"limit": TimeLimit(None), "as_json": False, "quiet": True}
+    assert ready(**asked, device="auto").devices == ("cuda:0", "cuda:1")
+    monkeypatch.setattr("warp.get_cuda_devices", list)
+    assert ready(**asked, device="auto").devices == ("cpu",)
+    assert ready(**asked, device=None).devices == ()
+
+
+def test_a_run_goes_on_where_it_was_on_the_cpu_or_on_the_device_that_is_named(campaign, caplog):
+    label, other = list(campaign.planned)[:2]
     path = campaign.places.run(label)
     run = work.start(campaign.planned[label].configs()[0], path, threads=1)
     about = json.loads((path / "provenance.json").read_text())
     (path / "provenance.json").write_text(json.dumps(about | {"device": "cuda:7"}))
-    assert not work.carry_out(campaign.path, label, 1)
+    assert not work.carry_out(campaign.path, label, 1, device="cuda:7")
     ended = json.loads(campaign.places.ended(label).read_text())
     assert ended["origin"] == "machine"
-    assert ended["message"].startswith(
-        f"{path} was started on cuda:7 and continues only there: device 'cuda:7': "
-    )
-    (path / "provenance.json").write_text(json.dumps(about))
-    assert work.carry_out(campaign.path, label, 1, device="cuda:7")  # begun on the CPU
+    assert ended["message"].startswith("device 'cuda:7': ")
+    assert work.carry_out(campaign.path, label, 1)
     assert run.status == "finished"
+    assert [session["device"] for session in run.provenance["sessions"]] == ["cpu"]
+    assert work.carry_out(campaign.path, other, 1, device="auto")
+    about = json.loads((campaign.places.run(other) / "provenance.json").read_text())
+    assert about["device"] == about["sessions"][0]["device"] == devices_here(("auto",))[0]
+
+
+def test_who_interrupts_a_campaign_on_cards_is_told_how_it_goes_on_there(
+    two_cards, campaign, monkeypatch, capsys
+):
+    def interrupted(*_, **how):
+        assert how["devices"] == ("cuda:0", "cuda:1")
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("conevo.campaigns.campaign.Campaign.carry_on", interrupted)
+    with pytest.raises(SystemExit) as ended:
+        main(["campaign", "start", str(campaign.path), "--device", "auto"])
+    assert ended.value.code == 130
+    assert capsys.readouterr().err.endswith(
+        f"continue with: conevo campaign start {campaign.path} --device cuda:0,cuda:1\n"
+    )
 
 
 # --- clusters -------------------------------------------------------------------------------------
@@ -158,6 +185,9 @@ def test_a_slurm_task_has_its_device_and_looks_for_it_first(campaign, tmp_path):
     assert not (campaign.path / "runs").exists()
     text = script.read_text()
     assert '"$SLURM_CPUS_PER_TASK" cuda:7 \\\n' in text
+    text = slurm.write_array(campaign.path, labels, device="auto").read_text()
+    assert '"$SLURM_CPUS_PER_TASK" auto \\\n' in text
+    assert "campaigns.devices" not in text  # it is there on every node
     with pytest.raises(UsageError, match="a task of the array has one device"):
         slurm.write_array(campaign.path, labels, device="cuda:0,cuda:1")
 
@@ -218,7 +248,16 @@ def test_a_ray_task_asks_for_a_gpu_where_its_device_is_one(campaign, ray_with):
     executor.submit(Job(campaign.path, label, 1))
     (on_gpu, words), (on_cpu, others) = fake.asked
     assert (on_gpu["num_gpus"], on_gpu["num_cpus"], words[-1]) == (1, 1, "cuda")
-    assert ("num_gpus" in on_cpu, others[-1]) == (False, "cpu")
+    assert ("num_gpus" in on_cpu, others[-1]) == (False, None)
+
+
+@pytest.mark.parametrize(("gpus", "asked"), [(2, 1), (0, None)])
+def test_auto_is_a_gpu_per_task_where_ray_has_any(campaign, ray_with, gpus, asked):
+    label = next(iter(campaign.planned))
+    fake = ray_with(gpus)
+    make_executor("ray", 4, devices=("auto",)).submit(Job(campaign.path, label, 1, "auto"))
+    ((resources, words),) = fake.asked
+    assert (resources.get("num_gpus"), words[-1]) == (asked, "auto")
 
 
 def test_a_ray_cluster_without_gpus_or_with_numbered_ones_is_refused(ray_with):
@@ -226,7 +265,7 @@ def test_a_ray_cluster_without_gpus_or_with_numbered_ones_is_refused(ray_with):
     with pytest.raises(EnvironmentFailure, match="no node has a GPU, for --device cuda"):
         make_executor("ray", 4, devices=("cuda",))
     assert make_executor("ray", 4).cores == 4
-    with pytest.raises(UsageError, match="with the executor ray it is cpu or cuda"):
+    with pytest.raises(UsageError, match="with the executor ray it is auto, cpu or cuda"):
         make_executor("ray", 4, devices=("cuda:0", "cuda:1"))
 
 
@@ -238,7 +277,8 @@ def test_the_check_of_a_node_is_quiet_where_all_is_well(monkeypatch, capsys):
 
 @pytest.mark.parametrize(
     ("device", "code", "words"),
-    [("gpu", 2, "'gpu' is not a device; allowed: cpu, cuda, cuda:N"), ("cuda:", 2, "allowed: cpu"),
+    [("gpu", 2, "'gpu' is not a device; allowed: auto, cpu, cuda, cuda:N"),
+     ("cuda:", 2, "allowed: auto, cpu"),
      ("cuda:7", 3, "device 'cuda:7': ")],
 )  # fmt: skip
 def test_a_name_that_no_device_has_is_the_users_mistake(

@@ -17,6 +17,7 @@ def behaviour_report(
     seed: int | None = None,
     *,
     threads: int | None = None,
+    device: str | None = None,
     rules: Any = None,
 ) -> dict[str, Any]:
     """Observe the fittest team of a run and return what ``conevo behaviours`` prints.
@@ -27,7 +28,7 @@ def behaviour_report(
     Raises:
         UsageError: another world, no generation has finished yet, or made with other kernels.
     """
-    found = observe(run, scenarios, seed, threads=threads, rules=rules)
+    found = observe(run, scenarios, seed, threads=threads, device=device, rules=rules)
     return {
         "run": str(run.path),
         "task": run.config.task,

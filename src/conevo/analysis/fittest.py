@@ -5,13 +5,19 @@ from __future__ import annotations
 from conevo.errors import UsageError, without_team
 from conevo.runs.champions import Team
 from conevo.runs.lab import Lab
+from conevo.runs.provenance import device_of
 from conevo.runs.run import Run
 
 __all__ = ["equip"]
 
 
-def equip(run: Run, threads: int | None = None) -> tuple[Team, Lab]:
+def equip(run: Run, threads: int | None = None, device: str | None = None) -> tuple[Team, Lab]:
     """Return the fittest team of a run and what simulates it.
+
+    Args:
+        run: finished or not.
+        threads: CPU threads, all by default.
+        device: as for ``Run.resume``.
 
     Raises:
         UsageError: no generation has finished yet, or made with other kernels.
@@ -19,7 +25,7 @@ def equip(run: Run, threads: int | None = None) -> tuple[Team, Lab]:
     team, about = run.champion, run.provenance
     if team is None:
         raise without_team(run.path, run.generations())
-    lab = Lab.equip(run.config, threads, about["device"])
+    lab = Lab.equip(run.config, threads, device_of(about, device))
     if lab.simulator.fingerprint != about["kernel_hash"]:
         raise UsageError(
             f"{run.path} was made with other kernels ({about['kernel_hash']}, here "

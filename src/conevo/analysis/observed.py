@@ -85,6 +85,7 @@ def observe(
     seed: int | None = None,
     *,
     threads: int | None = None,
+    device: str | None = None,
     rules: Any = None,
 ) -> Observed:
     """Watch the fittest team of a run in fresh scenarios.
@@ -93,14 +94,14 @@ def observe(
         run: of a world with a study, finished or not.
         scenarios: how many.
         seed: draws other scenarios than those of the run's own testing phase.
-        threads: CPU threads, all by default.
+        threads, device: as for ``Run.resume``.
         rules: by which behaviours are told, those of the study by default.
 
     Raises:
         UsageError: another world, no generation has finished yet, or made with other kernels.
     """
     study = studied(run)
-    team, lab = equip(run, threads)
+    team, lab = equip(run, threads, device)
     return _watched(
         study, team, lab, scenarios, run.config.run.seed if seed is None else seed, rules
     )

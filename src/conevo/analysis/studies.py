@@ -61,7 +61,9 @@ class _Portrait:
         return self.activity.labels
 
 
-def study(run: Run, scenarios: int = 20, *, threads: int | None = None) -> dict[str, Any]:
+def study(
+    run: Run, scenarios: int = 20, *, threads: int | None = None, device: str | None = None
+) -> dict[str, Any]:
     """Study the fittest team of a run in fresh scenarios; writes nothing.
 
     Where a world observes behaviours, these are the castes, and only the specialized ones are
@@ -70,7 +72,7 @@ def study(run: Run, scenarios: int = 20, *, threads: int | None = None) -> dict[
     Args:
         run: of any world, finished or not.
         scenarios: how many for each comparison.
-        threads: CPU threads, all by default; changes no result.
+        threads, device: as for ``Run.resume``; they change no result.
 
     Returns:
         Plain data. scores: rows {study, team, measure, scenario, value} of the studies "lesion" and
@@ -83,7 +85,7 @@ def study(run: Run, scenarios: int = 20, *, threads: int | None = None) -> dict[
     Raises:
         UsageError: no generation has finished yet, or made with other kernels.
     """
-    team, lab = equip(run, threads)
+    team, lab = equip(run, threads, device)
     seed = run.config.run.seed
     fresh = lab.world.scenarios([fold(seed, "test", k) for k in range(scenarios)])
     outcome = lab.simulator.evaluate(*team.as_trial(), fresh)

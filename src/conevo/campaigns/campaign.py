@@ -28,7 +28,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from conevo.campaigns.admission import admit_code
-from conevo.campaigns.devices import CPU, next_device
+from conevo.campaigns.devices import next_device
 from conevo.campaigns.ended import read_ended
 from conevo.campaigns.executors.protocol import Ending, Executor, Job
 from conevo.campaigns.extension import check_plan, settle, texts_of, write_plan
@@ -255,7 +255,7 @@ class Campaign:
         executor: Executor,
         *,
         threads: int = 1,
-        devices: Sequence[str] = (CPU,),
+        devices: Sequence[str] = (),
         watch: Watch | None = None,
         time_limit: float | TimeLimit | None = None,
     ) -> dict[str, Entry]:
@@ -267,7 +267,8 @@ class Campaign:
         Args:
             executor: where runs are carried out.
             threads: CPU threads of a run, at most as many as the executor has cores.
-            devices: on which runs are begun, in turn; the executor must have them.
+            devices: for runs in turn, begun or not; the executor must have them. Without any, runs
+                begin on the CPU and go on where they were.
             watch: called with the campaign and each ending; with None while there is none.
             time_limit: seconds after which it stops, as by ``stop``.
 

@@ -14,7 +14,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from conevo.campaigns.devices import CPU, parse_devices
+from conevo.campaigns.devices import AUTO, CPU, parse_devices
 from conevo.campaigns.executors.worker import ONE_THREAD
 from conevo.campaigns.places import Places
 from conevo.errors import UsageError, shown
@@ -89,7 +89,7 @@ def write_array(
     hours: float = 24.0,
     at_once: int | None = None,
     options: Sequence[str] = (),
-    device: str = CPU,
+    device: str | None = None,
     python: str = sys.executable,
 ) -> Path:
     """Write ``slurm.sh`` into a campaign's directory; nothing is submitted.
@@ -101,7 +101,8 @@ def write_array(
         hours: time limit of a task; unfinished runs are requeued.
         at_once: tasks that may run together; no limit by default.
         options: of sbatch, for every task: "--gres=gpu:1"; see ``check_request``.
-        device: on which runs are begun: "cpu" or a CUDA device of every node.
+        device: "auto", "cpu" or a CUDA device of every node; by default runs begin on the CPU and
+            go on where they were.
         python: the interpreter on the nodes.
 
     Raises:
@@ -115,6 +116,7 @@ def write_array(
     root = root.resolve()
     path = root / "slurm.sh"
     tasks = min(len(labels), TASKS)
+    check = CHECK.format(python=shlex.quote(python), device=device)
     text = SCRIPT.format(
         name=re.sub(r"[^A-Za-z0-9._-]", "_", f"conevo-{root.name}"),
         last=tasks - 1,
@@ -129,8 +131,8 @@ def write_array(
         runs="\n".join(shlex.quote(label) for label in labels),
         variables=" ".join(f"{name}=1" for name in ONE_THREAD),
         python=shlex.quote(python),
-        device="" if device == CPU else f" {device}",
-        check="" if device == CPU else CHECK.format(python=shlex.quote(python), device=device),
+        device=f" {device}" if device else "",
+        check="" if device in (None, AUTO, CPU) else check,
     )
     for label in labels:  # what the script would take for finished, and is not any more
         _forget_finished(Places(root).ended(label))
@@ -138,7 +140,7 @@ def write_array(
     return path
 
 
-def check_request(hours: float, options: Sequence[str], device: str = CPU) -> None:
+def check_request(hours: float, options: Sequence[str], device: str | None = None) -> None:
     """Refuse a time limit, options or devices with which the script would not work.
 
     Raises:
@@ -146,7 +148,7 @@ def check_request(hours: float, options: Sequence[str], device: str = CPU) -> No
             not written ``--NAME`` or ``--NAME=VALUE`` in the characters that ``#SBATCH`` lines take
             as they are, is the script's own, or is there twice; several devices.
     """
-    if len(parse_devices(device)) > 1:
+    if device and len(parse_devices(device)) > 1:
         raise UsageError(f"--device {device}: a task of the array has one device, cpu or cuda")
     if not 2 * GRACE <= hours * 3600 <= MOST_HOURS * 3600:
         raise UsageError(

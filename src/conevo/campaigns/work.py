@@ -65,7 +65,7 @@ def carry_out(
     label: str,
     threads: int,
     *,
-    device: str = CPU,
+    device: str | None = None,
     limit: TimeLimit | None = None,
     spent_before: float = 0.0,
 ) -> bool:
@@ -75,7 +75,7 @@ def carry_out(
         root: the campaign's directory.
         label: which of its runs.
         threads: CPU threads; no result depends on it.
-        device: of a run that has not begun; what has is carried on where it was.
+        device: by default the CPU for a run that has not begun, and where it was for one that has.
         limit: the time that is left for evolving, any by default.
         spent_before: core seconds of this process that are not the run's.
 
@@ -133,7 +133,7 @@ def _describe(error: BaseException) -> dict[str, str]:
 
 
 def _evolve(
-    places: Places, planned: PlannedRun, threads: int, device: str, limit: TimeLimit
+    places: Places, planned: PlannedRun, threads: int, device: str | None, limit: TimeLimit
 ) -> Run | Shaping:
     """Return the run, finished by now unless its time was over."""
     path = places.run(planned.label)
@@ -152,11 +152,12 @@ def _evolve(
                 path,
                 planned.overrides,
                 threads=threads,
-                device=device,
+                device=device or CPU,
                 command=command,
             )
         else:
-            found = start(configs[0], path, threads=threads, device=device, command=command)
+            on = device or CPU
+            found = start(configs[0], path, threads=threads, device=on, command=command)
     longer = None if found.run_ids == planned.run_ids else planned.configs()[0]
     if longer and (isinstance(found, Shaping) or found.provenance.get("stem_id") != longer.stem_id):
         raise UsageError(f"{path} is not the run that was planned; move it away and retry")
@@ -165,11 +166,12 @@ def _evolve(
         time.sleep(0.2)
     if found.status == "running":
         raise _InUse
+    how: dict[str, Any] = {"threads": threads, "device": device, "accept_other_code": True}
     if longer and isinstance(found, Run):
         places.study(planned.label).unlink(missing_ok=True)  # of a team that may not stay
-        found.extend_as(longer, threads=threads, accept_other_code=True)
+        found.extend_as(longer, **how)
     if found.status != "finished":
-        found.resume(time_limit=limit, threads=threads, accept_other_code=True)  # it is admitted
+        found.resume(time_limit=limit, **how)
     return found
 
 
@@ -191,7 +193,7 @@ def _frozen(value: Any) -> Any:
 
 def main() -> None:
     """Carry out one run; end when the coordinator does, which holds the other end of stdin."""
-    root, label, threads, device = [*sys.argv[1:], CPU][:4]
+    root, label, threads, *rest = sys.argv[1:]
     # A shell's background jobs ignore interrupts, and what they begin does so, too.
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
@@ -202,7 +204,7 @@ def main() -> None:
     if not sys.stdin.isatty():
         threading.Thread(target=leave_with_coordinator, daemon=True).start()
     try:
-        is_finished = carry_out(Path(root), label, int(threads), device=device)
+        is_finished = carry_out(Path(root), label, int(threads), device=next(iter(rest), None))
     except KeyboardInterrupt:
         os._exit(130)
     sys.stdout.flush()

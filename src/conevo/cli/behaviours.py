@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from conevo.cli.carry import device_option
 from conevo.worlds.registry import WORLDS
 
 if TYPE_CHECKING:
@@ -42,9 +43,15 @@ Try: conevo behaviours runs/hunt
     type=click.IntRange(1, 4096),
     help="CPU threads (default: all); does not change results.",
 )
+@device_option
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def behaviours(
-    run: str, scenarios: int, seed: int | None, threads: int | None, as_json: bool
+    run: str,
+    scenarios: int,
+    seed: int | None,
+    threads: int | None,
+    device: str | None,
+    as_json: bool,
 ) -> None:
     """Classify what the fittest team of a run does."""
     from conevo.analysis.behaviour_report import behaviour_report
@@ -52,7 +59,7 @@ def behaviours(
     from conevo.cli.find import find_run
 
     of = find_run(run)
-    found = behaviour_report(of, scenarios, seed, threads=threads)
+    found = behaviour_report(of, scenarios, seed, threads=threads, device=device)
     click.echo(json.dumps(found) if as_json else _text(found, studied(of)))
 
 

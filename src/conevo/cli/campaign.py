@@ -33,8 +33,9 @@ EXECUTION = (
         help="CPU threads per run; does not change results.",
     ),
     click.option(
-        "--device", metavar="DEVICES", default="cpu", show_default=True,
-        help="cpu, cuda, or several that workers use in turn: cuda:0,cuda:1.",
+        "--device", metavar="DEVICES",
+        help="cpu, cuda, several that workers use in turn (cuda:0,cuda:1), or auto: all CUDA "
+        "devices (default: cpu; runs that have begun go on where they were).",
     ),
     click.option("--address", metavar="ADDRESS", help="With ray: address of a cluster, or auto."),
     click.option(
@@ -149,7 +150,7 @@ def start(
 @click.option("--account", metavar="NAME", help="SLURM account.")
 @click.option("--gres", metavar="GRES", help="Resources of a task, for example gpu:1.")
 @click.option("--mem", metavar="SIZE", help="Memory of a task, for example 8G.")
-@click.option("--device", default="cpu", show_default=True, help="cpu or cuda; see --gres.")
+@click.option("--device", help="auto, cpu (default) or cuda; see --gres.")
 @click.option(
     "--sbatch", "others", metavar="OPTION", multiple=True,
     help="Another sbatch option, for example --sbatch=--constraint=avx512; may be repeated.",
@@ -164,7 +165,7 @@ def slurm(
     threads: int,
     hours: float,
     at_once: int | None,
-    device: str,
+    device: str | None,
     others: tuple[str, ...],
     accept_other_code: bool,
     **named: str | None,
@@ -196,7 +197,8 @@ def slurm(
         device=device,
     )
     click.echo(f"{counted(len(left), 'run')}; submit with: sbatch {quoted(script)}")
-    if device != "cpu" and not any(option.startswith(("--gres", "--gpus")) for option in options):
+    asks = any(option.startswith(("--gres", "--gpus")) for option in options)
+    if device not in (None, "cpu") and not asks:
         click.echo("conevo: note: the tasks ask SLURM for no GPU; add --gres gpu:1", err=True)
 
 

@@ -12,7 +12,7 @@ from typing import Any
 import click
 
 from conevo.campaigns.campaign import Campaign, Stopped
-from conevo.campaigns.devices import parse_devices
+from conevo.campaigns.devices import CPU, devices_here, parse_devices
 from conevo.campaigns.estimate import remaining_seconds
 from conevo.campaigns.executors.protocol import Ending, Executor
 from conevo.campaigns.executors.registry import make_executor
@@ -44,7 +44,7 @@ def ready(
     executor: str,
     cores: int | None,
     threads: int,
-    device: str,
+    device: str | None,
     address: str | None,
     store: str | None,
     limit: TimeLimit,
@@ -57,8 +57,10 @@ def ready(
         UsageError: options that do not go together, an unknown executor or one not installed.
         EnvironmentFailure: there is no such device.
     """
-    devices = parse_devices(device)
+    devices = parse_devices(device) if device else ()
     made = make_executor(executor, cores, address, store, devices)
+    if executor != "ray":  # whose tasks may be on any machine
+        devices = devices_here(devices)
     if threads > made.cores:
         raise UsageError(f"--threads {threads}: only {counted(made.cores, 'core')} to use")
     if executor == "serial":
@@ -70,6 +72,8 @@ def carry_on(campaign: Campaign, execution: Execution) -> int:
     """Finish what is missing, then say what can be done next; returns the exit code."""
     view = View(campaign, execution)
     advice = f"conevo campaign start {quoted(campaign.path)}"
+    if execution.devices not in ((), (CPU,)):
+        advice += f" --device {','.join(execution.devices)}"
     try:
         with view.showing():
             entries = campaign.carry_on(

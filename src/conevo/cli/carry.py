@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 __all__ = [
     "accept_option",
     "carry_on",
+    "device_option",
     "drop_output",
     "output_options",
     "style_of",
@@ -47,6 +48,23 @@ def accept_option(function: Function) -> Function:
         is_flag=True,
         help="Continue results of another version of conevo; show and reports list both.",
     )(function)
+
+
+def device_option(function: Function) -> Function:
+    """Add --device to a command that plays what a run has evolved; None if it is not given."""
+
+    def known(ctx: click.Context, parameter: click.Parameter, name: str | None) -> str | None:
+        from conevo.kernels.devices import refuse_unknown_device
+
+        if name is not None:
+            refuse_unknown_device(name)
+        return name
+
+    return click.option(
+        "--device", metavar="DEVICE", callback=known,
+        help="auto, cpu or cuda (default: that of the run's last session); does not change "
+        "results.",
+    )(function)  # fmt: skip
 
 
 def drop_output() -> None:
@@ -84,6 +102,7 @@ def carry_on(
     limit: TimeLimit,
     length: dict[str, Any] | None = None,
     accept_other_code: bool = False,
+    device: str | None = None,
 ) -> None:
     """Carry a run or a shaping on to its end, then print a summary and what can be done next.
 
@@ -94,6 +113,7 @@ def carry_on(
         limit: the time that is left.
         length: of a run, where it is to end instead: arguments of ``Run.extend``.
         accept_other_code: go on although another conevo made it so far.
+        device: by default the one of its last session.
     """
     from conevo.cli.progress import watching
     from conevo.cli.stages import print_shaping_end
@@ -109,11 +129,14 @@ def carry_on(
         if not isinstance(found, Run):
             of, before = len(found.outlines), len(found.generations()) - len(run.generations())
         if length:
-            run.extend(**length, threads=threads, accept_other_code=accept_other_code)
+            run.extend(
+                **length, threads=threads, device=device, accept_other_code=accept_other_code
+            )
         with watching(run, style, stage, of, before) as watch:
             run.resume(
                 time_limit=limit,
                 threads=threads,
+                device=device,
                 watch=watch,
                 remark=remark,
                 accept_other_code=accept_other_code,
@@ -133,7 +156,7 @@ def carry_on(
         if isinstance(found, Run):
             carry(found)
         else:
-            found.carry_on(carry, threads, accept_other_code)
+            found.carry_on(carry, threads, device, accept_other_code)
     except (KeyboardInterrupt, BrokenPipeError) as error:
         if isinstance(error, BrokenPipeError):
             drop_output()

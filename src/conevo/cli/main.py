@@ -5,6 +5,7 @@ from __future__ import annotations
 import atexit
 import errno
 import io
+import logging
 import math
 import os
 import signal
@@ -83,6 +84,17 @@ class Verbs(click.Group):
         """Write the table without loading the verbs."""
         with formatter.section("Commands"):
             formatter.write_dl(list(VERBS.items()))
+
+
+class Notes(logging.Handler):
+    """Prints what the library has to say, a line each."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Print one."""
+        click.echo(f"conevo: note: {' '.join(record.getMessage().split())}", err=True)
+
+
+NOTES = Notes()
 
 
 def fail(message: str, code: int) -> NoReturn:
@@ -171,6 +183,7 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     """
     _ready_streams()
     _count_interrupts_once()
+    logging.getLogger("conevo").addHandler(NOTES)
     try:
         words = list(sys.argv[1:] if arguments is None else arguments)
         for word in words:

@@ -47,7 +47,10 @@ OPTIONS = (
         "--threads", type=click.IntRange(1, 4096),
         help="CPU threads (default: all); does not change results."
     ),
-    click.option("--device", default="cpu", show_default=True, help="cpu or cuda."),
+    click.option(
+        "--device", default="cpu", show_default=True,
+        help="cpu, cuda or auto (cuda if there is one); does not change results.",
+    ),
     click.option("--out", metavar="DIR", help="Output directory (default: a new one under runs/)."),
     time_limit_option,
 )  # fmt: skip

@@ -9,6 +9,7 @@ import click
 from conevo.cli.carry import (
     accept_option,
     carry_on,
+    device_option,
     output_options,
     style_of,
     time_limit_option,
@@ -39,6 +40,7 @@ __all__ = ["resume"]
     type=click.IntRange(1, 4096),
     help="CPU threads (default: all); does not change results.",
 )
+@device_option
 @accept_option
 @output_options
 def resume(
@@ -48,6 +50,7 @@ def resume(
     target: str | None,
     limit: TimeLimit,
     threads: int | None,
+    device: str | None,
     accept_other_code: bool,
     as_json: bool,
     quiet: bool,
@@ -55,9 +58,9 @@ def resume(
 ) -> None:
     """Continue RUN (a directory, or the beginning of its name in runs/) from its last checkpoint.
 
-    The result is the same, bit for bit, as that of a run that was never interrupted. With
-    --generations or --budget-evaluations a finished run is extended; its result is then that of a
-    run planned that long.
+    The result is the same, bit for bit, as that of a run that was never interrupted, on whatever
+    device. With --generations or --budget-evaluations a finished run is extended; its result is
+    then that of a run planned that long.
 
     Try: conevo resume runs/first --generations 100
     """
@@ -70,7 +73,7 @@ def resume(
     }
     length = {name: value for name, value in length.items() if value is not None}
     style = style_of(as_json, quiet, verbose)
-    carry_on(find(run), threads, style, limit, length, accept_other_code)
+    carry_on(find(run), threads, style, limit, length, accept_other_code, device)
 
 
 def _target(text: str) -> float | str:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from conevo.cli.carry import device_option
 from conevo.errors import UsageError
 
 if TYPE_CHECKING:
@@ -41,6 +42,7 @@ OPTIONS = (
         "--threads", type=click.IntRange(1, 4096),
         help="CPU threads (default: all); does not change results."
     ),
+    device_option,
 )  # fmt: skip
 
 
@@ -58,6 +60,7 @@ def trajectories(
     beside_generation: int | None,
     epoch: int | None,
     threads: int | None,
+    device: str | None,
 ) -> list[Trajectory]:
     """Return the trajectory that is asked for, or the two.
 
@@ -66,10 +69,10 @@ def trajectories(
     """
     if beside is None and beside_generation is not None:
         raise UsageError("--beside-generation needs --beside RUN")
-    first = _trajectory(what, generation, epoch, threads, None)
+    first = _trajectory(what, generation, epoch, threads, device, None)
     if beside is None:
         return [first]
-    second = _trajectory(beside, beside_generation, None, threads, first)
+    second = _trajectory(beside, beside_generation, None, threads, device, first)
     for key in ("task", "scenario", "params"):
         if first.about[key] != second.about[key]:
             raise UsageError(f"{what} and {beside} cannot be shown side by side: different {key}s")
@@ -81,6 +84,7 @@ def _trajectory(
     generation: int | None,
     epoch: int | None,
     threads: int | None,
+    device: str | None,
     like: Trajectory | None,
 ) -> Trajectory:
     from conevo.cli.find import find_run
@@ -94,7 +98,8 @@ def _trajectory(
         return Trajectory.load(Path(text))
     run = find_run(text)
     with bar(f"evolving {run.path.name} again") as progress:
-        return record(run, generation, epoch or 0, threads=threads, like=like, progress=progress)
+        how: dict[str, Any] = {"threads": threads, "device": device}
+        return record(run, generation, epoch or 0, **how, like=like, progress=progress)
 
 
 def playbacks(seen: list[Trajectory], *names: str | None) -> list[Playback]:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from conevo.cli.carry import device_option
 from conevo.errors import UsageError
 
 if TYPE_CHECKING:
@@ -32,6 +33,7 @@ __all__ = ["test"]
     type=click.IntRange(1, 4096),
     help="CPU threads (default: all); does not change results.",
 )
+@device_option
 @click.option("--stages", is_flag=True, help="For a shaping: test in every stage's environment.")
 @click.option(
     "--on", metavar="ENVIRONMENT",
@@ -51,6 +53,7 @@ def test(
     scenarios: int | None,
     seed: int | None,
     threads: int | None,
+    device: str | None,
     stages: bool,
     on: str | None,
     settings: tuple[str, ...],
@@ -75,7 +78,7 @@ def test(
         shaping = find_shaping(run)
         for stage in shaping.stages[-1:]:
             note_other_code(stage)
-        results = shaping.test(scenarios, seed, threads=threads)
+        results = shaping.test(scenarios, seed, threads=threads, device=device)
         click.echo(json.dumps(results) if as_json else stages_test_text(results))
         return
     found = find_run(run)
@@ -85,10 +88,10 @@ def test(
         from conevo.runs.assignments import parse_assignments
 
         world = parse_assignments(settings)
-        both = found.test_under(on, world, robots, scenarios, seed, threads=threads)
+        both = found.test_under(on, world, robots, scenarios, seed, threads=threads, device=device)
         click.echo(json.dumps(both) if as_json else conditions_text(found, both))
         return
-    result = found.test(scenarios, seed, threads=threads)
+    result = found.test(scenarios, seed, threads=threads, device=device)
     click.echo(json.dumps(result) if as_json else test_text({"champion": result}))
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from conevo.cli.browser import open_while_serving
+from conevo.cli.carry import device_option
 
 if TYPE_CHECKING:
     from conevo.replay.live.watched import Watched
@@ -24,8 +25,9 @@ __all__ = ["watch"]
     default=0,
     help="Port to serve on (default: any free port).",
 )
+@device_option
 @click.option("--no-browser", is_flag=True, help="Print the page's address; do not open it.")
-def watch(what: str | None, port: int, no_browser: bool) -> None:
+def watch(what: str | None, port: int, device: str | None, no_browser: bool) -> None:
     """Serve a page that follows RUN, CAMPAIGN, or everything in runs/ and campaigns/.
 
     Only this machine can reach it. It reads files and writes none; stop it with Ctrl-C.
@@ -41,7 +43,7 @@ def watch(what: str | None, port: int, no_browser: bool) -> None:
         if not no_browser:
             open_while_serving(address)
 
-    serve(watched, port, lambda label: _champion_page(*watched.champion(label)), on_ready)
+    serve(watched, port, lambda label: _champion_page(*watched.champion(label), device), on_ready)
 
 
 def _watched(what: str | None) -> Watched:
@@ -57,11 +59,11 @@ def _watched(what: str | None) -> Watched:
 
 
 @lru_cache(maxsize=8)
-def _champion_page(path: Path, generation: int) -> str:
+def _champion_page(path: Path, generation: int, device: str | None) -> str:
     """Return the replay of a run's champion; made again when ``generation`` is another one."""
     from conevo.replay.page import replay_page
     from conevo.replay.playback import playback_of
     from conevo.replay.recording import record
     from conevo.runs.run import Run
 
-    return replay_page([playback_of(record(Run(path)))])
+    return replay_page([playback_of(record(Run(path), device=device))])

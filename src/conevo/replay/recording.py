@@ -29,6 +29,7 @@ def record(
     epoch: int = 0,
     *,
     threads: int | None = None,
+    device: str | None = None,
     like: Trajectory | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Trajectory:
@@ -38,7 +39,7 @@ def record(
         run: finished or not.
         generation: whose fittest team; by default the champion.
         epoch: number of the scenario among those that the run's testing phase draws, from 0.
-        threads: CPU threads, all by default; changes no result.
+        threads, device: as for ``Run.resume``; they change no result.
         like: another run's trajectory of the same task: its scenario is played instead.
         progress: told the generations done and wanted while the run is evolved again.
 
@@ -46,7 +47,7 @@ def record(
         UsageError: no generation has finished yet, no such generation, made with other kernels, or
             the other trajectory is of another task.
     """
-    champion, lab = equip(run, threads)
+    champion, lab = equip(run, threads, device)
     team = champion
     if generation is not None and generation != champion.generation:
         team = run.team_again(generation, lab, progress)

@@ -13,6 +13,7 @@ from conevo.runs.ancestry import refuse_other_controllers
 from conevo.runs.champions import Team
 from conevo.runs.config import RunConfig, resolve
 from conevo.runs.lab import Lab
+from conevo.runs.provenance import device_of
 from conevo.runs.testing import test_team
 
 if TYPE_CHECKING:
@@ -31,6 +32,7 @@ def test_under(
     scenarios: int | None,
     seed: int | None,
     threads: int | None,
+    device: str | None,
 ) -> Record:
     """Test a run's champion in its own world and under changed conditions; writes nothing.
 
@@ -46,10 +48,10 @@ def test_under(
     Raises:
         UsageError: a name or value that is not allowed, or the team cannot play there.
     """
-    own = run.test(scenarios, seed, threads=threads)
+    own = run.test(scenarios, seed, threads=threads, device=device)
     config = _changed(run.config, on, world, robots)
     refuse_other_controllers(str(run.path), run.config, config)
-    lab = Lab.equip(config, threads, run.provenance["device"])
+    lab = Lab.equip(config, threads, device_of(run.provenance, device))
     champion = run.champion
     if champion is None:
         raise RuntimeError("a tested run has a champion")

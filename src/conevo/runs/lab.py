@@ -23,7 +23,7 @@ from conevo.runs.evaluation import Evaluate, make_evaluator
 from conevo.runs.loop import check_budget, price, rehearse
 from conevo.worlds.own_simulator import OwnSimulator
 from conevo.worlds.protocol import Simulator, World
-from conevo.worlds.simulators import simulator
+from conevo.worlds.simulators import device_for, simulator
 
 __all__ = ["Lab", "Price", "check_memory", "layout_of", "price_of", "refuse_other_state"]
 
@@ -125,23 +125,30 @@ def check_memory(config: RunConfig, layout: Layout) -> None:
 
 @dataclass(frozen=True)
 class Lab:
-    """World, method and simulator of one run."""
+    """World, method and simulator of one run, with the device that simulates."""
 
     config: RunConfig
     world: World
     method: Method
     simulator: Simulator
     evaluate: Evaluate
+    device: str
 
     @staticmethod
     def equip(config: RunConfig, threads: int | None, device: str) -> Lab:
         """Build world, method and simulator.
+
+        Args:
+            config: of the run.
+            threads: CPU threads, all by default.
+            device: "auto", "cpu" or "cuda"; the lab's is the one that this is here.
 
         Raises:
             UsageError: the world's functions cannot be compiled.
             EnvironmentFailure: there is no such device, or no place for compiled kernels.
         """
         world = config.build_world()
+        device = device_for(world, device)
         made = simulator(world, config.controller, threads, device)
         return Lab(
             config=config,
@@ -156,6 +163,7 @@ class Lab:
                 fittest_epochs=config.run.fittest_epochs,
                 credit=config.run.credit,
             ),
+            device=device,
         )
 
     @property

@@ -5,7 +5,7 @@
     conevo, python, numpy, warp, platform, cpu, device, code, kernel_hash     when it was started
     world       its header: all that is needed to look at the run without loading the world
     sessions    one for each time it was carried on: started, from_generation, threads, and the
-                same versions, machine and code as above
+                same versions, machine, device and code as above
     finished, stopped_by    when it is
 
 ``code`` is the digest of the code that decides results (``runs.code``).
@@ -13,19 +13,26 @@
 
 from __future__ import annotations
 
+import functools
+import logging
 import platform
 import sys
+from collections.abc import Mapping
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from conevo.errors import shown
+from conevo.kernels.devices import CPU, is_here
 from conevo.runs.code import code_digest, version
 
 if TYPE_CHECKING:
     from conevo.evolution.protocol import Method
     from conevo.worlds.protocol import World
 
-__all__ = ["describe", "describe_machine", "describe_world", "now"]
+__all__ = ["describe", "describe_machine", "describe_world", "device_of", "now"]
+
+log = logging.getLogger("conevo")
 
 
 def describe_machine(device: str) -> dict[str, Any]:
@@ -64,6 +71,30 @@ def describe_world(world: World) -> dict[str, Any]:
         "iterations": world.params.iterations,
         "optimum": getattr(world, "optimum", None),
     }
+
+
+def device_of(provenance: Mapping[str, Any], wanted: str | None) -> str:
+    """Return the name of the device on which a run is to be played.
+
+    Results are the same on all. Unless one is wanted it is the device of the last session, or the
+    CPU where this machine has no such device; that is said once.
+    """
+    if wanted is not None:
+        return wanted
+    last = str([provenance, *provenance["sessions"]][-1].get("device", provenance["device"]))
+    if is_here(last):
+        return last
+    _say_that_there_is_no(last)
+    return CPU
+
+
+@functools.cache
+def _say_that_there_is_no(device: str) -> None:
+    log.warning(
+        "this machine has no %s, on which the run was last played: it is played on the cpu, with "
+        "the same results",
+        shown(device),
+    )
 
 
 def now() -> str:

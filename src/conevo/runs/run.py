@@ -8,7 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from conevo.errors import EnvironmentFailure, UsageError, without_team
+from conevo.errors import UsageError, without_team
 from conevo.runs import provenance
 from conevo.runs.code import last_code, refuse_other_code
 from conevo.runs.directory import CONFIG, refuse_existing
@@ -56,7 +56,7 @@ def evolve(
         config: a TOML file with settings, for example the ``config.toml`` of another run.
         overrides: single settings, for example ``{"run.generations": 5}``.
         threads: CPU threads, all by default; results do not depend on it.
-        device: "cpu" or "cuda".
+        device: "cpu", "cuda", or "auto": "cuda" if there is one; results do not depend on it.
         progress: print a line per generation.
         origin: a finished run with whose populations this one begins, if its controllers fit.
         of_champion: breed the populations from the origin's champion instead.
@@ -92,7 +92,7 @@ def start(
         config: what to run.
         out: the run's directory; by default a new one under ``runs/``.
         threads: CPU threads, all by default.
-        device: "cpu" or "cuda".
+        device: "cpu", "cuda", or "auto": "cuda" if there is one; results do not depend on it.
         command: what the provenance says the run was started with.
         origin: a finished run; the new one begins with the populations that it ended with, which
             are copied into the new directory, and is otherwise as any other.
@@ -116,7 +116,7 @@ def start(
         "command": command,
         "kernel_hash": lab.simulator.fingerprint,
         "created": provenance.now(),
-        **provenance.describe_machine(device),
+        **provenance.describe_machine(lab.device),
         **provenance.describe(lab.world, lab.method),
         **ancestry,
         "sessions": [],
@@ -262,6 +262,7 @@ class Run:
         target: float | Literal["none"] | None = None,
         time_limit: float | TimeLimit | None = None,
         threads: int | None = None,
+        device: str | None = None,
         watch: Watch | None = None,
         remark: Callable[[str], None] | None = None,
         accept_other_code: bool = False,
@@ -275,6 +276,7 @@ class Run:
             time_limit: seconds after which it stops at a checkpoint; its status is then
                 "interrupted", and resuming it again carries it on.
             threads: CPU threads, all by default.
+            device: by default the one of the last session, or the CPU where that is not here.
             watch: called with the run and the record of each finished generation.
             remark: told about a checkpoint that could not be used.
             accept_other_code: go on although another conevo made the run so far; it is recorded.
@@ -293,13 +295,14 @@ class Run:
                 budget_evaluations,
                 target,
                 threads=threads,
+                device=device,
                 accept_other_code=accept_other_code,
             )
         self.refuse_finished()
         self.refuse_other_code(accept_other_code)
         with self._open():
             self.refuse_finished()
-            lab = self._equip(threads)
+            lab = self._equip(threads, device)
             stopped_by = evolve_on(
                 self._store,
                 lab,
@@ -318,6 +321,7 @@ class Run:
         target: float | Literal["none"] | None = None,
         *,
         threads: int | None = None,
+        device: str | None = None,
         accept_other_code: bool = False,
     ) -> Run:
         """Give the run another length, finished or not; ``resume`` then carries it on.
@@ -329,8 +333,7 @@ class Run:
             generations: the run now ends after this many.
             budget_evaluations: it now spends at most so many team evaluations; 0 is no limit.
             target: it now ends at this main task performance; "none" takes the target away.
-            threads: CPU threads, all by default.
-            accept_other_code: as for ``resume``.
+            threads, device, accept_other_code: as for ``resume``.
 
         Raises:
             UsageError: less than what is done; of a finished run no more than it has, or it was
@@ -343,7 +346,7 @@ class Run:
         refuse_parts(self.path, length)
         self.refuse_other_code(accept_other_code)
         with self._open():
-            self._extend(self.config.of_length(length), threads, is_later=True)
+            self._extend(self.config.of_length(length), threads, device, is_later=True)
         return self
 
     def extend_as(
@@ -351,6 +354,7 @@ class Run:
         config: RunConfig,
         *,
         threads: int | None = None,
+        device: str | None = None,
         accept_other_code: bool = False,
     ) -> Run:
         """Give the run the length that another configuration has; ``resume`` carries it on.
@@ -359,8 +363,7 @@ class Run:
 
         Args:
             config: the run's own but for its length.
-            threads: CPU threads, all by default.
-            accept_other_code: as for ``resume``.
+            threads, device, accept_other_code: as for ``resume``.
 
         Raises:
             UsageError: as ``extend``, or the configuration is of another run.
@@ -368,14 +371,16 @@ class Run:
         """
         self.refuse_other_code(accept_other_code)
         with self._open():
-            self._extend(config, threads)
+            self._extend(config, threads, device)
         return self
 
-    def _extend(self, config: RunConfig, threads: int | None, is_later: bool = False) -> None:
+    def _extend(
+        self, config: RunConfig, threads: int | None, device: str | None, is_later: bool = False
+    ) -> None:
         """Give the run the length that a configuration has; see ``give_length``."""
         from conevo.runs.length import give_length
 
-        lab = give_length(self._store, config, lambda: self._equip(threads), is_later)
+        lab = give_length(self._store, config, lambda: self._equip(threads, device), is_later)
         self.outline, self.config, self._lab = config.outline, config, lab
 
     @contextmanager
@@ -392,6 +397,7 @@ class Run:
         seed: int | None = None,
         *,
         threads: int | None = None,
+        device: str | None = None,
         team: Team | None = None,
     ) -> Record:
         """Re-execute the fittest team so far in fresh scenarios; writes nothing.
@@ -399,7 +405,7 @@ class Run:
         Args:
             scenarios: how many, by default as many as the run's own testing phase.
             seed: draws other scenarios than the run's own testing phase.
-            threads: CPU threads, all by default.
+            threads, device: as for ``resume``.
             team: another run's team, for which the world has robots and networks of the same size.
 
         Raises:
@@ -412,7 +418,7 @@ class Run:
         champion = team or self.champion
         if champion is None:
             raise without_team(self.path, self.generations())
-        return self._test(self._equip(threads), champion, scenarios, seed)
+        return self._test(self._equip(threads, device), champion, scenarios, seed)
 
     def test_under(
         self,
@@ -423,6 +429,7 @@ class Run:
         seed: int | None = None,
         *,
         threads: int | None = None,
+        device: str | None = None,
     ) -> Record:
         """Test the champion under changed conditions; see ``conevo.runs.conditions.test_under``.
 
@@ -430,11 +437,11 @@ class Run:
             on: another environment, of this world or of one with controllers of the same sizes.
             world: settings of the world, for example ``{"world.iterations": 500}``.
             robots: in the team.
-            scenarios, seed, threads: as for ``test``.
+            scenarios, seed, threads, device: as for ``test``.
         """
         from conevo.runs.conditions import test_under
 
-        return test_under(self, on, world or {}, robots, scenarios, seed, threads)
+        return test_under(self, on, world or {}, robots, scenarios, seed, threads, device)
 
     def _test(
         self, lab: Lab, team: Team, scenarios: int | None = None, seed: int | None = None
@@ -463,22 +470,14 @@ class Run:
         """Raise UsageError if other code, unless accepted, made it, or its world is not played."""
         refuse_other_code(self.path, self.outline.task, last_code(self.provenance), is_accepted)
 
-    def _equip(self, threads: int | None) -> Lab:
+    def _equip(self, threads: int | None, device: str | None) -> Lab:
         """Return what the run needs, after checking that it is what it was started with."""
         from conevo.runs.lab import Lab
 
         lab, self._lab = self._lab, None
         about = self.provenance
-        if lab is None:
-            device = about["device"]
-            try:
-                lab = Lab.equip(self.config, threads, device)
-            except EnvironmentFailure as error:
-                if device == "cpu":
-                    raise
-                raise EnvironmentFailure(
-                    f"{self.path} was started on {device} and continues only there: {error}"
-                ) from error
+        if lab is None or device not in (None, lab.device):
+            lab = Lab.equip(self.config, threads, provenance.device_of(about, device))
         if lab.simulator.fingerprint != about["kernel_hash"]:
             raise UsageError(
                 f"{self.path} was made with other kernels ({about['kernel_hash']}, here "

@@ -65,7 +65,7 @@ def evolve_on(
         "started": provenance.now(),
         "from_generation": generation,
         "threads": lab.simulator.n_threads,
-        **provenance.describe_machine(about["device"]),
+        **provenance.describe_machine(lab.device),
     }
     store.write_provenance(about | {"sessions": [*about["sessions"], session]})
 

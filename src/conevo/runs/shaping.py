@@ -25,11 +25,13 @@ from typing import TYPE_CHECKING, Any
 import tomli_w
 
 from conevo.errors import UsageError, without_team
+from conevo.kernels.devices import CPU
 from conevo.reading import check, read_bytes, read_toml
 from conevo.runs.code import last_code, refuse_other_code, sessions_of
 from conevo.runs.directory import CONFIG, SHAPING, Directory, appearing, refuse_existing
 from conevo.runs.durable import is_there, replace_file
 from conevo.runs.outline import Outline, identify, outline_of
+from conevo.runs.provenance import device_of
 from conevo.runs.run import RUNS, Record, Run, Watch, start
 from conevo.runs.time_limit import TimeLimit
 from conevo.terms import quoted
@@ -85,7 +87,7 @@ def start_shaping(
         overrides: single settings, for example ``{"run.generations": 5}``.
         config: a TOML file with settings; ``tasks`` win over the world it names.
         threads: CPU threads, all by default; results do not depend on it.
-        device: "cpu" or "cuda".
+        device: "cpu", "cuda", or "auto": "cuda" if there is one; results do not depend on it.
         command: what the provenance says the stages were started with.
         place: where ``overrides`` came from, for error messages.
 
@@ -107,16 +109,18 @@ def start_shaping(
     if makes := product_of([stage.task for stage in configs]):
         makes.refuse(configs)
     state: State | None = None
+    on: list[str] = []
     for before, stage in zip([configs[0], *configs], configs, strict=False):
         lab = Lab.equip(stage, threads, device)
         state = lab.rehearsed(lab.first_state(state))
+        on.append(lab.device)
         refuse_other_controllers("a stage", before, stage)
     refuse_existing(path, is_new=True)
     with appearing(path) as draft:
         about = {
             "format": FORMAT,
             "command": command,
-            "device": device,
+            "device": CPU if CPU in on else on[0],
             "tasks": [stage.task for stage in configs],
             "run_ids": [stage.run_id for stage in configs],
             "stages": [keep_inputs(stage, draft).tables(draft) for stage in configs],
@@ -217,14 +221,19 @@ class Shaping:
         return {"stage": stage, "task": self.tasks[stage - 1]}
 
     def test(
-        self, scenarios: int | None = None, seed: int | None = None, *, threads: int | None = None
+        self,
+        scenarios: int | None = None,
+        seed: int | None = None,
+        *,
+        threads: int | None = None,
+        device: str | None = None,
     ) -> list[Record]:
         """Re-execute the last stage's fittest team in the environment of every stage begun.
 
         Args:
             scenarios: how many of each, by default as many as the stage's own testing phase.
             seed: draws other scenarios than that.
-            threads: CPU threads, all by default.
+            threads, device: as for ``resume``.
 
         Returns:
             A result for each stage, as ``Run.test`` has it, with the ``stage``, its ``task`` and
@@ -243,7 +252,7 @@ class Shaping:
         return [
             self.place(stage)
             | {"team_of": of}
-            | run.test(scenarios, seed, threads=threads, team=champion)
+            | run.test(scenarios, seed, threads=threads, device=device, team=champion)
             for stage, run in enumerate(stages, start=1)
         ]
 
@@ -275,6 +284,7 @@ class Shaping:
         *,
         time_limit: float | TimeLimit | None = None,
         threads: int | None = None,
+        device: str | None = None,
         watch: Watch | None = None,
         remark: Callable[[str], None] | None = None,
         accept_other_code: bool = False,
@@ -288,6 +298,7 @@ class Shaping:
         Args:
             time_limit: seconds after which it stops at a checkpoint, as ``Run.resume``.
             threads: CPU threads, all by default.
+            device: by default the one of the last session, or the CPU where that is not here.
             watch: called with the stage and the record of each finished generation.
             remark: told about a checkpoint that could not be used.
             accept_other_code: go on although another conevo made it so far; it is recorded.
@@ -302,17 +313,19 @@ class Shaping:
             run.resume(
                 time_limit=limit,
                 threads=threads,
+                device=device,
                 watch=watch,
                 remark=remark,
                 accept_other_code=accept_other_code,
             )
 
-        return self.carry_on(carry, threads, accept_other_code)
+        return self.carry_on(carry, threads, device, accept_other_code)
 
     def carry_on(
         self,
         carry: Callable[[Run, int], object],
         threads: int | None = None,
+        device: str | None = None,
         accept_other_code: bool = False,
     ) -> Shaping:
         """Begin one stage after the other; ``carry`` resumes each to its end.
@@ -320,7 +333,7 @@ class Shaping:
         Args:
             carry: called with a stage that is not finished and its number, from 1. If the stage is
                 not finished after that, the shaping stops there.
-            threads: CPU threads, all by default.
+            threads, device: as for ``resume``.
             accept_other_code: begin a stage although another conevo made those before.
 
         Raises:
@@ -331,7 +344,7 @@ class Shaping:
         with self._directory.locked():
             self.refuse_finished()
             for number in range(1, len(self.outlines) + 1):
-                run = self._stage(number, threads)
+                run = self._stage(number, threads, device)
                 if run.status != "finished":
                     carry(run, number)
                 if run.status != "finished":
@@ -349,16 +362,17 @@ class Shaping:
         if not os.path.lexists(path) or read_bytes(path) != lines.encode():
             replace_file(path, lines.encode())
 
-    def _stage(self, number: int, threads: int | None) -> Run:
+    def _stage(self, number: int, threads: int | None, device: str | None) -> Run:
         """Return a stage, begun by now; the ones before are finished."""
         begun = self.stages
         if number <= len(begun):
             return begun[number - 1]
+        about = begun[-1].provenance if begun else {"device": self._device, "sessions": []}
         return start(
             self.configs[number - 1],
             self._stage_path(number),
             threads=threads,
-            device=self._device,
+            device=device_of(about, device),
             command=self._command,
             origin=begun[-1] if begun else None,
         )

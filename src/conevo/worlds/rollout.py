@@ -15,36 +15,21 @@ import warp as wp
 from conevo.controllers.protocol import Controller
 from conevo.controllers.registry import controller as make_controller
 from conevo.controllers.registry import genome_of, refuse_misfit
-from conevo.errors import EnvironmentFailure, UsageError
+from conevo.errors import UsageError
 from conevo.kernels import engine
 from conevo.kernels.arrays import allocate, dimensions, shapes
-from conevo.kernels.devices import refuse_unknown_device
+from conevo.kernels.devices import device_here
 from conevo.kernels.views import SHARED_BYTES, Near, near_arrays
 from conevo.worlds.contract import refuse_faults, scenario_faults, shapes_of, stages_of
 from conevo.worlds.episode import Job, episode_kernel, loading_kernel
 from conevo.worlds.measures import measures_of
 from conevo.worlds.protocol import Outcome, Scenarios, World
 
-__all__ = ["Rollout", "check_device"]
+__all__ = ["Rollout"]
 
 # Worlds simulated at once: bounds memory, keeps all threads or blocks busy.
 CHUNK = 512
 CUDA_CHUNK = 8192
-
-
-def check_device(device: str) -> None:
-    """Refuse a device that this machine does not have.
-
-    Raises:
-        UsageError: it is not the name of a device.
-        EnvironmentFailure: there is none of this name here.
-    """
-    refuse_unknown_device(device)
-    engine.start()
-    allowed = ["cpu", *(d.alias for d in wp.get_cuda_devices())]
-    if device not in (*allowed, *(["cuda"] if len(allowed) > 1 else [])):
-        why = "no CUDA device on this machine; " if len(allowed) == 1 else ""
-        raise EnvironmentFailure(f"device {device!r}: {why}allowed here: {', '.join(allowed)}")
 
 
 @dataclass
@@ -68,7 +53,7 @@ class Rollout:
         world: the world and environment to run.
         controller: of the robots; by default the one that the world suggests.
         n_threads: CPU threads; all usable ones by default. Results do not depend on it.
-        device: "cpu" or a CUDA device as Warp names it.
+        device: "cpu", a CUDA device as Warp names it, or "auto": a CUDA device if there is one.
         lanes: lanes of a CPU block (for tests of the CUDA form; needs Warp's CPU blocks).
         timed: whether ``cycles`` tells what each phase takes, for benchmarks.
         shared_bytes: shared memory that a block on a CUDA device may take.
@@ -92,10 +77,9 @@ class Rollout:
         engine.start()
         self.world = world
         self.controller = controller or make_controller(world=world)
-        self.device = device
+        self.device = device = device_here(device)
         self.n_threads = n_threads or engine.usable_threads()
         self._chunk = CHUNK if device == "cpu" else CUDA_CHUNK
-        check_device(device)
         with engine.building:
             self._simulation = world.simulation()
             refuse_faults(world, self._simulation)

@@ -6,12 +6,13 @@ from typing import TYPE_CHECKING, Any
 
 from conevo.controllers.registry import refuse_misfit
 from conevo.errors import EnvironmentFailure
+from conevo.kernels.devices import AUTO, CPU, device_here, refuse_unknown_device
 
 if TYPE_CHECKING:
     from conevo.controllers.protocol import Controller
     from conevo.worlds.protocol import Simulator, World
 
-__all__ = ["has_own_simulator", "simulator"]
+__all__ = ["device_for", "has_own_simulator", "simulator"]
 
 
 def has_own_simulator(world: Any) -> bool:
@@ -19,8 +20,23 @@ def has_own_simulator(world: Any) -> bool:
     return hasattr(world, "simulator")
 
 
+def device_for(world: World, name: str) -> str:
+    """Return the device that a name means for a world, "auto" one that plays it.
+
+    Raises:
+        UsageError: it is not the name of a device.
+        EnvironmentFailure: there is no such device, or the world has its own simulator.
+    """
+    if not has_own_simulator(world):
+        return device_here(name)
+    refuse_unknown_device(name)
+    if name not in (AUTO, CPU):
+        raise EnvironmentFailure(f"device {name!r}: {world.name} has its own simulator, on the cpu")
+    return CPU
+
+
 def simulator(
-    world: World, controller: Controller, n_threads: int | None = None, device: str = "cpu"
+    world: World, controller: Controller, n_threads: int | None = None, device: str = CPU
 ) -> Simulator:
     """Return what plays a world with such controllers, ready to play.
 
@@ -31,15 +47,12 @@ def simulator(
     """
     from conevo.kernels.engine import usable_threads
 
+    device = device_for(world, device)
     if not has_own_simulator(world):
         from conevo.worlds.rollout import Rollout
 
         return Rollout(world, controller, n_threads, device).build()
     refuse_misfit(controller, world)
-    if device != "cpu":
-        raise EnvironmentFailure(
-            f"device {device!r}: {world.name} has its own simulator, on the cpu"
-        )
     from conevo.worlds.own_simulator import build_own
 
     return build_own(world, controller, n_threads or usable_threads())

@@ -10,7 +10,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import ClassVar, Protocol
 
-from conevo.campaigns.devices import CPU
 from conevo.runs.time_limit import TimeLimit
 
 __all__ = ["Ending", "Executor", "Job"]
@@ -18,15 +17,16 @@ __all__ = ["Ending", "Executor", "Job"]
 
 @dataclass(frozen=True)
 class Job:
-    """One run to execute, with its number of threads and, if it has not begun, its device.
+    """One run to execute, with its number of threads and its device.
 
-    ``limit`` is for an executor that runs in this process.
+    Without a device it is begun on the CPU, and carried on where it was. ``limit`` is for an
+    executor that runs in this process.
     """
 
     root: Path
     label: str
     threads: int
-    device: str = CPU
+    device: str | None = None
     limit: TimeLimit = field(default_factory=lambda: TimeLimit(None), compare=False)
 
 

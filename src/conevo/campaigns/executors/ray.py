@@ -19,7 +19,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, ClassVar
 
-from conevo.campaigns.devices import CPU
+from conevo.campaigns.devices import AUTO, CPU
 from conevo.campaigns.executors.protocol import Ending, Job
 from conevo.campaigns.executors.worker import spawn, usable_cores, why_lost
 from conevo.campaigns.object_store import ObjectStore
@@ -41,7 +41,8 @@ class RayCluster:
         address: of a cluster that is running, "auto" or "HOST:PORT"; None begins one on this
             machine, which ends with this executor. conevo must be installed on all nodes.
         store: address of an object store, if the nodes do not see the campaign's directory.
-        devices: of its jobs: "cpu", or "cuda" for a GPU per task.
+        devices: of its jobs: "cpu", "cuda" for a GPU per task, or "auto", which is "cuda" where a
+            node has a GPU.
 
     Raises:
         UsageError: Ray is not installed, the object store's address is none, or other devices.
@@ -57,10 +58,10 @@ class RayCluster:
         store: str = "",
         devices: Sequence[str] = (CPU,),
     ) -> None:
-        if not set(devices) <= {CPU, "cuda"}:
+        if not set(devices) <= {AUTO, CPU, "cuda"}:
             raise UsageError(
-                f"--device {','.join(devices)}: with the executor ray it is cpu or cuda; Ray gives "
-                f"every task a GPU of its own"
+                f"--device {','.join(devices)}: with the executor ray it is auto, cpu or cuda; Ray "
+                f"gives every task a GPU of its own"
             )
         os.environ["RAY_USAGE_STATS_ENABLED"] = "0"
         try:
@@ -83,7 +84,8 @@ class RayCluster:
         if not any(nodes):
             self._ray.shutdown()
             raise EnvironmentFailure(f"Ray at {address or 'this machine'}: no node has CPU cores")
-        if set(devices) != {CPU} and not self._ray.cluster_resources().get("GPU"):
+        self._has_gpus = bool(self._ray.cluster_resources().get("GPU"))
+        if "cuda" in devices and not self._has_gpus:
             self._ray.shutdown()
             raise EnvironmentFailure(
                 f"Ray at {address or 'this machine'}: no node has a GPU, for --device cuda"
@@ -102,7 +104,7 @@ class RayCluster:
             if not self._store.has_run(job.label):
                 self._store.put_run(job.root, job.label)
             self._store.forget_ending(job.root, job.label)
-        gpus = {} if job.device == CPU else {"num_gpus": 1}
+        gpus = {"num_gpus": 1} if job.device not in (None, CPU) and self._has_gpus else {}
         task = self._ray.remote(num_cpus=threads, max_retries=RETRIES, **gpus)(_carry)
         self._tasks[task.remote(str(job.root), job.label, threads, uri, job.device)] = job
 
@@ -138,7 +140,7 @@ class RayCluster:
         return Ending(job.label, lost)
 
 
-def _carry(root: str, label: str, threads: int, store: str, device: str = CPU) -> int:
+def _carry(root: str, label: str, threads: int, store: str, device: str | None = None) -> int:
     """Carry a run on, on the node where this is called, and return the worker's exit code."""
     if not store:
         return _supervise(Job(Path(root), label, threads, device))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from conevo.campaigns.devices import CPU, check_here
+from conevo.campaigns.devices import CPU, devices_here
 from conevo.campaigns.executors.local import Processes, Serial
 from conevo.campaigns.executors.protocol import Executor
 from conevo.campaigns.executors.worker import usable_cores
@@ -46,6 +46,6 @@ def make_executor(
     for option, value in (("--address", address), ("--store", store)):
         if value is not None:
             raise UsageError(f"{option} {value}: only the executor ray has one, not {name}")
-    check_here(devices)
+    devices_here(devices)
     kinds: dict[str, Callable[[int], Executor]] = {k.name: k for k in (Serial, Processes)}
     return kinds[name](cores or usable_cores())

@@ -6,7 +6,6 @@ import os
 import subprocess
 import sys
 
-from conevo.campaigns.devices import CPU
 from conevo.campaigns.executors.protocol import Job
 from conevo.campaigns.places import Places
 
@@ -33,7 +32,7 @@ def spawn(job: Job) -> subprocess.Popen[bytes]:
 def worker_command(job: Job) -> list[str]:
     """Return the command that carries a job out."""
     arguments = [str(job.root.resolve()), job.label, str(job.threads)]
-    arguments += [job.device] if job.device != CPU else []
+    arguments += [job.device] if job.device else []
     return [sys.executable, "-m", "conevo.campaigns.work", *arguments]
 
 
