@@ -1,6 +1,6 @@
 """What every world promises, for each environment family of the registry."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -71,6 +71,23 @@ def outcome_arrays(outcome):
 def assert_same_bits(a, b):
     for name, values in outcome_arrays(a).items():
         assert values.tobytes() == outcome_arrays(b)[name].tobytes(), name
+
+
+def test_a_scenario_is_that_of_its_key_whatever_is_drawn_with_it(some_world):
+    many = keys(40)
+    whole, turned = some_world.scenarios(many), some_world.scenarios(many[::-1])
+    assert (len(whole), len(turned)) == (40, 40)
+    player = played(some_world)
+    for field in fields(whole):
+        of_all = getattr(whole, field.name)
+        for e in (0, 17, 39):
+            (alone,) = many[e : e + 1]
+            own = getattr(some_world.scenarios([alone]), field.name)
+            if player.is_shared(field.name):
+                assert np.array_equal(own, of_all, equal_nan=own.dtype.kind == "f"), field.name
+            else:
+                assert own[0].tobytes() == of_all[e].tobytes(), field.name
+                assert own[0].tobytes() == getattr(turned, field.name)[39 - e].tobytes()
 
 
 def test_a_world_is_what_its_entry_says(path, some_world):

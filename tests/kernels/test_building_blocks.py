@@ -15,6 +15,7 @@ from conevo.kernels.geometry import COVER_WORDS, cover_disc, covered_by_any, oct
 from conevo.kernels.outputs import sigmoid, sigmoid_of
 from conevo.kernels.random import uniform
 from conevo.kernels.views import view_of
+from conevo.rng import uniforms
 from oracles import rover_oracle, splitmix
 
 engine.start()
@@ -90,6 +91,7 @@ def test_uniform_is_splitmix_of_its_counter():
     )
     expected = [splitmix.uniform(seed, *map(int, c)) for c in zip(t, a, b, strict=True)]
     assert u.numpy().tolist() == expected
+    assert uniforms(np.array([seed], np.uint64), t, a, b).tolist() == expected  # numpy's too
 
 
 def test_uniform_is_uniform_and_neighbours_are_uncorrelated():

@@ -37,7 +37,7 @@ def played(name: str, seed: int = 2, iterations: int = 240) -> Trajectory:
     heuristic = np.arange(seed, seed + a_world.n_robots, dtype=np.int32) % len(a_world.heuristics)
     heuristic[::3] = -1
     about, channels = record_epoch(
-        Rollout(a_world, n_threads=1), genes, team, fold(2, "test", 0), heuristic
+        Rollout(a_world, n_threads=1), genes, team, fold(4, "test", 0), heuristic
     )
     run = {"method": "cone", "label": f"a team of seed {seed}", "seed": seed}
     return Trajectory(about | run, channels)

@@ -420,7 +420,7 @@ def test_bad_parameters_are_refused_in_one_line(name, value):
 
 def test_what_could_never_be_played_is_refused_in_one_line():
     with pytest.raises(UsageError, match="arena of 10 cm has no room for"):
-        draw_scenarios([1], "pursuit-v2", 10.0, 4, (1, 1), (0, 0), n_sensors=16)
+        draw_scenarios([1], 10.0, 4, (1, 1), (0, 0), n_sensors=16)
     with pytest.raises(UsageError, match=r"capture_predators \(3\) must not be above the 2 pred"):
         world("pursuit/team-1", capture_predators=3)
 

@@ -374,8 +374,8 @@ def test_relabelling_the_rovers_relabels_the_outcome():
         hi_accuracy=1.0,
         separation=0.0,
     )
-    genes, slots = random_team(a_world, 5)
-    scenarios = crowd(a_world.scenarios([fold(5, "relabel")]), 8, 5)
+    genes, slots = random_team(a_world, 6)
+    scenarios = crowd(a_world.scenarios([fold(6, "relabel")]), 8, 6)
     order = stream(5, "order").permutation(8)
     turned = replace(
         scenarios,

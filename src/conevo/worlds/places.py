@@ -1,41 +1,124 @@
-"""Random places in the unit square, apart from each other and from what is in the way."""
+"""Random places in the unit square, apart from each other and from what is in the way.
+
+Of many scenarios at once: every candidate has a number of its own, so that what is drawn for a key
+does not depend on the keys that are drawn with it.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from conevo.errors import UsageError
+from conevo.rng import uniforms
 
-__all__ = ["draw_places"]
+__all__ = ["NoRoom", "draw_places", "first_that_fits"]
 
-Place = npt.NDArray[np.float32]
+MOST = 10_000  # candidates for a place
+
+Ints = npt.NDArray[np.intp]
+Bools = npt.NDArray[np.bool_]
+Floats = npt.NDArray[np.float32]
+Keys = npt.NDArray[np.uint64]
+
+
+class NoRoom(UsageError):
+    """None of the candidates fits."""
+
+
+def first_that_fits(
+    keys: Keys,
+    places: Ints,
+    tried: Ints,
+    n_numbers: int,
+    fits: Callable[[Ints, Floats], Bools],
+) -> Floats:
+    """Return the first candidate of each of P places that fits: numbers in [0, 1) [P, N] float32.
+
+    Args:
+        keys: [P] of the scenarios.
+        places: [P] which of its scenario's places each is.
+        tried: [P] candidates of each place to leave out; counted on to the one that is returned.
+        n_numbers: N, numbers that a candidate has.
+        fits: whether each of C candidates [Q, C, N] for the places with some indices [Q] fits.
+
+    Raises:
+        NoRoom: no candidate fits.
+    """
+    found = np.empty((len(keys), n_numbers), dtype=np.float32)
+    rest, n = np.arange(len(keys)), 1
+    while len(rest):
+        candidates = tried[rest, None, None] + np.arange(n)[:, None]
+        if candidates.max() >= MOST:
+            raise NoRoom(f"none of {MOST} candidates fits")
+        u = uniforms(
+            keys[rest, None, None], candidates, places[rest, None, None], np.arange(n_numbers)
+        )
+        is_right = fits(rest, u)
+        first = is_right.argmax(axis=1)
+        is_found = is_right[np.arange(len(rest)), first]
+        found[rest] = u[np.arange(len(rest)), first]
+        tried[rest] += np.where(is_found, first + 1, n)
+        rest, n = rest[~is_found], min(2 * n, 1024)  # more at once, where few fit
+    return found
 
 
 def draw_places(
-    rng: np.random.Generator, n: int, separation: float, is_free: Callable[[Place], bool]
-) -> Place:
-    """Return places [n, 2] float32, in sides of the square.
+    keys: Keys,
+    n: int,
+    separation: float,
+    is_free: Callable[[Ints, Floats], Bools] | None = None,
+    is_there: Bools | None = None,
+) -> Floats:
+    """Return places [E, n, 2] float32, in sides of the square.
+
+    One after another: each is the first of its candidates that is free and as far as it must be
+    from all before it.
 
     Args:
-        rng: source of the places.
-        n: how many.
+        keys: [E] of the scenarios.
+        n: how many in each.
         separation: least distance of two of them.
-        is_free: whether a place [2] may be taken.
+        is_free: whether places [Q, C, 2], C for each of the scenarios with some indices [Q], may be
+            taken; all may by default.
+        is_there: [E, n] whether there is such a place, at 0 otherwise; all are by default.
 
     Raises:
-        UsageError: there is no room for so many, so far apart.
+        NoRoom: there is no room for so many, so far apart.
     """
-    places = np.empty((n, 2), dtype=np.float32)
-    found = 0
-    for _ in range(100_000):
-        if found == n:
-            return places
-        place = rng.random(2, dtype=np.float32)
-        gaps = np.sum((places[:found] - place) ** 2, axis=1)
-        if is_free(place) and np.all(gaps >= separation**2):
-            places[found] = place
-            found += 1
-    raise UsageError(f"the square has no room for {n} places, {separation:g} apart")
+    there = np.ones((len(keys), n), dtype=np.bool_) if is_there is None else is_there
+    places = np.zeros((len(keys), n, 2), dtype=np.float32)
+    tried = np.zeros((len(keys), n), dtype=np.intp)
+    before = np.tri(n, k=-1, dtype=np.bool_)  # [place, those before it]
+
+    def is_close(e: Ints, k: Any, xy: Floats) -> Bools:
+        """Return whether candidates [Q, C, 2] for places ``k`` are too close to one before."""
+        gaps = ((xy[:, :, None] - places[e, None]) ** 2).sum(axis=3)
+        return ((gaps < separation**2) & (there[e, None] & before[k])).any(axis=2)
+
+    def draw(e: Ints, k: Ints, is_apart: bool) -> None:
+        """Draw the next candidates that fit for places ``k`` [Q] of scenarios ``e`` [Q]."""
+
+        def fits(rest: Ints, xy: Floats) -> Bools:
+            good = np.ones(xy.shape[:2], np.bool_) if is_free is None else is_free(e[rest], xy)
+            return good & ~is_close(e[rest], k[rest, None], xy) if is_apart else good
+
+        begun = tried[e, k]
+        places[e, k] = first_that_fits(keys[e], k, begun, 2, fits)
+        tried[e, k] = begun
+
+    try:
+        e, k = np.nonzero(there)
+        draw(e, k, is_apart=False)
+        e = np.arange(len(keys) if n and separation > 0 else 0)
+        while len(e):  # the first of each scenario that is too close is drawn again, then the next
+            close = is_close(e, np.arange(n), places[e]) & there[e]
+            e, close = e[close.any(axis=1)], close[close.any(axis=1)]
+            draw(e, close.argmax(axis=1), is_apart=True)
+    except NoRoom as error:
+        why = f"the square has no room for {n} places, {separation:g} apart"
+        raise NoRoom(why) from error
+    return places

@@ -80,7 +80,8 @@ has none of these, and is non-specialized.
 Version history:
 
 - v1: first version.
-- v2: sine, cosine and arc tangent of kernels are the same bits on every device.
+- v2: sine, cosine and arc tangent of kernels are the same bits on every device; scenarios are drawn
+  from other random numbers, those of all keys at once.
 """
 
 from collections.abc import Sequence
@@ -93,8 +94,9 @@ from annotated_types import Ge, Gt, Le
 
 from conevo.errors import UsageError
 from conevo.parameters import parameters
-from conevo.rng import stream
+from conevo.rng import fold_all
 from conevo.worlds.gacc.dynamics import FUNCTIONS
+from conevo.worlds.gacc.obstacles import are_clear, draw_obstacles
 from conevo.worlds.gacc.plans import TYPES, Plan, plan
 from conevo.worlds.gacc.state import GaccConstants, GaccScene, GaccTeam
 from conevo.worlds.measures import Measure
@@ -269,53 +271,38 @@ class GaccWorld:
         Raises:
             UsageError: no room for the obstacles, or for the robots.
         """
-        plan = self.plan
-        drawn = [self._draw(key, plan) for key in keys]
-        stacked = {name: np.stack([one[name] for one in drawn]) for name in drawn[0]}
-        return GaccScenarios(plan=plan.parts, seed=np.array(keys, dtype=np.uint64), **stacked)
+        p, plan = self.params, self.plan
+        seed = np.array(keys, dtype=np.uint64)
+        blocks = draw_obstacles(
+            fold_all(seed, "gacc", "obstacles"),
+            plan.n_obstacles,
+            p.home,
+            (p.obstacle_least, p.obstacle_most),
+            p.obstacle_gap,
+        ).astype(np.float32)
+        edge = np.float32(p.home + 1e-6)  # more than float32 rounds
 
-    def _draw(self, key: int, plan: Plan) -> dict[str, npt.NDArray[Any]]:
-        rng = stream(key, "gacc-v1")
-        blocks = self._obstacles(rng, plan.n_obstacles)
-        edge = self.params.home_side / 2 + 1e-6  # more than float32 rounds
-
-        def is_free(place: npt.NDArray[np.float32]) -> bool:
-            if (np.abs(place - np.float32(0.5)) <= edge).all():
-                return False
-            return not ((place >= blocks[:, :2]) & (place <= blocks[:, 2:])).all(axis=1).any()
+        def is_free(e: npt.NDArray[np.intp], xy: npt.NDArray[np.float32]) -> npt.NDArray[np.bool_]:
+            is_home = (np.abs(xy - np.float32(0.5)) <= edge).all(axis=-1)
+            return ~is_home & are_clear(e, xy, blocks)
 
         types = plan.object_types
-        objects = draw_places(rng, len(types), 0.0, is_free)
-        starts = draw_places(rng, self.n_robots, self.params.separation, is_free)
-        left, bottom, right, top = np.ascontiguousarray(blocks.T)
-        return {
-            "object_x": objects[:, 0],
-            "object_y": objects[:, 1],
-            "object_type": types,
-            "left": left,
-            "bottom": bottom,
-            "right": right,
-            "top": top,
-            "start_x": starts[:, 0],
-            "start_y": starts[:, 1],
-        }
-
-    def _obstacles(self, rng: np.random.Generator, n: int) -> npt.NDArray[np.float32]:
-        """Draw rectangles [n, 4], apart from the home area, the walls and each other."""
-        p = self.params
-        half = p.home_side / 2
-        gap = p.obstacle_gap
-        taken = np.array([[0.5 - half, 0.5 - half, 0.5 + half, 0.5 + half]])
-        for _ in range(10_000):
-            if len(taken) > n:
-                return taken[1:].astype(np.float32)
-            sides = rng.uniform(p.obstacle_least, p.obstacle_most, 2)
-            corner = rng.uniform(gap, 1 - gap - sides)
-            block = np.concatenate([corner, corner + sides])
-            beyond = (block[:2] > taken[:, 2:] + gap) | (block[2:] < taken[:, :2] - gap)
-            if beyond.any(axis=1).all():
-                taken = np.vstack([taken, block])
-        raise UsageError(f"the square has no room for {n} obstacles, {gap:g} apart")
+        objects = draw_places(fold_all(seed, "gacc", "objects"), len(types), 0.0, is_free)
+        starts = draw_places(fold_all(seed, "gacc", "starts"), self.n_robots, p.separation, is_free)
+        left, bottom, right, top = (np.ascontiguousarray(blocks[:, :, k]) for k in range(4))
+        return GaccScenarios(
+            object_x=objects[:, :, 0],
+            object_y=objects[:, :, 1],
+            object_type=np.tile(types, (len(seed), 1)),
+            left=left,
+            bottom=bottom,
+            right=right,
+            top=top,
+            start_x=starts[:, :, 0],
+            start_y=starts[:, :, 1],
+            plan=plan.parts,
+            seed=seed,
+        )
 
     def simulation(self) -> Simulation:
         """Return the Warp side of this world."""

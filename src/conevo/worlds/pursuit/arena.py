@@ -15,8 +15,8 @@ from annotated_types import Ge, Gt, Le
 from conevo.errors import UsageError
 from conevo.kernels.khepera import RADIUS
 from conevo.parameters import parameters
-from conevo.rng import stream
-from conevo.terms import counted
+from conevo.rng import fold_all, numbers, uniforms
+from conevo.worlds.places import NoRoom, draw_places
 from conevo.worlds.protocol import Scenarios, Simulation, World, kernel_params
 from conevo.worlds.pursuit.bodies import (
     N_OBSTACLES,
@@ -101,7 +101,6 @@ class ArenaScenarios(Scenarios):
 
 def draw_scenarios(
     keys: Sequence[int],
-    name: str,
     arena_cm: float,
     robots: int,
     others: tuple[int, int],
@@ -114,73 +113,69 @@ def draw_scenarios(
 
     Args:
         keys: of the scenarios.
-        name: of the world.
         arena_cm: side of the arena.
         robots: R, robots of the team.
         others: least and most of the other bodies.
         obstacles: least and most of the obstacles.
         n_sensors: S.
         prey: weights of the prey's networks, [Q * H, 8] and [Q * H, 2].
+
+    Raises:
+        UsageError: no room for so many.
     """
     most = robots + others[1]
-    drawn = [_draw(stream(key, name), arena_cm, robots, others, obstacles) for key in keys]
-    stacked: dict[str, Any] = {k: np.stack([one[k] for one in drawn]) for k in drawn[0]}
-    places, n_bodies = stacked["places"], stacked["n_bodies"]
+    seed = np.array(keys, dtype=np.uint64)
+    n_bodies = robots + _between(fold_all(seed, "arena", "bodies"), others)
+    n_obstacles = _between(fold_all(seed, "arena", "obstacles"), obstacles)
+    is_there = np.concatenate(
+        [np.arange(most) < n_bodies[:, None], np.arange(int(N_OBSTACLES)) < n_obstacles[:, None]],
+        axis=1,
+    )
+    places = _places(fold_all(seed, "arena", "places"), arena_cm, is_there)
+    turned = uniforms(fold_all(seed, "arena", "headings")[:, None], 0, np.arange(most), 0)
     nobody = np.zeros((0, 8), dtype=np.float32), np.zeros((0, 2), dtype=np.float32)
     prey_in, prey_out = prey or nobody
     return ArenaScenarios(
         x=places[:, :most, 0],
         y=places[:, :most, 1],
-        heading=stacked["heading"],
+        heading=np.float32(2 * math.pi) * turned - np.float32(math.pi),
         n_bodies=n_bodies,
         obstacle_x=places[:, most:, 0],
         obstacle_y=places[:, most:, 1],
-        n_obstacles=stacked["n_obstacles"],
+        n_obstacles=n_obstacles,
         prey_in=prey_in,
         prey_out=prey_out,
         clamp=np.full((robots, n_sensors), np.nan, dtype=np.float32),
-        seed=np.array(keys, dtype=np.uint64),
+        seed=seed,
     )
 
 
-def _draw(
-    rng: np.random.Generator,
-    arena_cm: float,
-    robots: int,
-    others: tuple[int, int],
-    obstacles: tuple[int, int],
-) -> dict[str, Any]:
-    """Draw one scenario; ``places`` holds all bodies and obstacles, absent ones at 0."""
-    most = robots + others[1]
-    n_bodies = robots + rng.integers(others[0], others[1], endpoint=True, dtype=np.int32)
-    n_obstacles = rng.integers(obstacles[0], obstacles[1], endpoint=True, dtype=np.int32)
-    places = np.zeros((most + int(N_OBSTACLES), 2), dtype=np.float32)
-    taken: list[npt.NDArray[np.float64]] = []
-    for at in (*range(n_bodies), *range(most, most + n_obstacles)):
-        taken.append(_free_place(rng, arena_cm, taken))
-        places[at] = taken[-1]
-    heading = rng.uniform(-math.pi, math.pi, most).astype(np.float32)
-    return {
-        "places": places,
-        "heading": heading,
-        "n_bodies": n_bodies,
-        "n_obstacles": np.int32(n_obstacles),
-    }
+def _between(keys: npt.NDArray[np.uint64], bounds: tuple[int, int]) -> npt.NDArray[np.int32]:
+    """Return a number from the least to the most, all equally likely, for each key."""
+    least, most = bounds
+    half = np.uint64(32)  # bits of a number, and the product's other half
+    return least + ((numbers(keys, 0, 0, 0) >> half) * np.uint64(most - least + 1) >> half).astype(
+        np.int32
+    )
 
 
-def _free_place(
-    rng: np.random.Generator, arena_cm: float, taken: list[npt.NDArray[np.float64]]
-) -> npt.NDArray[np.float64]:
-    """Draw a place for a body, a little away from walls and from all places taken."""
+def _places(
+    keys: npt.NDArray[np.uint64], arena_cm: float, is_there: npt.NDArray[np.bool_]
+) -> npt.NDArray[np.float32]:
+    """Draw places [E, bodies and obstacles, 2], a little away from walls and from each other.
+
+    Absent bodies are at 0.
+    """
     margin = 0.01  # more than float32 rounds in the largest arena
     edge = float(RADIUS) + margin
-    for _ in range(10_000):
-        place = rng.uniform(edge, max(edge, arena_cm - edge), 2)
-        if all(math.dist(place, other) >= 2 * float(RADIUS) + margin for other in taken):
-            return place
-    raise UsageError(
-        f"an arena of {arena_cm:g} cm has no room for {counted(len(taken) + 1, 'robot')}"
-    )
+    side = max(arena_cm - 2 * edge, margin)
+    n = is_there.shape[1]
+    try:
+        places = draw_places(keys, n, (2 * float(RADIUS) + margin) / side, is_there=is_there)
+    except NoRoom as error:
+        most = is_there.sum(axis=1).max()
+        raise UsageError(f"an arena of {arena_cm:g} cm has no room for {most} bodies") from error
+    return np.where(is_there[:, :, None], edge + side * places, 0).astype(np.float32)
 
 
 def simulate(

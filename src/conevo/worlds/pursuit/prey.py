@@ -27,7 +27,8 @@ Choice: a predator that runs into a prey is refused like any move; that is no co
 Version history:
 
 - v1: first version.
-- v2: sine, cosine and arc tangent of kernels are the same bits on every device.
+- v2: sine, cosine and arc tangent of kernels are the same bits on every device; scenarios are drawn
+  from other random numbers, those of all keys at once.
 """
 
 from collections.abc import Sequence
@@ -102,7 +103,6 @@ class PreyWorld:
         has_obstacles = self.experiment % 3 != 2
         return draw_scenarios(
             keys,
-            self.name,
             self.params.arena_cm,
             self.n_robots,
             self._predators,

@@ -37,7 +37,8 @@ Version history:
 
 - v1: first version.
 - v2: sine, cosine and arc tangent of kernels are the same bits on every device; the ways of a prey
-  are summed up in integers.
+  are summed up in integers; scenarios are drawn from other random numbers, those of all keys at
+  once.
 """
 
 from collections.abc import Sequence
@@ -157,7 +158,6 @@ class PursuitWorld:
         obstacles = self.params.n_obstacles
         return draw_scenarios(
             keys,
-            self.name,
             self.params.arena_cm,
             self.n_robots,
             (self.n_prey, self.n_prey),

@@ -35,7 +35,8 @@ Version history:
 
 - v1: first version.
 - v2: sine, cosine and arc tangent of kernels are the same bits on every device; what rocks add
-  to sensors and fitness is in integers, in 2^-16 and 2^-32, so that any order gives the same sum.
+  to sensors and fitness is in integers, in 2^-16 and 2^-32, so that any order gives the same sum;
+  scenarios are drawn from other random numbers, those of all keys at once.
 """
 
 from collections.abc import Sequence
@@ -48,7 +49,7 @@ from annotated_types import Ge, Gt, Le
 
 from conevo.kernels.geometry import COVER_WORDS
 from conevo.parameters import parameters
-from conevo.rng import stream
+from conevo.rng import fold_all, uniforms
 from conevo.worlds.measures import Measure
 from conevo.worlds.places import draw_places
 from conevo.worlds.protocol import Scenarios, Simulation, kernel_params, names_of
@@ -56,13 +57,13 @@ from conevo.worlds.rover import canals, rocks
 from conevo.worlds.rover.dynamics import (
     FUNCTIONS,
     LISTS,
-    ROCK_CELLS,
     SCRATCH,
     SURVEYED,
     RoverConstants,
     RoverScene,
     RoverTeam,
 )
+from conevo.worlds.rover.sites import draw_rocks, rock_sites
 
 __all__ = ["RoverParams", "RoverScenarios", "RoverWorld"]
 
@@ -198,51 +199,32 @@ class RoverWorld:
 
     def scenarios(self, keys: Sequence[int]) -> RoverScenarios:
         """Return one scenario per key: rock sites and types, starts outside canals, lander."""
-        mask = canals.load(rocks.layout(self.environment))
-        sites = canals.sites(mask)
-        types = np.repeat(np.arange(5, dtype=np.int32), rocks.mix(self.environment))
-        drawn = [self._draw(key, mask, sites, types) for key in keys]
-        stacked = {name: np.stack([one[name] for one in drawn]) for name in drawn[0]}
-        return RoverScenarios(
-            canal=mask.astype(np.uint8), seed=np.array(keys, dtype=np.uint64), **stacked
+        seed = np.array(keys, dtype=np.uint64)
+        places = rock_sites(rocks.layout(self.environment))
+        mask = places.mask
+
+        def is_free(_: npt.NDArray[np.intp], xy: npt.NDArray[np.float32]) -> npt.NDArray[np.bool_]:
+            column, row = np.moveaxis((xy * np.float32(canals.N_CELLS)).astype(np.intp), -1, 0)
+            return ~mask[row, column]
+
+        starts = draw_places(
+            fold_all(seed, "rover", "starts"), self.n_robots, self.params.separation, is_free
         )
-
-    def _draw(
-        self,
-        key: int,
-        mask: npt.NDArray[np.bool_],
-        sites: npt.NDArray[np.float32],
-        types: npt.NDArray[np.int32],
-    ) -> dict[str, npt.NDArray[Any]]:
-        rng = stream(key, "rover-v1")
-        at = sites[rng.permutation(len(sites))[: len(types)]]
-        n = int(ROCK_CELLS)
-        column, row = np.minimum((at * np.float32(n)).astype(np.int32), n - 1).T
-        order = np.argsort(row * n + column, kind="stable")
-        starts = self._starts(rng, mask)
-        return {
-            "rock_x": at[order, 0],
-            "rock_y": at[order, 1],
-            "rock_value": np.array(rocks.VALUES, dtype=np.float32)[types[order]],
-            "rock_type": types[order],
-            "cell": np.searchsorted(
-                (row * n + column)[order], np.arange(n * n + 1), side="left"
-            ).astype(np.int32),
-            "start_x": starts[:, 0],
-            "start_y": starts[:, 1],
-            "lander": rng.random(2, dtype=np.float32),
-        }
-
-    def _starts(
-        self, rng: np.random.Generator, mask: npt.NDArray[np.bool_]
-    ) -> npt.NDArray[np.float32]:
-        """Draw places outside the canals, no two rovers on the same one."""
-
-        def is_free(place: npt.NDArray[np.float32]) -> bool:
-            column, row = (place * np.float32(canals.N_CELLS)).astype(int)
-            return not mask[row, column]
-
-        return draw_places(rng, self.n_robots, self.params.separation, is_free)
+        site, kind, cell = draw_rocks(
+            fold_all(seed, "rover", "rocks"), places, rocks.mix(self.environment)
+        )
+        return RoverScenarios(
+            rock_x=places.x[site],
+            rock_y=places.y[site],
+            rock_value=np.array(rocks.VALUES, dtype=np.float32)[kind],
+            rock_type=kind,
+            cell=cell,
+            canal=mask.astype(np.uint8),
+            start_x=starts[:, :, 0],
+            start_y=starts[:, :, 1],
+            lander=uniforms(fold_all(seed, "rover", "lander")[:, None], 0, 0, np.arange(2)),
+            seed=seed,
+        )
 
     def simulation(self) -> Simulation:
         """Return the Warp side of this world."""
