@@ -30,9 +30,13 @@ Q6 = wp.constant(1.19825839466702e-06)
 def highest(outputs: wp.array2d[float], i: int, n: int) -> int:
     """Return the number of robot ``i``'s highest output of the first ``n``, the first of equals."""
     best = int(0)
-    for k in range(1, n):
-        if outputs[i, k] > outputs[i, best]:
-            best = k
+    most = outputs[i, 0]
+    k = int(1)
+    while k < n:
+        output = outputs[i, k]
+        best = wp.where(output > most, k, best)
+        most = wp.where(output > most, output, most)
+        k += 1
     return best
 
 

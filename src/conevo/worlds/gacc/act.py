@@ -141,6 +141,7 @@ def act(team: GaccTeam, scene: GaccScene, p: GaccConstants, i: int, t: int) -> N
     if i == 0:  # what has changed has been sensed
         team.moved[0] = wp.uint64(0)
         team.stirred[0] = wp.uint64(0)
+        team.turned[0] = wp.uint64(0)
         team.changed[0] = wp.uint64(0)
         team.has_news[0] = 0
     team.to_x[i] = team.x[i]

@@ -28,9 +28,13 @@ from conevo.worlds.gacc.state import (
     hold,
     is_home,
     is_within,
+    object_parts,
     release,
+    robot_parts,
+    setting_of,
+    spoil,
 )
-from conevo.worlds.gacc.survey import survey, survey_parts
+from conevo.worlds.gacc.survey import spread, survey, survey_parts
 
 __all__ = ["FUNCTIONS"]
 
@@ -84,6 +88,7 @@ def reset(team: GaccTeam, scene: GaccScene, p: GaccConstants, i: int) -> None:
         team.shared[0] = wp.uint64(0)
         team.moved[0] = all_of(p.n_robots)
         team.stirred[0] = all_of(p.n_robots)
+        team.turned[0] = wp.uint64(0)
         team.changed[0] = wp.uint64(0)
         team.has_news[0] = 1
         for c in range(p.n_complex):
@@ -126,10 +131,11 @@ def move(team: GaccTeam, p: GaccConstants, i: int) -> None:
     team.x[i] = x
     team.y[i] = y
     wp.atomic_or(team.moved, 0, one(i))
-    wp.atomic_or(team.stirred, 0, one(i))
+    wp.atomic_or(team.stirred, 0, one(i) | team.near[i])
     team.near[i] = wp.uint64(0)
     team.things[i] = wp.uint64(0)
     team.walls[i] = wp.uint64(0)
+    spoil(team, i)
     if not is_home(p, x, y):
         team.dropped[i] = NONE
     k = team.held[i]
@@ -172,6 +178,9 @@ def commit(team: GaccTeam, scene: GaccScene, p: GaccConstants, i: int, t: int) -
         team.waited[i] = 0
         if team.held[i] >= 0:
             release(team, i)
+    setting = setting_of(a)
+    if setting != team.view[i] or (setting != NONE and p.object_accuracy < 1.0):
+        wp.atomic_or(team.turned, 0, one(i))
     count_action(team.action, team.switches, team.counts, i, a, column)
 
 
@@ -193,7 +202,11 @@ def outcome(team: GaccTeam, scene: GaccScene, p: GaccConstants, t_end: int) -> N
 
 FUNCTIONS = {
     "reset": reset,
-    "sense": (Phase(survey, survey_parts), Phase(sense)),
+    "sense": (
+        Phase(survey, survey_parts),
+        Phase(spread, object_parts),
+        Phase(sense, robot_parts),
+    ),
     "act": act,
     "commit": commit,
     "resolve": RESOLVE,

@@ -7,7 +7,7 @@ in their order. Lanes share all else.
 import warp as wp
 
 from conevo.kernels.phases import Phase
-from conevo.kernels.sets import has, lowest, one, part_of, parts, without_lowest
+from conevo.kernels.sets import has, lowest, one, part_of, without_lowest
 from conevo.worlds.gacc.state import (
     CARRIED,
     CONSTRUCT,
@@ -24,7 +24,9 @@ from conevo.worlds.gacc.state import (
     GaccScene,
     GaccTeam,
     is_home,
+    object_parts,
     release,
+    robot_parts,
 )
 
 __all__ = ["RESOLVE"]
@@ -104,18 +106,6 @@ def signal(team: GaccTeam, scene: GaccScene, p: GaccConstants) -> None:
 
 
 # --- the phases ---------------------------------------------------------------------------------
-
-
-@wp.func
-def robots(team: GaccTeam, scene: GaccScene, p: GaccConstants) -> int:
-    """Return into how many parts the set of robots is cut."""
-    return parts(p.n_robots)
-
-
-@wp.func
-def objects(team: GaccTeam, scene: GaccScene, p: GaccConstants) -> int:
-    """Return into how many parts the set of objects is cut."""
-    return parts(p.n_objects)
 
 
 @wp.func
@@ -205,8 +195,8 @@ def name_lives(team: GaccTeam, scene: GaccScene, p: GaccConstants, q: int, t: in
 
 
 RESOLVE = (
-    Phase(count_holders, robots),
+    Phase(count_holders, robot_parts),
     Phase(judge, 1),
-    Phase(end_waits, robots),
-    Phase(name_lives, objects),
+    Phase(end_waits, robot_parts),
+    Phase(name_lives, object_parts),
 )

@@ -11,18 +11,16 @@ import warp as wp
 from conevo.kernels.geometry import octant
 from conevo.kernels.random import uniform
 from conevo.kernels.sensing import none_of_eight
-from conevo.kernels.sets import has, lowest, one, without_lowest
+from conevo.kernels.sets import all_of, has, lowest, one, part_of, without_lowest
 from conevo.worlds.gacc.state import (
-    MOVE,
     NONE,
-    STALE,
     UNDETECTED,
     GaccConstants,
     GaccScene,
     GaccTeam,
     is_blocked,
+    setting_of,
 )
-from conevo.worlds.gacc.survey import notice_changes
 
 __all__ = ["sense"]
 
@@ -155,51 +153,57 @@ def look_around(team: GaccTeam, scene: GaccScene, p: GaccConstants, i: int) -> o
 
 
 @wp.func
-def look_home(team: GaccTeam, p: GaccConstants, i: int) -> octants:
-    """Return the eight home sensors.
+def look_home(team: GaccTeam, p: GaccConstants, i: int) -> None:
+    """Fill the eight home sensors.
 
     Choice: the home area reads h / d in its octant, at most 1, with h half its side and d the
     distance to its centre: "inversely proportional to the distance" (6.2.4).
     """
-    home = octants()
     dx = 0.5 - team.x[i]
     dy = 0.5 - team.y[i]
     d2 = dx * dx + dy * dy
+    show(team, i, 16, octants())
     if d2 < p.home_range_2:
-        home[octant(dx, dy)] = p.home / wp.max(wp.sqrt(d2), p.home)
-    return home
+        team.inputs[i, 16 + octant(dx, dy)] = p.home / wp.max(wp.sqrt(d2), p.home)
 
 
 @wp.func
 def show(team: GaccTeam, i: int, first: int, reading: octants) -> None:
     """Write eight of robot ``i``'s inputs, from number ``first`` on."""
-    for o in range(8):
+    o = int(0)
+    while o < 8:
         team.inputs[i, first + o] = reading[o]
+        o += 1
 
 
 @wp.func
-def sense(team: GaccTeam, scene: GaccScene, p: GaccConstants, i: int, t: int) -> None:
+def sense_again(team: GaccTeam, scene: GaccScene, p: GaccConstants, i: int, t: int) -> None:
     """Fill those of robot ``i``'s 27 sensor inputs that may have changed."""
     if team.energy[i] <= 0.0:
         return
-    has_moved = has(team.moved[0], i)
-    is_changed = has_moved
-    if not has_moved:
-        is_changed = notice_changes(team, p, i)
-    setting = wp.where(team.action[i] < MOVE, team.action[i], NONE)
-    view = team.view[i]
-    if view != NONE and (is_changed or p.object_accuracy < 1.0):
-        view = STALE
-    if view != setting:
+    setting = setting_of(team.action[i])
+    if team.view[i] != setting or p.object_accuracy < 1.0:
         team.view[i] = setting
         things = octants()
         if setting != NONE:
             things = look(team, scene, p, i, t, setting)
         show(team, i, 0, things)
-    if has_moved or (team.near[i] & team.stirred[0]) != wp.uint64(0):
+    if has(team.stirred[0], i):
         show(team, i, 8, look_around(team, scene, p, i))
-    if has_moved:
-        show(team, i, 16, look_home(team, p, i))
+    if has(team.moved[0], i):
+        look_home(team, p, i)
     if team.has_news[0] != 0:
         for kind in range(3):
             team.inputs[i, 24 + kind] = team.demand[kind]
+
+
+@wp.func
+def sense(team: GaccTeam, scene: GaccScene, p: GaccConstants, q: int, t: int) -> None:
+    """Let those of part ``q`` of the robots sense for whom something may have changed."""
+    robots = team.stirred[0] | team.turned[0]
+    if team.has_news[0] != 0:
+        robots = all_of(p.n_robots)
+    robots = part_of(robots, q)
+    while robots != wp.uint64(0):
+        sense_again(team, scene, p, lowest(robots), t)
+        robots = without_lowest(robots)

@@ -9,7 +9,7 @@ import warp as wp
 
 from conevo.kernels.actions import NONE
 from conevo.kernels.arrays import named_arrays
-from conevo.kernels.sets import lowest, one, without_lowest
+from conevo.kernels.sets import lowest, one, parts, without_lowest
 
 __all__ = [
     "CARRIED",
@@ -38,7 +38,11 @@ __all__ = [
     "is_known",
     "is_refused",
     "is_within",
+    "object_parts",
     "release",
+    "robot_parts",
+    "setting_of",
+    "spoil",
 ]
 
 UNDETECTED = wp.constant(2**31 - 1)
@@ -64,7 +68,7 @@ HELPED = wp.constant(4)
 DELIVERED = wp.constant(5)
 DROPPED = wp.constant(6)
 
-STALE = wp.constant(-2)  # of a view: to be looked at again
+STALE = wp.constant(-2)  # of a view: something in it has changed
 
 
 @wp.struct
@@ -137,7 +141,9 @@ class GaccTeam:
     fitness: wp.array[float]
     counts: wp.array[int]
     switches: wp.array[int]
-    view: wp.array[int]  # setting whose readings the object sensors show, NONE if they are off
+    view: wp.array[
+        int
+    ]  # setting whose readings object sensors show, NONE if they are off, or STALE
     near: wp.array[wp.uint64]  # robots in reach, and some that have been since it came here
     things: wp.array[wp.uint64]  # objects that lie in reach
     walls: wp.array[wp.uint64]  # obstacles in reach
@@ -160,10 +166,27 @@ class GaccTeam:
     lying_home: Annotated[wp.array[wp.uint64], "team"]  # those of them in the home area
     # What has changed since robots sensed last:
     moved: Annotated[wp.array[wp.uint64], "team"]  # robots that have moved
-    stirred: Annotated[wp.array[wp.uint64], "team"]  # that have moved, gripped or let go
+    stirred: Annotated[wp.array[wp.uint64], "team"]  # those, and robots near which one has
+    # moved, gripped or let go
+    turned: Annotated[wp.array[wp.uint64], "team"]  # robots whose view is another than it was
     changed: Annotated[wp.array[wp.uint64], "team"]  # objects that lie now or do no more
     has_news: Annotated[wp.array[int], "team"]  # of the demand
     performance: wp.array[float]  # delivered, completed, delivered_share
+
+
+# --- sets that lanes share ------------------------------------------------------------------------
+
+
+@wp.func
+def robot_parts(team: GaccTeam, scene: GaccScene, p: GaccConstants) -> int:
+    """Return into how many parts lanes cut a set of robots."""
+    return parts(p.n_robots)
+
+
+@wp.func
+def object_parts(team: GaccTeam, scene: GaccScene, p: GaccConstants) -> int:
+    """Return into how many parts lanes cut a set of objects."""
+    return parts(p.n_objects)
 
 
 # --- places ---------------------------------------------------------------------------------------
@@ -247,6 +270,19 @@ def is_blocked(
 
 
 @wp.func
+def setting_of(action: int) -> int:
+    """Return the setting of the object sensors that an action activates, or NONE."""
+    return wp.where(action < MOVE, action, NONE)
+
+
+@wp.func
+def spoil(team: GaccTeam, i: int) -> None:
+    """Let what robot ``i`` sees of objects and obstacles no longer be what is there."""
+    if team.view[i] != NONE:
+        team.view[i] = STALE
+
+
+@wp.func
 def is_known(team: GaccTeam, p: GaccConstants, k: int, t: int) -> bool:
     """Return whether a robot may grip object ``k``: it has been detected (6.2.6, 6.5.3)."""
     return team.detected[k] < t or p.needs_detection == 0
@@ -257,7 +293,7 @@ def hold(team: GaccTeam, i: int, k: int) -> None:
     """Close robot ``i``'s gripper on object ``k``."""
     team.held[i] = k
     wp.atomic_or(team.carriers, 0, one(i))
-    wp.atomic_or(team.stirred, 0, one(i))
+    wp.atomic_or(team.stirred, 0, team.near[i])
 
 
 @wp.func
@@ -265,4 +301,4 @@ def release(team: GaccTeam, i: int) -> None:
     """Open the gripper of robot ``i``, which holds an object."""
     team.held[i] = NONE
     wp.atomic_and(team.carriers, 0, ~one(i))
-    wp.atomic_or(team.stirred, 0, one(i))
+    wp.atomic_or(team.stirred, 0, team.near[i])

@@ -9,10 +9,10 @@ depends on how far reach is.
 import warp as wp
 
 from conevo.kernels.phases import n_lanes
-from conevo.kernels.sets import has, lowest, one, without_lowest
-from conevo.worlds.gacc.state import GaccConstants, GaccScene, GaccTeam
+from conevo.kernels.sets import has, lowest, one, part_of, without_lowest
+from conevo.worlds.gacc.state import GaccConstants, GaccScene, GaccTeam, spoil
 
-__all__ = ["notice_changes", "survey", "survey_parts"]
+__all__ = ["spread", "survey", "survey_parts"]
 
 PARTS = wp.constant(4)  # of a robot's survey, where a block has many lanes
 
@@ -55,6 +55,7 @@ def meet(team: GaccTeam, p: GaccConstants, i: int, first: int, step: int) -> Non
         j += step
     found = found & ~one(i)
     wp.atomic_or(team.near, i, found)
+    wp.atomic_or(team.stirred, 0, found)
     while found != wp.uint64(0):
         wp.atomic_or(team.near, lowest(found), one(i))
         found = without_lowest(found)
@@ -93,19 +94,30 @@ def walls_in_reach(
 
 
 @wp.func
-def notice_changes(team: GaccTeam, p: GaccConstants, i: int) -> bool:
-    """Return whether an object in reach of robot ``i`` lies there now, or does no more; note it."""
-    things = team.things[i]
-    rest = team.changed[0]
-    while rest != wp.uint64(0):
-        k = lowest(rest)
-        dx = team.object_x[k] - team.x[i]
-        dy = team.object_y[k] - team.y[i]
-        things = things & ~one(k)
-        if has(team.lying[0], k) and dx * dx + dy * dy <= p.reach_2:
-            things = things | one(k)
-        rest = without_lowest(rest)
-    if things == team.things[i]:
-        return False
-    team.things[i] = things
-    return True
+def spread(team: GaccTeam, scene: GaccScene, p: GaccConstants, q: int, t: int) -> None:
+    """Tell robots in reach of those objects of part ``q`` that lie there now, or do no more."""
+    objects = part_of(team.changed[0], q)
+    while objects != wp.uint64(0):
+        k = lowest(objects)
+        lies = has(team.lying[0], k)
+        before = wp.uint64(0)
+        now = wp.uint64(0)
+        i = int(0)
+        while i < p.n_robots:
+            dx = team.object_x[k] - team.x[i]
+            dy = team.object_y[k] - team.y[i]
+            is_near = lies and dx * dx + dy * dy <= p.reach_2
+            now = now | (wp.uint64(is_near) << wp.uint64(i))
+            before = before | (((team.things[i] >> wp.uint64(k)) & wp.uint64(1)) << wp.uint64(i))
+            i += 1
+        told = before ^ now
+        wp.atomic_or(team.turned, 0, told)
+        while told != wp.uint64(0):
+            i = lowest(told)
+            spoil(team, i)
+            if lies:
+                wp.atomic_or(team.things, i, one(k))
+            else:
+                wp.atomic_and(team.things, i, ~one(k))
+            told = without_lowest(told)
+        objects = without_lowest(objects)
