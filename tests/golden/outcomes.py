@@ -1,4 +1,4 @@
-"""What shipped worlds and methods gave before the seams moved: digests that must not change.
+"""What shipped worlds and methods give: digests that must not change with the code.
 
 ``python tests/golden/outcomes.py`` prints them; a change of a world's or a method's version writes
 them anew, ``> tests/golden/outcomes.json``, and says why.

@@ -1,4 +1,4 @@
-"""The same bits as before the seams moved, on the machine that wrote the digests."""
+"""The same bits as those on record, which a new version of a world or method writes anew."""
 
 import importlib.util
 import json
@@ -11,7 +11,7 @@ HERE = Path(__file__).parent
 
 @pytest.mark.slow
 def test_worlds_and_methods_give_the_outcomes_on_record() -> None:
-    """Sines are the C library's: on a machine with another one, the worlds that use them differ."""
+    """Kernels call no library mathematics; what methods draw is numpy's."""
     spec = importlib.util.spec_from_file_location("outcomes", HERE / "outcomes.py")
     assert spec is not None
     assert spec.loader is not None
