@@ -145,25 +145,6 @@ def test_the_comparison_above_is_not_vacuous():
     assert ((out["action"][1:] == MOVE) & ~moved).any()
 
 
-@pytest.mark.parametrize(
-    "lanes", [96, *(pytest.param(n, marks=pytest.mark.slow) for n in (32, 64, 128, 256))]
-)
-def test_lanes_do_not_change_a_bit_where_rovers_meet_and_detect(lanes, cpu_blocks):
-    a_world = world("rover/complex-5", iterations=40)
-    genes, slots = random_team(a_world, 4)
-    heuristic = np.where(np.arange(20) < 8, -1, np.arange(20) % 4).astype(np.int32)
-    scenarios = crowd(a_world.scenarios([fold(4, "lanes")]), 20, 4, side=0.2)
-    given = (genes, slots[None], scenarios, heuristic[None])
-    serial = Rollout(a_world, n_threads=1).evaluate(*given)
-    assert (serial.fitness > 0).sum() > 3
-    with cpu_blocks():
-        block = Rollout(a_world, n_threads=1, lanes=lanes).evaluate(*given)
-    for name in ("fitness", "counts", "switches"):
-        assert getattr(block, name).tobytes() == getattr(serial, name).tobytes(), name
-    for name, values in serial.performance.items():
-        assert block.performance[name].tobytes() == values.tobytes(), name
-
-
 # --- hand-built situations --------------------------------------------------------------------
 
 

@@ -11,21 +11,13 @@ COVER_WORDS = wp.constant(200)  # 64-bit words of one grid: two for each row of 
 @wp.func
 def octant(dx: float, dy: float) -> int:
     """Return which of eight 45-degree sectors the vector lies in, counter-clockwise from +x."""
-    o = int(0)
-    x = dx
-    y = dy
-    if dy < 0.0 or (dy == 0.0 and dx < 0.0):
-        o = 4
-        x = -dx
-        y = -dy
-    if x <= 0.0:
-        o = o + 2
-        s = x
-        x = y
-        y = -s
-    if y >= x:
-        o = o + 1
-    return o
+    is_below = dy < 0.0 or (dy == 0.0 and dx < 0.0)
+    x = wp.where(is_below, -dx, dx)
+    y = wp.where(is_below, -dy, dy)
+    is_left = x <= 0.0
+    ahead = wp.where(is_left, y, x)
+    aside = wp.where(is_left, -x, y)
+    return 4 * int(is_below) + 2 * int(is_left) + int(aside >= ahead)
 
 
 @wp.func

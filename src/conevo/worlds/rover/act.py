@@ -11,6 +11,7 @@ from conevo.worlds.rover.state import (
     CANAL_CELLS,
     MOVE,
     N_ACTIONS,
+    N_SETTINGS,
     SCANNING,
     RoverConstants,
     RoverScene,
@@ -32,6 +33,8 @@ def act(team: RoverTeam, scene: RoverScene, p: RoverConstants, i: int, t: int) -
     if i == 0:
         team.n_listed[SCANNING] = 0
         team.changed[0] = wp.uint64(0)
+        for k in range(N_SETTINGS):
+            team.acting[k] = wp.uint64(0)
     team.to_x[i] = team.x[i]
     team.to_y[i] = team.y[i]
     if team.energy[i] <= 0.0:
@@ -99,7 +102,6 @@ def commit(team: RoverTeam, scene: RoverScene, p: RoverConstants, i: int, t: int
     Choice: of two rovers that propose the same place, the one with the lower number gets it.
     """
     a = team.chosen[i]
-    has_changed = a != team.action[i]
     count_action(team.action, team.switches, team.counts, i, a, a)
     if a == MOVE:
         x = team.to_x[i]
@@ -110,11 +112,14 @@ def commit(team: RoverTeam, scene: RoverScene, p: RoverConstants, i: int, t: int
                 team.x[i] = x
                 team.y[i] = y
                 team.covered_range[i] = 0.0
-                team.looked[i] = NONE
-                has_changed = True
+                team.looked[i] = 0
+                for k in range(N_SETTINGS):
+                    team.barren[i * N_SETTINGS + k] = wp.uint64(0)
+                wp.atomic_or(team.changed, 0, one(i))
         team.energy[i] = team.energy[i] - p.rover_sensor_cost - p.move_cost
     elif a != NONE:
-        team.setting[i] = a
+        if team.setting[i] != a:
+            team.setting[i] = a
+            wp.atomic_or(team.changed, 0, one(i))
+        wp.atomic_or(team.acting, a, one(i))
         team.energy[i] = team.energy[i] - p.rover_sensor_cost - of_setting(p.cost, a)
-    if has_changed:
-        wp.atomic_or(team.changed, 0, one(i))

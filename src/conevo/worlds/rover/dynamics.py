@@ -15,10 +15,11 @@ from conevo.kernels.geometry import COVER_CELLS, COVER_WORDS, covered_by_any
 from conevo.kernels.phases import Phase, n_lanes
 from conevo.worlds.rover.act import act, commit
 from conevo.worlds.rover.resolve import RESOLVE
-from conevo.worlds.rover.sense import OFF, SENSE
+from conevo.worlds.rover.sense import SENSE
 from conevo.worlds.rover.state import (
     LISTS,
     N_ACTIONS,
+    N_SETTINGS,
     ROCK_CELLS,
     SURVEYED,
     RoverConstants,
@@ -56,10 +57,11 @@ def begin(team: RoverTeam, scene: RoverScene, p: RoverConstants, i: int, t: int)
     begin_counting(team.action, team.switches, team.counts, i)
     for word in range(COVER_WORDS):
         team.cover[i * COVER_WORDS + word] = wp.uint64(0)
-    team.hopeful[i] = 0
+    for k in range(N_SETTINGS):
+        team.barren[i * N_SETTINGS + k] = wp.uint64(0)
     team.sees_rovers[i] = 0
-    team.looked[i] = NONE
-    team.shown[i] = OFF
+    team.looked[i] = 0
+    team.shown[i] = NONE
     team.gain[i] = 0
     team.gain_near[i] = wp.int64(0)
     if i == 0:

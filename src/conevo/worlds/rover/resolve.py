@@ -11,6 +11,7 @@ from conevo.worlds.rover.sense import ROWS, SUBS, share, take_off
 from conevo.worlds.rover.state import (
     COVERING,
     DETECTING,
+    N_SETTINGS,
     PARTS,
     ROCK_CELLS,
     UNIT,
@@ -40,9 +41,14 @@ def partner(rock_type: int, setting: int) -> int:
 def enlist(team: RoverTeam, scene: RoverScene, p: RoverConstants, i: int, t: int) -> None:
     """List rover ``i`` if it covers new cells, and if it may detect a rock with another.
 
-    Its mates are looked up only if it or one of its company has changed; and it is not listed while
-    no rock is left that it and a mate may detect.
+    Two that found no rock for their settings, or no cells that both reach, need not try again until
+    one of them has moved or the other has another setting.
     """
+    changed = team.changed[0]
+    if (changed & team.company[i]) != wp.uint64(0):
+        for k in range(N_SETTINGS):
+            at = i * N_SETTINGS + k
+            team.barren[at] = team.barren[at] & ~changed
     a = team.action[i]
     if not is_activation(a):
         return
@@ -50,17 +56,25 @@ def enlist(team: RoverTeam, scene: RoverScene, p: RoverConstants, i: int, t: int
     if team.covered_range[i] < r:
         team.covered_range[i] = r
         team.covering[wp.atomic_add(team.n_listed, COVERING, 1)] = i
-    if (team.changed[0] & (team.company[i] | one(i))) != wp.uint64(0):
-        find_mates(team, p, i, r)
-    if team.hopeful[i] != 0:
-        team.hopeful[i] = 0
-        team.detecting[wp.atomic_add(team.n_listed, DETECTING, 1)] = i
+    fit = team.acting[1]  # settings next to each other
+    if a == 1:
+        fit = fit | team.acting[0] | team.acting[2]
+    else:
+        fit = fit | team.acting[a]
+    mates = team.company[i] & fit & ~team.barren[i * N_SETTINGS + a]
+    if mates != wp.uint64(0):
+        mates = in_reach(team, p, i, a, r, mates)
+        if mates != wp.uint64(0):
+            team.mates[i] = mates
+            team.hopeful[i] = wp.uint64(0)
+            team.detecting[wp.atomic_add(team.n_listed, DETECTING, 1)] = i
 
 
 @wp.func
-def find_mates(team: RoverTeam, p: RoverConstants, i: int, r: float) -> None:
-    """Find the rovers that may detect rocks with rover ``i``, and the cells that both reach."""
-    a = team.action[i]
+def in_reach(
+    team: RoverTeam, p: RoverConstants, i: int, a: int, r: float, others: wp.uint64
+) -> wp.uint64:
+    """Return the others whose detection overlaps rover ``i``'s; keep where, and who are too far."""
     x = team.x[i]
     y = team.y[i]
     left = float(2.0)
@@ -68,29 +82,29 @@ def find_mates(team: RoverTeam, p: RoverConstants, i: int, r: float) -> None:
     low = float(2.0)
     high = float(-2.0)
     mates = wp.uint64(0)
-    rest = team.company[i]
+    rest = others
     while rest != wp.uint64(0):
         j = lowest(rest)
         rest = without_lowest(rest)
+        dx = team.x[j] - x
+        dy = team.y[j] - y
         b = team.action[j]
-        if is_activation(b) and wp.abs(b - a) <= 1:
-            dx = team.x[j] - x
-            dy = team.y[j] - y
-            s = of_setting(p.ranges, b)
-            if dx * dx + dy * dy < (r + s) * (r + s):
-                mates = mates | one(j)
-                left = wp.min(left, team.x[j] - s)
-                right = wp.max(right, team.x[j] + s)
-                low = wp.min(low, team.y[j] - s)
-                high = wp.max(high, team.y[j] + s)
-    team.mates[i] = mates
-    team.hopeful[i] = int(mates != wp.uint64(0))
+        s = of_setting(p.ranges, b)
+        if dx * dx + dy * dy < (r + s) * (r + s):
+            mates = mates | one(j)
+            left = wp.min(left, team.x[j] - s)
+            right = wp.max(right, team.x[j] + s)
+            low = wp.min(low, team.y[j] - s)
+            high = wp.max(high, team.y[j] + s)
+    at = i * N_SETTINGS + a
+    team.barren[at] = team.barren[at] | (others & ~mates)
     team.box[i] = (
         rock_cell(wp.max(left, x - r))
         | (rock_cell(wp.min(right, x + r)) << 8)
         | (rock_cell(wp.max(low, y - r)) << 16)
         | (rock_cell(wp.min(high, y + r)) << 24)
     )
+    return mates
 
 
 @wp.func
@@ -155,7 +169,7 @@ def pair(team: RoverTeam, scene: RoverScene, p: RoverConstants, i: int, part: in
                         if succeed(scene, p, i, a, fit, need, k, t):
                             gain(team, scene, p, i, k, d2, t)
                         else:
-                            team.hopeful[i] = 1
+                            wp.atomic_or(team.hopeful, i, fit)
             k += subs
         row += rows
 
@@ -167,15 +181,14 @@ def fitting(
     """Return the mates that have the needed setting and rock ``k`` in range."""
     r = of_setting(p.ranges, need)
     found = wp.uint64(0)
-    rest = mates
+    rest = mates & team.acting[need]
     while rest != wp.uint64(0):
         j = lowest(rest)
         rest = without_lowest(rest)
-        if team.action[j] == need:
-            dx = scene.rock_x[k] - team.x[j]
-            dy = scene.rock_y[k] - team.y[j]
-            if dx * dx + dy * dy < r * r:
-                found = found | one(j)
+        dx = scene.rock_x[k] - team.x[j]
+        dy = scene.rock_y[k] - team.y[j]
+        if dx * dx + dy * dy < r * r:
+            found = found | one(j)
     return found
 
 
@@ -228,6 +241,8 @@ def n_crediting(team: RoverTeam, scene: RoverScene, p: RoverConstants) -> int:
 def credit(team: RoverTeam, scene: RoverScene, p: RoverConstants, q: int, t: int) -> None:
     """Credit a listed rover with what it has detected, and let it pay for the report."""
     i = team.detecting[q]
+    at = i * N_SETTINGS + team.action[i]
+    team.barren[at] = team.barren[at] | (team.mates[i] & ~team.hopeful[i])
     if team.gain[i] > 0:
         area = float(team.covered[i]) / float(COVER_CELLS * COVER_CELLS)
         near = float(team.gain_near[i]) / (UNIT * UNIT * p.min_distance_2)

@@ -8,11 +8,13 @@ import warp as wp
 
 from conevo.kernels.actions import NONE
 from conevo.kernels.geometry import octant
-from conevo.kernels.phases import Phase
+from conevo.kernels.phases import Phase, n_lanes
 from conevo.kernels.sets import lowest, one, without_lowest
 from conevo.worlds.rover.state import (
     COVERING,
     DETECTING,
+    N_SETTINGS,
+    OLD,
     PARTS,
     ROCK_CELLS,
     SCANNING,
@@ -27,11 +29,8 @@ from conevo.worlds.rover.state import (
     rock_cell,
 )
 
-__all__ = ["NEW", "OFF", "OLD", "SENSE", "share", "take_off"]
+__all__ = ["ROWS", "SENSE", "SUBS", "share", "take_off"]
 
-OFF = wp.constant(0)  # rock sensors read 0,
-OLD = wp.constant(1)  # what is no longer true,
-NEW = wp.constant(2)  # what is kept
 N_SENSORS = wp.constant(8)  # of each kind, one for every octant
 SUBS = wp.constant(4)  # rocks of a row that lanes look at side by side
 ROWS = wp.constant(int(PARTS) // 4)
@@ -54,19 +53,19 @@ def look(team: RoverTeam, scene: RoverScene, p: RoverConstants, i: int, t: int) 
         see_rovers(team, p, i)
     a = team.action[i]
     if not is_activation(a):
-        if team.shown[i] != OFF:
+        if team.shown[i] != NONE:
             for o in range(N_SENSORS):
                 team.inputs[i, N_SENSORS + o] = 0.0
-            team.shown[i] = OFF
-    elif team.looked[i] != a:
+            team.shown[i] = NONE
+    elif ((team.looked[i] >> a) & 1) == 0:
         for o in range(N_SENSORS):
-            team.rocks[i * N_SENSORS + o] = 0
-        team.looked[i] = a
+            team.rocks[row_of(i, a) + o] = 0
+        team.looked[i] = team.looked[i] | (1 << a)
         team.scanning[wp.atomic_add(team.n_listed, SCANNING, 1)] = i
-    elif team.shown[i] != NEW:
+    elif team.shown[i] != a:
         for o in range(N_SENSORS):
-            show(team, i, o)
-        team.shown[i] = NEW
+            show(team, i, a, o)
+        team.shown[i] = a
 
 
 @wp.func
@@ -87,34 +86,42 @@ def survey(team: RoverTeam, p: RoverConstants, i: int) -> None:
     own = one(i)
     team.crowd[i] = crowd & ~own
     team.company[i] = company & ~own
+    for a in range(N_SETTINGS):
+        at = i * N_SETTINGS + a
+        team.barren[at] = team.barren[at] & company
 
 
 @wp.func
 def see_rovers(team: RoverTeam, p: RoverConstants, i: int) -> None:
     """Fill rover ``i``'s rover sensors."""
-    rest = team.crowd[i]
-    if rest == wp.uint64(0) and team.sees_rovers[i] == 0:
-        return
     x = team.x[i]
     y = team.y[i]
-    for o in range(N_SENSORS):
-        team.inputs[i, o] = 0.0
-        team.closest[i * N_SENSORS + o] = p.rover_sensor_range_2
-    team.sees_rovers[i] = 0
+    near = wp.uint64(0)
+    rest = team.crowd[i]
     while rest != wp.uint64(0):
         j = lowest(rest)
         rest = without_lowest(rest)
         dx = team.x[j] - x
         dy = team.y[j] - y
+        if dx * dx + dy * dy < p.rover_sensor_range_2:
+            near = near | one(j)
+    if near == wp.uint64(0) and team.sees_rovers[i] == 0:
+        return
+    team.sees_rovers[i] = int(near != wp.uint64(0))
+    for o in range(N_SENSORS):
+        team.inputs[i, o] = 0.0
+        team.closest[i * N_SENSORS + o] = p.rover_sensor_range_2
+    while near != wp.uint64(0):
+        j = lowest(near)
+        near = without_lowest(near)
+        dx = team.x[j] - x
+        dy = team.y[j] - y
         d2 = dx * dx + dy * dy
-        if d2 < p.rover_sensor_range_2:
-            o = octant(dx, dy)
-            if d2 < team.closest[i * N_SENSORS + o]:
-                team.closest[i * N_SENSORS + o] = d2
-                setting = float(team.setting[j] + 1)
-                near = wp.max(d2, p.min_distance_2)
-                team.inputs[i, o] = setting * p.min_distance_2 / (3.0 * near)
-                team.sees_rovers[i] = 1
+        o = octant(dx, dy)
+        if d2 < team.closest[i * N_SENSORS + o]:
+            team.closest[i * N_SENSORS + o] = d2
+            z = share(p, float(team.setting[j] + 1), d2)
+            team.inputs[i, o] = z / 3.0
 
 
 @wp.func
@@ -142,7 +149,8 @@ def scan(team: RoverTeam, scene: RoverScene, p: RoverConstants, q: int, t: int) 
     i = team.scanning[at]
     x = team.x[i]
     y = team.y[i]
-    r = of_setting(p.ranges, team.looked[i])
+    a = team.action[i]
+    r = of_setting(p.ranges, a)
     first = rock_cell(x - r)
     last = rock_cell(x + r)
     row = int(rock_cell(y - r) + part // subs)
@@ -157,7 +165,7 @@ def scan(team: RoverTeam, scene: RoverScene, p: RoverConstants, q: int, t: int) 
             if d2 < r * r:
                 if team.detected[k] >= t:
                     z = in_units(share(p, scene.rock_value[k], d2))
-                    wp.atomic_add(team.rocks, i * N_SENSORS + octant(dx, dy), z)
+                    wp.atomic_add(team.rocks, row_of(i, a) + octant(dx, dy), z)
             k += subs
         row += rows
 
@@ -177,24 +185,36 @@ def in_units(z: float) -> int:
 @wp.func
 def n_reading(team: RoverTeam, scene: RoverScene, p: RoverConstants) -> int:
     """Return the number of items of ``read``."""
-    return team.n_listed[SCANNING] * N_SENSORS
+    return team.n_listed[SCANNING] * wp.where(n_lanes() == 1, 1, N_SENSORS)
 
 
 @wp.func
 def read(team: RoverTeam, scene: RoverScene, p: RoverConstants, q: int, t: int) -> None:
-    """Fill one rock sensor of a rover that has scanned."""
-    i = team.scanning[q // N_SENSORS]
-    show(team, i, q % N_SENSORS)
-    team.shown[i] = NEW
+    """Fill one rock sensor of a rover that has scanned; all at once on one lane."""
+    if n_lanes() == 1:
+        i = team.scanning[q]
+        for o in range(N_SENSORS):
+            show(team, i, team.action[i], o)
+        team.shown[i] = team.action[i]
+    else:
+        i = team.scanning[q // N_SENSORS]
+        show(team, i, team.action[i], q % N_SENSORS)
+        team.shown[i] = team.action[i]
 
 
 @wp.func
-def show(team: RoverTeam, i: int, o: int) -> None:
-    """Let rover ``i``'s rock sensor of an octant read what is kept.
+def row_of(i: int, a: int) -> int:
+    """Return where what rover ``i`` sees with a setting begins in ``rocks``."""
+    return (i * N_SETTINGS + a) * N_SENSORS
+
+
+@wp.func
+def show(team: RoverTeam, i: int, a: int, o: int) -> None:
+    """Let rover ``i``'s rock sensor of an octant read what is kept for a setting.
 
     Choice: it reads z / (1 + z), with z the sum over the undetected rocks in its octant.
     """
-    z = float(team.rocks[i * N_SENSORS + o]) / UNIT
+    z = float(team.rocks[row_of(i, a) + o]) / UNIT
     team.inputs[i, N_SENSORS + o] = z / (1.0 + z)
 
 
@@ -205,16 +225,15 @@ def take_off(team: RoverTeam, scene: RoverScene, p: RoverConstants, i: int, k: i
     while rest != wp.uint64(0):
         j = lowest(rest)
         rest = without_lowest(rest)
-        a = team.looked[j]
-        if a != NONE:
-            dx = scene.rock_x[k] - team.x[j]
-            dy = scene.rock_y[k] - team.y[j]
-            d2 = dx * dx + dy * dy
+        dx = scene.rock_x[k] - team.x[j]
+        dy = scene.rock_y[k] - team.y[j]
+        d2 = dx * dx + dy * dy
+        z = in_units(share(p, scene.rock_value[k], d2))
+        for a in range(N_SETTINGS):
             r = of_setting(p.ranges, a)
-            if d2 < r * r:
-                z = in_units(share(p, scene.rock_value[k], d2))
-                wp.atomic_add(team.rocks, j * N_SENSORS + octant(dx, dy), -z)
-                if team.shown[j] == NEW:
+            if ((team.looked[j] >> a) & 1) != 0 and d2 < r * r:
+                wp.atomic_add(team.rocks, row_of(j, a) + octant(dx, dy), -z)
+                if team.shown[j] == a:
                     team.shown[j] = OLD
 
 

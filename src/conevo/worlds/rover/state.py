@@ -16,6 +16,8 @@ __all__ = [
     "LISTS",
     "MOVE",
     "N_ACTIONS",
+    "N_SETTINGS",
+    "OLD",
     "PARTS",
     "ROCK_CELLS",
     "SCANNING",
@@ -31,9 +33,11 @@ __all__ = [
 ]
 
 N_ACTIONS = wp.constant(4)
+N_SETTINGS = wp.constant(3)
 MOVE = wp.constant(3)
 ROCK_CELLS = wp.constant(40)  # grid over the rocks; 0.025 wide, so a disc needs few cells
 CANAL_CELLS = wp.constant(canals.N_CELLS)
+OLD = wp.constant(-2)  # what rock sensors read is no longer true
 UNIT = wp.constant(2.0**16)  # sums of sensors are integers in 1 / UNIT: at most 5000 * UNIT
 
 # The lists of an iteration: who scans rocks, who covers cells, who may detect with another.
@@ -43,7 +47,7 @@ COVERING = wp.constant(1)
 DETECTING = wp.constant(2)
 
 # Every so many iterations each rover's company is looked up: who may be near until the next time.
-SURVEYED = wp.constant(8)
+SURVEYED = wp.constant(4)
 PARTS = wp.constant(32)  # that lanes cut a scan into: 8 rows x 4 rocks, or 32 rows of cells
 
 
@@ -112,17 +116,20 @@ class RoverTeam:
     counts: wp.array[int]
     switches: wp.array[int]
     performance: wp.array[float]  # value, area
-    # What is kept. changed: who has moved or does something else than in the previous iteration.
-    changed: Annotated[wp.array[wp.uint64], "team"]
+    # What is kept.
+    changed: Annotated[wp.array[wp.uint64], "team"]  # who has moved or has another setting
+    acting: Annotated[wp.array[wp.uint64], "settings"]  # who activates with each setting
     crowd: wp.array[wp.uint64]  # who may be sensed, or be in the way
     company: wp.array[wp.uint64]  # whose detection may overlap
-    mates: wp.array[wp.uint64]  # whose detection does overlap, with a setting that may fit
-    box: wp.array[int]  # first and last column and row of cells where both reach
-    hopeful: wp.array[int]  # whether a rock was left there that both may detect
+    # for each setting of this rover who, as it is, can detect nothing with it from here
+    barren: Annotated[wp.array[wp.uint64], "robots", "settings"]
+    mates: wp.array[wp.uint64]  # whose detection overlaps, with a setting that may fit
+    hopeful: wp.array[wp.uint64]  # mates with whom a rock is left
+    box: wp.array[int]  # first and last column and row of cells that a mate and this rover reach
     sees_rovers: wp.array[int]  # whether a rover sensor is not 0
-    looked: wp.array[int]  # setting with which ``rocks`` was summed up at this place, or NONE
-    rocks: Annotated[wp.array[int], "robots", "octants"]  # in 1 / UNIT
-    shown: wp.array[int]  # what the rock sensors read: OFF, OLD or NEW
+    looked: wp.array[int]  # settings with which ``rocks`` was summed up at this place, a bit each
+    rocks: Annotated[wp.array[int], "robots", "settings", "octants"]  # in 1 / UNIT
+    shown: wp.array[int]  # setting whose ``rocks`` the rock sensors read, NONE for 0, or OLD
     closest: Annotated[wp.array[float], "robots", "octants"]  # squared distance of a rover
     # What an iteration or the outcome adds up, in integers.
     gain: wp.array[int]

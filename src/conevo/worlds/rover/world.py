@@ -231,7 +231,13 @@ class RoverWorld:
         n_rocks = sum(rocks.mix(self.environment))
         return Simulation(
             state=RoverTeam,
-            sizes={"rocks": n_rocks, "words": int(COVER_WORDS), "octants": 8, "lists": LISTS},
+            sizes={
+                "rocks": n_rocks,
+                "words": int(COVER_WORDS),
+                "octants": 8,
+                "lists": LISTS,
+                "settings": 3,
+            },
             scene=RoverScene,
             params_type=RoverConstants,
             params=kernel_params(RoverConstants, self.params, **self._reaches()),
