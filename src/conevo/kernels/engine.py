@@ -14,7 +14,7 @@ import tempfile
 import threading
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from typing import Any
 
 import warp as wp
@@ -22,10 +22,12 @@ import warp as wp
 from conevo.errors import EnvironmentFailure, UsageError
 
 __all__ = [
+    "OutOfMemory",
     "build",
     "building",
     "kernel_hash",
     "launch",
+    "memory_named",
     "options",
     "start",
     "usable_threads",
@@ -41,6 +43,10 @@ building = threading.RLock()
 _is_started = False
 
 
+class OutOfMemory(EnvironmentFailure):
+    """A device does not have as much free memory as was asked for."""
+
+
 def start() -> None:
     """Initialize Warp once, quietly.
 
@@ -53,7 +59,7 @@ def start() -> None:
             if not os.environ.get("WARP_CACHE_PATH"):
                 os.environ.pop("WARP_CACHE_PATH", None)  # an empty one is not the working directory
             wp.config.log_level = wp.LOG_WARNING
-            with _without_driver_warning(), _cache_named():
+            with _without_line(b"CUDA driver"), _cache_named():  # where there is no GPU driver
                 wp.init()
             _is_started = True
 
@@ -80,6 +86,25 @@ def build(kernel: Any, device: str, lanes: int) -> None:
 
 
 @contextmanager
+def memory_named(device: str) -> Iterator[None]:
+    """Let memory that a device does not have be one error, without Warp's own line on it.
+
+    Raises:
+        OutOfMemory: an array that was asked for cannot be had.
+    """
+    try:
+        with nullcontext() if device == "cpu" else _without_line(b"out of memory"):
+            yield
+    except (MemoryError, RuntimeError) as error:
+        if isinstance(error, RuntimeError) and "Failed to allocate" not in str(error):
+            raise
+        raise OutOfMemory(
+            f"device {device!r}: too little free memory; end what else uses it, or play fewer "
+            f"scenarios at once"
+        ) from error
+
+
+@contextmanager
 def _cache_named() -> Iterator[None]:
     """Let a file system that refuses compiled kernels be an error that names their folder."""
     try:
@@ -103,8 +128,8 @@ def _mistake(error: Exception) -> str:
 
 
 @contextmanager
-def _without_driver_warning() -> Iterator[None]:
-    """Drop the line that Warp's native code prints where there is no GPU driver, and no other."""
+def _without_line(word: bytes) -> Iterator[None]:
+    """Drop the lines with a word that Warp's native code prints, and no other."""
     try:
         os.fstat(2)
     except OSError:  # started without a standard error: nothing to keep clean
@@ -119,7 +144,7 @@ def _without_driver_warning() -> Iterator[None]:
             os.dup2(real.fileno(), 2)
             caught.seek(0)
             for line in caught:
-                if b"CUDA driver" not in line:
+                if word not in line:
                     real.write(line)
 
 

@@ -5,6 +5,7 @@ scenarios, so a generation of ten thousand teams needs no unpacked weights. Batc
 workspace run in parts.
 """
 
+import logging
 from dataclasses import dataclass
 from typing import Any, Self
 
@@ -20,12 +21,15 @@ from conevo.kernels import engine
 from conevo.kernels.arrays import allocate, dimensions, shapes
 from conevo.kernels.devices import device_here
 from conevo.kernels.views import SHARED_BYTES, Near, near_arrays
+from conevo.terms import counted
 from conevo.worlds.contract import refuse_faults, scenario_faults, shapes_of, stages_of
 from conevo.worlds.episode import Job, episode_kernel, loading_kernel
 from conevo.worlds.measures import measures_of
 from conevo.worlds.protocol import Outcome, Scenarios, World
 
 __all__ = ["Rollout"]
+
+log = logging.getLogger("conevo")
 
 # Worlds simulated at once: bounds memory, keeps all threads or blocks busy.
 CHUNK = 512
@@ -159,6 +163,7 @@ class Rollout:
         Raises:
             ValueError: shapes or rows that do not fit this world.
             UsageError: scenarios whose arrays are not those of the world's scene.
+            EnvironmentFailure: there is no memory for as much as one team.
         """
         self._refuse_faulty(scenarios)
         genes, teams, heuristic = self._checked(genes, teams, heuristic)
@@ -170,16 +175,16 @@ class Rollout:
         parts = []
         scene = self._scene(scenarios)
         job = self._job(len(scenarios), e, n_teams // rounds)
-        step = max(1, self._chunk // e)
         pool = self._array(genes)
-        for first in range(0, n_teams, step):
-            some = slice(first, min(first + step, n_teams))
-            n = some.stop - some.start
-            batch = self._batch(n * e, n)
+        first = 0
+        while first < n_teams:
+            batch, n = self._room(n_teams - first, e)
+            some = slice(first, first + n)
             job.first_team, job.heuristic = first, self._array(heuristic[some])
             self._load(batch, pool, teams[some])
             self._launch(batch, scene, job, n * e)
             parts.append(self._collect(batch, n, e))
+            first += n
         joined = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
         return Outcome(
             fitness=joined["fitness"].reshape(n_teams, e, r),
@@ -285,7 +290,8 @@ class Rollout:
     def _array(self, values: npt.NDArray[Any]) -> Any:
         dtype = wp.dtype_from_numpy(values.dtype)
         values = np.ascontiguousarray(values)  # views are made from pointers: strides would be lost
-        return wp.array(values, dtype=dtype, device=self.device, copy=self.device != "cpu")
+        with engine.memory_named(self.device):
+            return wp.array(values, dtype=dtype, device=self.device, copy=self.device != "cpu")
 
     def _job(self, n_scenes: int, n_scenarios: int, teams_per_round: int) -> Any:
         job = Job()
@@ -298,21 +304,47 @@ class Rollout:
         job.t_begin, job.t_end = 0, self.world.params.iterations
         return job
 
+    def _room(self, n_teams: int, e: int) -> tuple[_Workspace, int]:
+        """Return a workspace for some teams in ``e`` scenarios, and for how many it is.
+
+        Where the device has too little memory they are halved, now and from then on.
+        """
+        wanted = n = min(n_teams, max(1, self._chunk // e))
+        while True:
+            is_grown = self._workspace is not None  # to the worlds and teams of any two batches
+            try:
+                batch = self._batch(n * e, n)
+                break
+            except engine.OutOfMemory:
+                if n == 1 and not is_grown:
+                    raise
+                n = n if is_grown else n // 2
+        if n < wanted:
+            self._chunk = n * e
+            log.warning(
+                "device %s lacks memory for %s at once: it plays %s, with the same results",
+                self.device,
+                counted(wanted * e, "world"),
+                n * e,
+            )
+        return batch, n
+
     def _batch(self, n_worlds: int, n_teams: int) -> _Workspace:
         """Return a workspace of at least so many worlds and teams."""
         had = self._workspace
         if had is None or had.n_worlds < n_worlds or had.n_teams < n_teams:
             if had is not None:
                 n_worlds, n_teams = max(n_worlds, had.n_worlds), max(n_teams, had.n_teams)
-            self._workspace = None  # frees what was there before more is taken
+            had = self._workspace = None  # frees what was there before more is taken
             mind, wanted = self._mind, self._mind_shapes
-            self._workspace = _Workspace(
-                n_worlds,
-                n_teams,
-                allocate(self._simulation.state, self._shapes, n_worlds, self.device),
-                allocate(mind.memory, wanted[mind.memory], n_worlds, self.device),
-                allocate(mind.weights, wanted[mind.weights], n_teams, self.device),
-            )
+            with engine.memory_named(self.device):
+                self._workspace = _Workspace(
+                    n_worlds,
+                    n_teams,
+                    allocate(self._simulation.state, self._shapes, n_worlds, self.device),
+                    allocate(mind.memory, wanted[mind.memory], n_worlds, self.device),
+                    allocate(mind.weights, wanted[mind.weights], n_teams, self.device),
+                )
         assert self._workspace is not None
         return self._workspace
 

@@ -1,0 +1,94 @@
+"""Where a device has too little memory, fewer teams are played at once, with the same results."""
+
+import weakref
+
+import pytest
+
+from conevo.errors import EnvironmentFailure
+from conevo.kernels import arrays
+from conevo.worlds import rollout as rolling
+from conevo.worlds.registry import world
+from conevo.worlds.rollout import Rollout
+from contracts.test_worlds import assert_same_bits, keys, random_teams
+
+TASK = world("rover/complex-1", n_robots=3, iterations=8)
+GENES, TEAMS = random_teams(TASK, 13)
+SCENARIOS = TASK.scenarios(keys(2))
+SHRUNK = "device cpu lacks memory for {} at once: it plays {}, with the same results"
+
+
+@pytest.fixture
+def room(monkeypatch):
+    """Return a list of the worlds (or teams) that have room; before a state all others are gone."""
+    limit, alive = [0], []
+
+    def allocate(struct, shape_of, n, device):
+        if "fitness" in shape_of:
+            assert [one for one in alive if one() is not None] == []
+        if n > limit[0]:
+            raise RuntimeError(f"Failed to allocate {4 * n} bytes on device '{device}'")
+        made = arrays.allocate(struct, shape_of, n, device)
+        alive.extend(weakref.ref(getattr(made, name)) for name in shape_of)
+        return made
+
+    monkeypatch.setattr(rolling, "allocate", allocate)
+    return limit
+
+
+@pytest.mark.parametrize(
+    ("worlds", "said"),
+    [(26, []), (25, [("26 worlds", 12)]), (7, [("26 worlds", 6)]), (2, [("26 worlds", 2)])],
+)
+def test_as_many_teams_as_have_room_are_played_at_once(worlds, said, room, caplog):
+    room[0] = worlds
+    rollout = Rollout(TASK, n_threads=1)
+    for _ in range(2):
+        shrunk = rollout.evaluate(GENES, TEAMS, SCENARIOS)
+    assert caplog.messages == [SHRUNK.format(*one) for one in said]
+    del rollout
+    room[0] = 1000
+    assert_same_bits(Rollout(TASK, n_threads=1).evaluate(GENES, TEAMS, SCENARIOS), shrunk)
+
+
+def test_one_team_that_has_no_room_is_the_machines_failure(room, caplog):
+    room[0] = 1
+    rollout = Rollout(TASK, n_threads=1)
+    with pytest.raises(EnvironmentFailure, match=r"^device 'cpu': too little free memory; end"):
+        rollout.evaluate(GENES, TEAMS, SCENARIOS)
+    assert caplog.messages == []
+    room[0] = 2
+    assert rollout.evaluate(GENES, TEAMS[:1], SCENARIOS).fitness.shape == (1, 2, 3)
+
+
+def test_room_for_many_teams_is_given_up_for_one_in_many_scenarios(room, caplog):
+    """A workspace grows to the worlds and the teams of any two batches, if there is memory."""
+    room[0] = 13
+    rollout = Rollout(TASK, n_threads=1)
+    one = TASK.scenarios(keys(1))
+    rollout.evaluate(GENES, TEAMS, one)
+    room[0] = 12
+    many = TASK.scenarios([*keys(2)] * 6)
+    assert rollout.evaluate(GENES, TEAMS[:1], many).fitness.shape == (1, 12, 3)
+    room[0] = 14
+    many = TASK.scenarios([*keys(2)] * 7)
+    assert rollout.evaluate(GENES, TEAMS[:1], many).fitness.shape == (1, 14, 3)
+    assert caplog.messages == []
+
+
+def test_other_errors_are_not_taken_for_it(room, monkeypatch):
+    def broken(*_):
+        raise RuntimeError("CUDA error 700: an illegal memory access was encountered")
+
+    monkeypatch.setattr(rolling, "allocate", broken)
+    with pytest.raises(RuntimeError, match="CUDA error 700"):
+        Rollout(TASK, n_threads=1).evaluate(GENES, TEAMS, SCENARIOS)
+
+
+def test_arrays_that_have_no_room_are_the_machines_failure(monkeypatch):
+    def refused(values, **_):
+        raise RuntimeError(f"Failed to allocate {values.nbytes} bytes on device 'cpu'")
+
+    rollout = Rollout(TASK, n_threads=1)
+    monkeypatch.setattr(rolling.wp, "array", refused)
+    with pytest.raises(EnvironmentFailure, match="device 'cpu': too little free memory"):
+        rollout.evaluate(GENES, TEAMS, SCENARIOS)
