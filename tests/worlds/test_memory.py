@@ -1,8 +1,12 @@
 """Where a device has too little memory, fewer teams are played at once, with the same results."""
 
 import weakref
+from math import prod
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
+import warp as wp
 
 from conevo.errors import EnvironmentFailure
 from conevo.kernels import arrays
@@ -92,3 +96,39 @@ def test_arrays_that_have_no_room_are_the_machines_failure(monkeypatch):
     monkeypatch.setattr(rolling.wp, "array", refused)
     with pytest.raises(EnvironmentFailure, match="device 'cpu': too little free memory"):
         rollout.evaluate(GENES, TEAMS, SCENARIOS)
+
+
+class OnDevice:
+    """An array on a device; notes how many numbers are fetched from there."""
+
+    device = SimpleNamespace(is_cpu=False)
+
+    def __init__(self, values):
+        self.values, self.shape, self.fetched = values, values.shape, []
+
+    def __getitem__(self, some):
+        cut = OnDevice(self.values[some])
+        cut.fetched = self.fetched
+        return cut
+
+    def numpy(self):
+        self.fetched.append(self.values.size)
+        return self.values.copy()
+
+
+@pytest.mark.parametrize(
+    ("apart", "shape"), [((), (3,)), ((), ()), ((), (3, 4)), ((5,), (3, 5)), ((5,), (3, 2, 5))]
+)
+def test_no_more_is_fetched_from_a_device_than_is_read(apart, shape):
+    """An array holds ``shape`` for each of 7 worlds; a last dimension of its own stays apart."""
+    whole = np.arange(7 * prod(shape)).reshape(7, *shape)
+    flat = whole.reshape(-1, *apart)
+    there = OnDevice(flat)
+    here = wp.array(flat, dtype=wp.int64, device="cpu")
+    for n in (1, 3, 7):
+        assert np.array_equal(rolling._first(there, n, shape), whole[:n])
+        assert there.fetched.pop() == n * prod(shape)
+        assert np.array_equal(rolling._first(here, n, shape), whole[:n])
+    kept = rolling._first(here, 1, shape)
+    here.fill_(-1)
+    assert np.array_equal(kept, whole[:1])  # the next launch does not change what was read

@@ -7,6 +7,7 @@ workspace run in parts.
 
 import logging
 from dataclasses import dataclass
+from math import prod
 from typing import Any, Self
 
 import numpy as np
@@ -239,7 +240,7 @@ class Rollout:
             for name in names:
                 steps[name].append(self._read(batch, name, 1)[0])
             seen = _first(getattr(batch.memory, mind.probe), 1, probe)[0]
-            steps["hidden"].append(seen[:, : self.genome.max_parts].copy())
+            steps["hidden"].append(seen[:, : self.genome.max_parts])
         final = {n: self._read(batch, n, 1)[0] for n in self._simulation.recorded_at_end}
         return {name: np.stack(values) for name, values in steps.items()} | final
 
@@ -350,7 +351,7 @@ class Rollout:
 
     def _read(self, batch: _Workspace, name: str, n: int) -> npt.NDArray[Any]:
         """Return a copy of an array of the first ``n`` worlds' state, [n, its dimensions]."""
-        return _first(getattr(batch.state, name), n, self._shapes[name]).copy()
+        return _first(getattr(batch.state, name), n, self._shapes[name])
 
     def _load(self, batch: _Workspace, pool: Any, teams: npt.NDArray[np.int32]) -> None:
         """Build the controllers of some teams."""
@@ -374,6 +375,10 @@ class Rollout:
 
 
 def _first(array: Any, n: int, shape: tuple[int, ...]) -> npt.NDArray[Any]:
-    """Return what the first ``n`` parts of a batch hold, each of a shape."""
-    values: npt.NDArray[Any] = array.numpy().reshape(-1, *shape)[:n]
+    """Return a copy of what the first ``n`` parts of a batch hold, each of a shape."""
+    values: npt.NDArray[Any]
+    if array.device.is_cpu:
+        values = array.numpy().reshape(-1, *shape)[:n].copy()
+    else:  # cut there, so that no more than that is fetched
+        values = array[: n * prod(shape) // prod(array.shape[1:])].numpy().reshape(n, *shape)
     return values
