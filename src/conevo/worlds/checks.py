@@ -17,8 +17,9 @@ from conevo.controllers.registry import controller, genome_of, refuse_misfit
 from conevo.errors import ConevoError, EnvironmentFailure, UsageError
 from conevo.outside import line_of
 from conevo.parameters import wrong_values
-from conevo.rng import fold, stream
+from conevo.rng import fold
 from conevo.worlds import own_checks
+from conevo.worlds.agreement import random_teams_of
 from conevo.worlds.contract import faults, scenario_faults
 from conevo.worlds.drawn_checks import drawn_in_words, of_drawing
 from conevo.worlds.protocol import World
@@ -233,11 +234,7 @@ def random_teams(a_world: World, n: int) -> tuple[npt.NDArray[np.float32], npt.N
     They are of the controller that the world suggests.
     """
     genome = genome_of(controller(world=a_world), a_world)
-    r = a_world.n_robots
-    pool = stream(1, "check", "pool").uniform(-1, 1, (n * r * genome.n_parts, genome.n_genes))
-    teams = np.full((n, r, genome.max_parts), -1, dtype=np.int32)
-    teams[:, :, : genome.n_parts] = np.arange(len(pool)).reshape(n, r, -1)
-    return pool.astype(np.float32), teams
+    return random_teams_of(genome, a_world.n_robots, n)
 
 
 def _shorter(entry: WorldEntry, environment: str, given: Mapping[str, Any] = {}) -> World:

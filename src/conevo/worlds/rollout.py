@@ -151,6 +151,7 @@ class Rollout:
         scenarios: Scenarios,
         heuristic: npt.NDArray[np.int32] | None = None,
         rounds: int = 1,
+        iterations: int | None = None,
     ) -> Outcome:
         """Run every team in every scenario of its round and return what happened.
 
@@ -160,6 +161,7 @@ class Rollout:
             scenarios: E scenarios of this world for each round, one round after another.
             heuristic: [N, R], index of a heuristic controller of the world, -1 for the robot's own.
             rounds: the teams come in so many parts of equal length, each with its own scenarios.
+            iterations: the first ones that are played, all by default.
 
         Raises:
             ValueError: shapes or rows that do not fit this world.
@@ -176,6 +178,7 @@ class Rollout:
         parts = []
         scene = self._scene(scenarios)
         job = self._job(len(scenarios), e, n_teams // rounds)
+        job.t_end = min(iterations or job.t_end, job.t_end)
         pool = self._array(genes)
         first = 0
         while first < n_teams:

@@ -40,18 +40,25 @@ def simulator(
 ) -> Simulator:
     """Return what plays a world with such controllers, ready to play.
 
+    A device has shown by then that it gives the bits of the CPU.
+
     Raises:
         UsageError: the world's functions cannot be compiled, its own simulator lacks something, or
             the controller does not fit the world.
-        EnvironmentFailure: there is no such device, or no place for compiled kernels.
+        EnvironmentFailure: there is no such device, it gives other results than the CPU, or there
+            is no place for compiled kernels.
     """
     from conevo.kernels.engine import usable_threads
 
     device = device_for(world, device)
     if not has_own_simulator(world):
+        from conevo.worlds.agreement import refuse_other_bits
         from conevo.worlds.rollout import Rollout
 
-        return Rollout(world, controller, n_threads, device).build()
+        made = Rollout(world, controller, n_threads, device).build()
+        if device != CPU:
+            refuse_other_bits(made, device)
+        return made
     refuse_misfit(controller, world)
     from conevo.worlds.own_simulator import build_own
 
