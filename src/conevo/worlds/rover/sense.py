@@ -1,7 +1,7 @@
 """What rovers sense: the closest rover and the red rocks in each octant.
 
-What nothing has changed is not looked at again: a rover's sum over rocks is kept while it stays
-and keeps its setting, and what is detected is taken off.
+What nothing has changed is not looked at again: a rover's sums over rocks, one for each setting,
+are kept until it moves; a rock that is detected is taken off them.
 """
 
 import warp as wp
