@@ -64,8 +64,8 @@ def is_refused(
 
 
 @wp.func
-def act(team: PursuitTeam, scene: PursuitScene, p: PursuitConstants, b: int, t: int) -> None:
-    """Set the wheels of body ``b``; propose where it will be.
+def set_wheels(team: PursuitTeam, scene: PursuitScene, p: PursuitConstants, b: int, t: int) -> None:
+    """Set the wheels of body ``b``.
 
     A prey of the team that has collided does nothing more in its epoch (section 4.3).
     """
@@ -74,9 +74,14 @@ def act(team: PursuitTeam, scene: PursuitScene, p: PursuitConstants, b: int, t: 
         wheels = command(team, scene, p, b, t)
     team.left[b] = wheels[0]
     team.right[b] = wheels[1]
+
+
+@wp.func
+def act(team: PursuitTeam, scene: PursuitScene, p: PursuitConstants, b: int, t: int) -> None:
+    """Propose where body ``b`` will be, and whether it may be there."""
     v = wheel_speed(p, b)
     ahead = wp.vec2f(team.ahead_x[b], team.ahead_y[b])
-    to = drive(team.x[b], team.y[b], team.heading[b], ahead, v * wheels[0], v * wheels[1])
+    to = drive(team.x[b], team.y[b], team.heading[b], ahead, v * team.left[b], v * team.right[b])
     team.to_x[b] = to[0]
     team.to_y[b] = to[1]
     team.to_heading[b] = to[2]
@@ -152,5 +157,5 @@ def add_way(team: PursuitTeam, p: PursuitConstants, b: int, is_out: int, t: int)
     team.moved[at] = moved
 
 
-ACT = (FIRE, Phase(act, bodies))
+ACT = (FIRE, Phase(set_wheels, bodies), Phase(act, bodies))
 COMMIT = (Phase(commit, bodies),)
