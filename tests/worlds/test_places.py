@@ -20,9 +20,9 @@ def one_after_another(key, n, separation, is_free, is_there):
             place = place.astype(np.float32)
             others = places[:k][is_there[:k]]
             is_close = (((place - others) ** 2).sum(axis=1) < separation**2).any()
-            refused[0] += not is_free(*place)
+            refused[0] += not is_free(k, *place)
             refused[1] += bool(is_close)
-            if is_free(*place) and not is_close:
+            if is_free(k, *place) and not is_close:
                 places[k] = place
                 break
             attempt += 1
@@ -38,17 +38,17 @@ def test_places_are_the_first_that_fit(separation, half, some):
     if some:
         is_there = np.random.default_rng(2).random(is_there.shape) < 0.7
 
-    def is_free(e, xy):
-        """Left of a border that every scenario has for itself."""
-        return xy[:, :, 0] < 0.5 + 0.01 * e[:, None]
+    def is_free(e, k, xy):
+        """Left of a border that every scenario and place has for itself."""
+        return xy[:, :, 0] < 0.5 + 0.01 * e[:, None] - 0.02 * k[:, None]
 
     found = draw_places(KEYS, n, separation, is_free if half else None, is_there if some else None)
     assert found.dtype == np.float32
     total = np.zeros(2, int)
     for e, key in enumerate(KEYS):
-        border = np.float64(0.5 + 0.01 * e)
+        borders = [0.5 + 0.01 * e - 0.02 * k for k in range(n)]
         expected, refused = one_after_another(
-            key, n, separation, lambda x, y, b=border: not half or x < b, is_there[e]
+            key, n, separation, lambda k, x, y, b=borders: not half or x < b[k], is_there[e]
         )
         assert found[e].tolist() == expected.tolist(), e
         total += refused
@@ -60,7 +60,7 @@ def test_what_has_no_room_is_refused_in_one_line():
     with pytest.raises(UsageError, match=r"the square has no room for 40 places, 0\.3 apart"):
         draw_places(KEYS, 40, 0.3)
     with pytest.raises(UsageError, match="no room for 2 places"):
-        draw_places(KEYS, 2, 0.0, lambda e, xy: np.zeros(xy.shape[:2], np.bool_))
+        draw_places(KEYS, 2, 0.0, lambda e, k, xy: np.zeros(xy.shape[:2], np.bool_))
 
 
 def test_nobody_needs_no_room():

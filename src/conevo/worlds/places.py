@@ -70,7 +70,7 @@ def draw_places(
     keys: Keys,
     n: int,
     separation: float,
-    is_free: Callable[[Ints, Floats], Bools] | None = None,
+    is_free: Callable[[Ints, Ints, Floats], Bools] | None = None,
     is_there: Bools | None = None,
 ) -> Floats:
     """Return places [E, n, 2] float32, in sides of the square.
@@ -82,8 +82,8 @@ def draw_places(
         keys: [E] of the scenarios.
         n: how many in each.
         separation: least distance of two of them.
-        is_free: whether places [Q, C, 2], C for each of the scenarios with some indices [Q], may be
-            taken; all may by default.
+        is_free: whether candidates [Q, C, 2], C for each of places with some indices [Q] in the
+            scenarios with some indices [Q], may be taken; all may by default.
         is_there: [E, n] whether there is such a place, at 0 otherwise; all are by default.
 
     Raises:
@@ -103,7 +103,8 @@ def draw_places(
         """Draw the next candidates that fit for places ``k`` [Q] of scenarios ``e`` [Q]."""
 
         def fits(rest: Ints, xy: Floats) -> Bools:
-            good = np.ones(xy.shape[:2], np.bool_) if is_free is None else is_free(e[rest], xy)
+            free = np.ones(xy.shape[:2], np.bool_)
+            good = free if is_free is None else is_free(e[rest], k[rest], xy)
             return good & ~is_close(e[rest], k[rest, None], xy) if is_apart else good
 
         begun = tried[e, k]

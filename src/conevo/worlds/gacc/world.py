@@ -282,7 +282,9 @@ class GaccWorld:
         ).astype(np.float32)
         edge = np.float32(p.home + 1e-6)  # more than float32 rounds
 
-        def is_free(e: npt.NDArray[np.intp], xy: npt.NDArray[np.float32]) -> npt.NDArray[np.bool_]:
+        def is_free(
+            e: npt.NDArray[np.intp], _: npt.NDArray[np.intp], xy: npt.NDArray[np.float32]
+        ) -> npt.NDArray[np.bool_]:
             is_home = (np.abs(xy - np.float32(0.5)) <= edge).all(axis=-1)
             return ~is_home & are_clear(e, xy, blocks)
 

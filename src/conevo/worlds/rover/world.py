@@ -24,6 +24,8 @@ Choices, all declared in ``RoverParams`` or here, with their sensitivity on the 
 
 - Rocks stand at the centres of a 200 x 200 lattice inside the canals (``rover.canals``). Each
   scenario draws which sites carry a rock, and of which type, the rovers' starts and the lander.
+  Types are drawn independently of place; with ``segregation`` each has a region (``rover.sites``),
+  and with ``starts = "by_robot"`` so has a rover.
 - If more than two rovers succeed on one rock in one iteration, all that belong to a valid pair are
   credited; the team's value counts the rock once. So no order of rovers decides who is paid.
 - A rover without energy stays where it is as a body that others sense, and does nothing more.
@@ -63,7 +65,7 @@ from conevo.worlds.rover.dynamics import (
     RoverScene,
     RoverTeam,
 )
-from conevo.worlds.rover.sites import draw_rocks, rock_sites
+from conevo.worlds.rover.sites import N_REGIONS, draw_rocks, rock_sites
 
 __all__ = ["RoverParams", "RoverScenarios", "RoverWorld"]
 
@@ -121,6 +123,12 @@ class RoverParams:
     """(side) a rover may not come closer than this to another."""
     fitness: Literal["eq_5_4", "value_times_area"] = "eq_5_4"
     """what a rover is credited with: eq. 5.4, or value times area."""
+    segregation: Share = 0.0  # Choice: 0, as "each possible x, y position" of a canal (5.1.4)
+    """(share) of the rocks of each type A to D that lie in that type's region; the others, and
+    those of type E, lie anywhere. 0 draws types independently of place, 1 gives one type to a
+    region."""
+    starts: Literal["random", "by_robot"] = "random"
+    """where rovers start: anywhere, or rover i in region i mod 4."""
 
     @property
     def ranges(self) -> tuple[float, float, float]:
@@ -203,15 +211,23 @@ class RoverWorld:
         places = rock_sites(rocks.layout(self.environment))
         mask = places.mask
 
-        def is_free(_: npt.NDArray[np.intp], xy: npt.NDArray[np.float32]) -> npt.NDArray[np.bool_]:
+        def is_free(
+            _: npt.NDArray[np.intp], robot: npt.NDArray[np.intp], xy: npt.NDArray[np.float32]
+        ) -> npt.NDArray[np.bool_]:
             column, row = np.moveaxis((xy * np.float32(canals.N_CELLS)).astype(np.intp), -1, 0)
-            return ~mask[row, column]
+            free = ~mask[row, column]
+            if self.params.starts == "by_robot":
+                free &= places.region(xy) == robot[:, None] % N_REGIONS
+            return free
 
         starts = draw_places(
             fold_all(seed, "rover", "starts"), self.n_robots, self.params.separation, is_free
         )
         site, kind, cell = draw_rocks(
-            fold_all(seed, "rover", "rocks"), places, rocks.mix(self.environment)
+            fold_all(seed, "rover", "rocks"),
+            places,
+            rocks.mix(self.environment),
+            self.params.segregation,
         )
         return RoverScenarios(
             rock_x=places.x[site],
