@@ -56,6 +56,8 @@ def test_what_there_is_to_build(environment):
     assert letters == "".join(sorted("".join(plans)))  # exactly the parts, A first
     assert s.left.shape == (2, n_obstacles)
     assert s.start_x.shape == (2, 30)
+    assert len(letters) <= 64  # kernels keep sets of objects and obstacles as bits of a word
+    assert n_obstacles <= 64
 
 
 def test_names_and_sizes():

@@ -10,7 +10,6 @@ import warp as wp
 
 from conevo.kernels.geometry import octant
 from conevo.kernels.random import uniform
-from conevo.kernels.sensing import none_of_eight
 from conevo.kernels.sets import all_of, has, lowest, one, part_of, without_lowest
 from conevo.worlds.gacc.state import (
     NONE,
@@ -33,6 +32,39 @@ else:
 
 
 @wp.func
+def all_eight(value: float) -> octants:
+    """Return a value for each octant."""
+    values = octants()
+    k = int(0)
+    while k < 8:
+        values[k] = value
+        k += 1
+    return values
+
+
+@wp.func
+def value_of(values: octants, o: int) -> float:
+    """Return the value of an octant (selected: a vector with a variable index lies in memory)."""
+    value = values[0]
+    k = int(1)
+    while k < 8:
+        value = wp.where(k == o, values[k], value)
+        k += 1
+    return value
+
+
+@wp.func
+def with_value(values: octants, o: int, value: float) -> octants:
+    """Return the values of eight octants with another one for octant ``o``."""
+    changed = octants()
+    k = int(0)
+    while k < 8:
+        changed[k] = wp.where(k == o, value, values[k])
+        k += 1
+    return changed
+
+
+@wp.func
 def nearness(p: GaccConstants, d2: float) -> float:
     """Return 1 within the least distance of eq. 6.1, from there on falling with the square."""
     return p.min_distance_2 / wp.max(d2, p.min_distance_2)
@@ -47,46 +79,43 @@ def is_noticed(scene: GaccScene, p: GaccConstants, i: int, t: int, thing: int) -
 
 
 @wp.func
-def look(
-    team: GaccTeam, scene: GaccScene, p: GaccConstants, i: int, t: int, setting: int
-) -> octants:
-    """Return the eight object and obstacle sensors; note the objects that are found (eq. 6.2).
+def look(team: GaccTeam, scene: GaccScene, p: GaccConstants, i: int, t: int, setting: int) -> None:
+    """Fill the eight object and obstacle sensors; note the objects that are found (eq. 6.2).
 
     Choice: an object reads (type + 1) / 3 d_min^2 / d^2, an obstacle or a wall - d_min^2 / d^2.
     """
     x = team.x[i]
     y = team.y[i]
     walls = team.walls[i]
-    closest = octants()
-    reading = octants()
-    for o in range(8):
-        closest[o] = p.object_range_2
+    closest = all_eight(p.object_range_2)
     rest = team.things[i] & team.kinds[setting]
     while rest != wp.uint64(0):
         k = lowest(rest)
         dx = team.object_x[k] - x
         dy = team.object_y[k] - y
         d2 = dx * dx + dy * dy
-        if d2 < p.object_range_2 and is_noticed(scene, p, i, t, k):
+        if d2 < p.object_range_2:
             o = octant(dx, dy)
             is_new = team.detected[k] == UNDETECTED
-            if (d2 < closest[o] or is_new) and not is_blocked(scene, walls, x, y, dx, dy):
-                if is_new:
-                    team.detected[k] = t  # the same from every robot that finds it now
-                if d2 < closest[o]:
-                    closest[o] = d2
-                    reading[o] = float(setting + 1) / 3.0 * nearness(p, d2)
+            if d2 < value_of(closest, o) or is_new:
+                if is_noticed(scene, p, i, t, k) and not is_blocked(scene, walls, x, y, dx, dy):
+                    if is_new:
+                        team.detected[k] = t  # the same from every robot that finds it now
+                    if d2 < value_of(closest, o):
+                        closest = with_value(closest, o, d2)
+                        team.inputs[i, o] = float(setting + 1) / 3.0 * nearness(p, d2)
         rest = without_lowest(rest)
     while walls != wp.uint64(0):
         k = lowest(walls)
         dx = wp.clamp(x, scene.left[k], scene.right[k]) - x
         dy = wp.clamp(y, scene.bottom[k], scene.top[k]) - y
         d2 = dx * dx + dy * dy
-        if d2 < p.object_range_2 and is_noticed(scene, p, i, t, p.n_objects + k):
+        if d2 < p.object_range_2:
             o = octant(dx, dy)
-            if d2 < closest[o]:
-                closest[o] = d2
-                reading[o] = -nearness(p, d2)
+            if d2 < value_of(closest, o):
+                if is_noticed(scene, p, i, t, p.n_objects + k):
+                    closest = with_value(closest, o, d2)
+                    team.inputs[i, o] = -nearness(p, d2)
         walls = without_lowest(walls)
     side = int(0)
     while side < 4:
@@ -104,29 +133,24 @@ def look(
         if d2 < p.object_range_2:
             if is_noticed(scene, p, i, t, p.n_objects + scene.left.shape[0] + side):
                 o = octant(dx, dy)
-                if d2 < closest[o]:
-                    closest[o] = d2
-                    reading[o] = -nearness(p, d2)
+                if d2 < value_of(closest, o):
+                    closest = with_value(closest, o, d2)
+                    team.inputs[i, o] = -nearness(p, d2)
         side += 1
-    return reading
 
 
 @wp.func
-def look_around(team: GaccTeam, scene: GaccScene, p: GaccConstants, i: int) -> octants:
-    """Return the eight robot sensors: what the closest robot carries (eq. 6.3), 0 if nothing.
+def look_around(team: GaccTeam, scene: GaccScene, p: GaccConstants, i: int) -> None:
+    """Fill the eight robot sensors: what the closest robot carries (eq. 6.3), 0 if nothing.
 
     Robots that are no longer in reach are forgotten.
     """
-    reading = octants()
     near = team.near[i]
     if (near & team.carriers[0]) == wp.uint64(0):
-        return reading
+        return
     x = team.x[i]
     y = team.y[i]
-    closest = octants()
-    for o in range(8):
-        closest[o] = p.robot_range_2
-    found = none_of_eight()
+    closest = all_eight(p.robot_range_2)
     rest = near
     while rest != wp.uint64(0):
         j = lowest(rest)
@@ -135,21 +159,18 @@ def look_around(team: GaccTeam, scene: GaccScene, p: GaccConstants, i: int) -> o
         d2 = dx * dx + dy * dy
         if d2 < p.robot_range_2:
             o = octant(dx, dy)
-            if d2 < closest[o] and not is_blocked(scene, team.walls[i], x, y, dx, dy):
-                closest[o] = d2
-                found[o] = j
+            if d2 < value_of(closest, o):
+                if not is_blocked(scene, team.walls[i], x, y, dx, dy):
+                    closest = with_value(closest, o, d2)
+                    reading = float(0.0)
+                    if team.held[j] >= 0:
+                        kind = scene.object_type[team.held[j]]
+                        reading = float(kind + 1) / 3.0 * nearness(p, d2)
+                    team.inputs[i, 8 + o] = reading
         elif d2 >= p.near_2:
             near = near & ~one(j)
         rest = without_lowest(rest)
     team.near[i] = near
-    for o in range(8):
-        j = found[o]
-        if j >= 0:
-            k = team.held[j]
-            if k >= 0:
-                near_by = nearness(p, closest[o])
-                reading[o] = float(scene.object_type[k] + 1) / 3.0 * near_by
-    return reading
 
 
 @wp.func
@@ -162,17 +183,16 @@ def look_home(team: GaccTeam, p: GaccConstants, i: int) -> None:
     dx = 0.5 - team.x[i]
     dy = 0.5 - team.y[i]
     d2 = dx * dx + dy * dy
-    show(team, i, 16, octants())
     if d2 < p.home_range_2:
         team.inputs[i, 16 + octant(dx, dy)] = p.home / wp.max(wp.sqrt(d2), p.home)
 
 
 @wp.func
-def show(team: GaccTeam, i: int, first: int, reading: octants) -> None:
-    """Write eight of robot ``i``'s inputs, from number ``first`` on."""
+def silence(team: GaccTeam, i: int, first: int) -> None:
+    """Let eight of robot ``i``'s sensors, from number ``first`` on, sense nothing."""
     o = int(0)
     while o < 8:
-        team.inputs[i, first + o] = reading[o]
+        team.inputs[i, first + o] = 0.0
         o += 1
 
 
@@ -184,13 +204,14 @@ def sense_again(team: GaccTeam, scene: GaccScene, p: GaccConstants, i: int, t: i
     setting = setting_of(team.action[i])
     if team.view[i] != setting or p.object_accuracy < 1.0:
         team.view[i] = setting
-        things = octants()
+        silence(team, i, 0)
         if setting != NONE:
-            things = look(team, scene, p, i, t, setting)
-        show(team, i, 0, things)
+            look(team, scene, p, i, t, setting)
     if has(team.stirred[0], i):
-        show(team, i, 8, look_around(team, scene, p, i))
+        silence(team, i, 8)
+        look_around(team, scene, p, i)
     if has(team.moved[0], i):
+        silence(team, i, 16)
         look_home(team, p, i)
     if team.has_news[0] != 0:
         for kind in range(3):

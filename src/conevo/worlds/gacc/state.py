@@ -121,7 +121,7 @@ class GaccScene:
 
 @named_arrays
 class GaccTeam:
-    """State of a team. Sets of robots, objects and obstacles are words (``kernels.sets``)."""
+    """State of a team. Sets of robots, objects and obstacles are words, so of 64 at most."""
 
     inputs: wp.array2d[float]
     outputs: wp.array2d[float]
