@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -9,10 +11,11 @@ import numpy as np
 from conevo.controllers.registry import controller
 from conevo.evolution.protocol import Trials
 from conevo.rng import stream
-from conevo.runs.evaluation import describe, make_evaluator, score
+from conevo.runs.evaluation import Evaluate, describe, make_evaluator, score
 from conevo.worlds.protocol import Outcome
 from conevo.worlds.registry import world
 from conevo.worlds.rollout import Rollout
+from conevo.worlds.rover.world import RoverParams, RoverScenarios, RoverWorld
 
 ACTIONS = ("dig", "move")
 
@@ -26,6 +29,17 @@ OUTCOME = Outcome(
     ),
     performance={"value": np.array([[10, 20]], dtype=np.float32)},
 )
+
+
+@dataclass(frozen=True)
+class Counting(RoverWorld):
+    """Remembers how many scenarios were drawn each time."""
+
+    n_drawn: list[int] = field(default_factory=list)
+
+    def scenarios(self, keys: Sequence[int]) -> RoverScenarios:
+        self.n_drawn.append(len(keys))
+        return super().scenarios(keys)
 
 
 def test_each_robot_is_credited_with_its_own_mean_over_epochs() -> None:
@@ -75,6 +89,33 @@ def test_a_generation_shares_scenarios_and_fixed_ones_are_the_same_in_all() -> N
     assert counts(4, scenarios="fixed").shape[1] == 3
     fixed = counts(5, scenarios="fixed", purpose="lesion", portrait=True)
     np.testing.assert_array_equal(counts(4, scenarios="fixed"), fixed)
+
+
+def test_a_run_may_meet_those_of_generation_0_in_all_generations() -> None:
+    """In all rounds of all phases; what is the same in all generations is drawn once."""
+    task = Counting("complex-1", RoverParams(n_robots=3, iterations=60))
+    small = controller(world=task, n_hidden=2, max_hidden=2)
+    rollout = Rollout(task, small, 1)
+    sizes: dict[str, Any] = {"seed": 1, "epochs": 2, "fittest_epochs": 3, "credit": "robot"}
+    fresh = make_evaluator(rollout, task, **sizes)
+    fixed = make_evaluator(rollout, task, **sizes, scenarios="fixed")
+    genes = stream(1, "genes").uniform(-1, 1, (6, 23)).astype(np.float32)
+    teams = np.arange(6, dtype=np.int32).reshape(1, 3, 2).repeat(4, axis=0)
+
+    def counts(evaluate: Evaluate, generation: int, **request: Any) -> np.ndarray:
+        return evaluate(Trials(generation, genes, teams, **request)).outcome.counts
+
+    for request in ({}, {"rounds": 2}, {"rounds": 4, "purpose": "elites"}, {"scenarios": "fixed"}):
+        first = counts(fresh, 0, **request)
+        for generation in (0, 1, 7):
+            np.testing.assert_array_equal(counts(fixed, generation, **request), first)
+    assert not np.array_equal(counts(fresh, 1), counts(fixed, 1))
+    task.n_drawn.clear()
+    for generation in (1, 2, 3):
+        counts(fresh, generation)
+        counts(fresh, generation, scenarios="fixed")
+        counts(fixed, generation, rounds=2)
+    assert task.n_drawn == [2, 2, 2]  # fresh ones of each generation, nothing else
 
 
 def test_each_round_of_trials_meets_scenarios_of_its_own() -> None:

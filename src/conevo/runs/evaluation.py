@@ -11,7 +11,7 @@ import numpy.typing as npt
 from conevo.evolution.protocol import Scores, Trials
 from conevo.rng import fold
 from conevo.specialization import individual
-from conevo.worlds.protocol import Outcome, Simulator, World
+from conevo.worlds.protocol import Outcome, Scenarios, Simulator, World
 
 __all__ = ["Evaluation", "Portrait", "describe", "make_evaluator", "score"]
 
@@ -45,27 +45,44 @@ Evaluate = Callable[[Trials], Evaluation]
 
 
 def make_evaluator(
-    simulator: Simulator, world: World, *, seed: int, epochs: int, fittest_epochs: int, credit: str
+    simulator: Simulator,
+    world: World,
+    *,
+    seed: int,
+    epochs: int,
+    fittest_epochs: int,
+    credit: str,
+    scenarios: str = "fresh",
 ) -> Evaluate:
     """Return the function that plays trials in a world.
 
     All trials of a generation meet the same ``epochs`` scenarios, addressed by seed, generation
     and epoch, so a score depends neither on the batch nor on when it is computed; if the trials
-    have rounds, so many further ones in each. Those that ask for fixed scenarios meet the same
-    ``fittest_epochs`` of them in all generations.
+    have rounds, so many further ones in each. With ``scenarios`` "fixed" those of generation 0 are
+    met in all. Trials that ask for fixed scenarios meet the same ``fittest_epochs`` of them in all
+    generations. What all generations meet is drawn once.
     """
 
     def keys(trials: Trials) -> list[int]:
         if trials.scenarios == "fixed":
             return [fold(seed, "fittest", epoch) for epoch in range(fittest_epochs)]
-        met = range(trials.rounds * epochs)
-        return [fold(seed, "epoch", trials.generation, epoch) for epoch in met]
+        generation = 0 if scenarios == "fixed" else trials.generation
+        return [fold(seed, "epoch", generation, epoch) for epoch in range(trials.rounds * epochs)]
+
+    drawn: dict[tuple[str, int], Scenarios] = {}  # of all generations: whose, and how many
+
+    def met(trials: Trials) -> Scenarios:
+        if "fixed" not in (scenarios, trials.scenarios):
+            return world.scenarios(keys(trials))
+        which = trials.scenarios, trials.rounds
+        if which not in drawn:
+            drawn[which] = world.scenarios(keys(trials))
+        return drawn[which]
 
     def evaluate(trials: Trials) -> Evaluation:
         genes = np.asarray(trials.genes, dtype=np.float32)
         teams = np.asarray(trials.teams, dtype=np.int32)
-        scenarios = world.scenarios(keys(trials))
-        outcome = simulator.evaluate(genes, teams, scenarios, rounds=trials.rounds)
+        outcome = simulator.evaluate(genes, teams, met(trials), rounds=trials.rounds)
         return Evaluation(score(outcome, credit), outcome)
 
     return evaluate

@@ -162,6 +162,7 @@ class Lab:
                 epochs=config.run.epochs,
                 fittest_epochs=config.run.fittest_epochs,
                 credit=config.run.credit,
+                scenarios=config.run.scenarios,
             ),
             device=device,
         )

@@ -56,6 +56,10 @@ class RunSettings:
     """the run ends after this many."""
     epochs: Annotated[int, Ge(1), Le(10_000)] = 10
     """simulated trials per team evaluation (q); all teams of a generation meet the same."""
+    scenarios: Literal["fresh", "fixed"] = "fresh"
+    """those of every generation: "fresh" ones, or those of generation 0 in all ("fixed"). Choice:
+    fresh, so that nothing is learnt by heart; fixed ones let a population have a place of its
+    own."""
     fittest_epochs: Annotated[int, Ge(1), Le(10_000)] = 10
     """simulated trials in which each generation's fittest team is evaluated once more. Choice: as
     many as the thesis' q, and the same in all generations, so that progress and the champion of a

@@ -170,7 +170,8 @@ class Simulator(Protocol):
         Args:
             genes: pool of genotypes [K, G], float32, in [-1, 1].
             teams: pool rows of the parts [N, R, U] (team, robot, slot), -1 for an empty slot.
-            scenarios: E scenarios of the world for each round, one round after another.
+            scenarios: E scenarios of the world for each round, one round after another; they may be
+                played again later, so nothing is written into them.
             heuristic: [N, R], index of a heuristic controller of the world, -1 for the robot's own.
             rounds: the teams come in so many parts of equal length, each with its own scenarios.
 
