@@ -5,7 +5,6 @@ import pytest
 import warp as wp
 
 from conevo.kernels.views import near_arrays
-from conevo.worlds.episode import episode_kernel
 from conevo.worlds.registry import world
 from conevo.worlds.rollout import Rollout
 
@@ -55,9 +54,7 @@ def test_near_arrays_compile_for_cuda_and_change_no_result(limit, tmp_path):
     state, memory = near._simulation.state, near._mind.memory
     chosen = near_arrays({state: near._shapes, memory: near._mind_shapes[memory]}, limit)
     assert sum(map(len, chosen.values())) > 0
-    kernel = episode_kernel(
-        near._simulation, near._mind, near=(chosen[state], chosen[memory]), lanes=64
-    )
+    kernel = near.cuda_form(64, shared_bytes=limit)
     near._kernel = kernel
     assert_same_bits(*(one.evaluate(genes, teams, scenarios) for one in (plain, near)))
     seen = [one.record(genes, teams[0], scenarios) for one in (plain, near)]

@@ -21,7 +21,7 @@ from conevo.errors import UsageError
 from conevo.kernels import engine
 from conevo.kernels.arrays import allocate, dimensions, shapes
 from conevo.kernels.devices import device_here
-from conevo.kernels.views import SHARED_BYTES, Near, near_arrays
+from conevo.kernels.views import SHARED_BYTES, near_arrays
 from conevo.terms import counted
 from conevo.worlds.contract import refuse_faults, scenario_faults, shapes_of, stages_of
 from conevo.worlds.episode import Job, episode_kernel, loading_kernel
@@ -59,7 +59,8 @@ class Rollout:
         controller: of the robots; by default the one that the world suggests.
         n_threads: CPU threads; all usable ones by default. Results do not depend on it.
         device: "cpu", a CUDA device as Warp names it, or "auto": a CUDA device if there is one.
-        lanes: lanes of a CPU block (for tests of the CUDA form; needs Warp's CPU blocks).
+        lanes: of a block; on a CUDA device those that the world suggests by default, on the CPU one
+            (more are for tests of the CUDA form, and need Warp's CPU blocks).
         timed: whether ``cycles`` tells what each phase takes, for benchmarks.
         shared_bytes: shared memory that a block on a CUDA device may take.
 
@@ -75,7 +76,7 @@ class Rollout:
         controller: Controller | None = None,
         n_threads: int | None = None,
         device: str = "cpu",
-        lanes: int = 1,
+        lanes: int | None = None,
         timed: bool = False,
         shared_bytes: int = SHARED_BYTES,
     ) -> None:
@@ -88,7 +89,7 @@ class Rollout:
         with engine.building:
             self._simulation = world.simulation()
             refuse_faults(world, self._simulation)
-            self.lanes = lanes if device == "cpu" else self._simulation.lanes
+            self.lanes = lanes or (1 if device == "cpu" else self._simulation.lanes)
             refuse_misfit(self.controller, world)
             self.genome = genome_of(self.controller, world)
             self._mind = self.controller.mind(len(world.inputs), len(world.outputs))
@@ -100,20 +101,25 @@ class Rollout:
             struct: shapes(dimensions(struct, lambda _: ("robots",)), sizes)
             for struct in (mind.memory, mind.weights)
         }
-        near: tuple[Near, Near] = ((), ())
-        if device != "cpu":
-            state, memory = self._simulation.state, mind.memory
-            shape_of = {state: self._shapes, memory: self._mind_shapes[memory]}
-            chosen = near_arrays(shape_of, shared_bytes)
-            near = chosen[state], chosen[memory]
-        with engine.building:
-            bound = 0 if device == "cpu" else self.lanes
-            self._kernel = episode_kernel(self._simulation, mind, timed, near, bound)
+        if device == "cpu":
+            with engine.building:
+                self._kernel = episode_kernel(self._simulation, mind, timed)
+        else:
+            self._kernel = self.cuda_form(self.lanes, timed, shared_bytes)
         stages = stages_of(self._simulation).items()
         self._phases = ["think", *(f"{at} {one.name}" for at, those in stages for one in those)]
         self._clock = wp.zeros(len(self._phases) if timed else 0, dtype=wp.int64, device=device)
         self._is_built = False
         self._workspace: _Workspace | None = None
+
+    def cuda_form(self, lanes: int, timed: bool = False, shared_bytes: int = SHARED_BYTES) -> Any:
+        """Return the kernel as a CUDA device runs it; arguments as for the rollout."""
+        state, memory = self._simulation.state, self._mind.memory
+        shape_of = {state: self._shapes, memory: self._mind_shapes[memory]}
+        chosen = near_arrays(shape_of, shared_bytes)
+        near = chosen[state], chosen[memory]
+        with engine.building:
+            return episode_kernel(self._simulation, self._mind, timed, near, lanes)
 
     def build(self) -> Self:
         """Compile and load the kernels, which the first launch does otherwise; return this rollout.
