@@ -137,13 +137,17 @@ def think(
     used = weights.n_used[i]
     first = wide_vector()
     out = out_vector()
-    for k in range(OUT):
+    k = int(0)
+    while k < OUT:
         out[k] = shape.bias
+        k += 1
     for chunk in range((used + WIDE - 1) // WIDE):
         c = i * shape.n_chunks + chunk
         h = wide_vector()
-        for k in range(WIDE):
+        k = int(0)
+        while k < WIDE:
             h[k] = shape.bias
+            k += 1
         w = c * shape.n_inputs
         j = int(0)
         while j < shape.n_sensors:  # not range: see worlds.rover.dynamics
@@ -154,8 +158,10 @@ def think(
         while j < shape.n_context:
             h += weights.w_in[w + j] * memory.hidden[hidden + j]
             j += 1
-        for k in range(WIDE):
+        k = int(0)
+        while k < WIDE:
             h[k] = sigmoid(h[k])
+            k += 1
         h = wp.cw_mul(h, weights.filled[c])
         k = int(0)
         while k < wp.min(used - chunk * WIDE, WIDE):
@@ -164,13 +170,19 @@ def think(
         if chunk == 0:
             first = h
         else:
-            for k in range(WIDE):
+            k = int(0)
+            while k < WIDE:
                 memory.hidden[hidden + chunk * WIDE + k] = h[k]
+                k += 1
     # Written only now: every chunk must read the context of the previous iteration.
-    for k in range(WIDE):
+    k = int(0)
+    while k < WIDE:
         memory.hidden[hidden + k] = first[k]
-    for o in range(shape.n_outputs):
+        k += 1
+    o = int(0)
+    while o < shape.n_outputs:
         outputs[i, o] = out[o]
+        o += 1
 
 
 @wp.func
