@@ -79,7 +79,7 @@ def settings() -> Iterator[tuple[str, Params]]:
             yield f"{title} {sign}", scaled(names, factor)
     yield "ranges as sides of squares", scaled(RANGES, np.pi**-0.5)
     yield "step without the root of 2", scaled(("move_range",), 2**-0.5)
-    yield "fitness value_times_area", {"fitness": "value_times_area"}
+    yield "fitness value_times_area", {"fitness": "product"}
 
 
 def long_settings() -> Iterator[tuple[str, Params]]:

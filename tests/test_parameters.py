@@ -32,7 +32,7 @@ WRONG = [
     (ROVER, "world.energy", -1, "must be greater than 0"),
     (ROVER, "world.energy", float("inf"), "must be a finite number"),
     (ROVER, "world.energy", "much", "must be a valid number"),
-    (ROVER, "world.fitness", "eq_5", "must be 'eq_5_4' or 'value_times_area'"),
+    (ROVER, "world.fitness", "eq_5", "must be 'cumulative', 'activation', 'product' or 'value'"),
     ("gacc/simple-1", "world.needs_detection", 1, "must be a valid boolean"),
     (OWN, "world.step", 0.5, "must be less than or equal to 0.1"),
     (ROVER, "method.sst", 1.5, "must be less than or equal to 1"),

@@ -50,7 +50,8 @@ class Params:
     d_min: float = 0.01
     separation: float = 0.002
     coverage_cells: int = 100
-    fitness: str = "eq54"  # or "value_times_area"
+    fitness: str = "cumulative"  # area so far; "activation": its own; "product", "value"
+    rocks_per_activation: int = 0  # all in range
 
 
 # --- controllers --------------------------------------------------------------------------------
@@ -336,16 +337,32 @@ def run(
             for k in within(xy[v], rock_xy, p.ranges[action[v]]):
                 if detected[k] < 0 and uniform(t, k, v) < p.accuracies[action[v]]:
                     hits.setdefault(k, []).append(v)
-        reporting = set()
-        for k, rovers in sorted(hits.items()):
+
+        def partners_of(k: int, rovers: Sequence[int], action: list[int] = action) -> set[int]:
+            """The rovers that belong to a pair whose settings detect rock k."""
             fitting = COMPLEMENTARY[int(rock_type[k])]
-            partners = {
+            return {
                 v for v in rovers for w in rovers if v != w and (action[v], action[w]) in fitting
             }
+
+        if p.rocks_per_activation == 1:
+            # Settled: each takes, of what it could detect with anybody, the first in random order.
+            could = {k: partners_of(k, rovers) for k, rovers in hits.items()}
+            hits = {}
+            for v in activating:
+                mine = [k for k in could if v in could[k]]
+                if mine:
+                    first = min(mine, key=lambda k, t=t: (uniform(t, k, 64), k))
+                    hits.setdefault(first, []).append(v)
+        reporting = set()
+        for k, rovers in sorted(hits.items()):
+            partners = partners_of(k, rovers)
             for v in sorted(partners):
                 d2 = ((rock_xy[k] - xy[v]) ** 2).sum()
                 # eq. 5.4; the bound of eq. 5.1 is against singularities, hence a maximum.
-                fitness[v] += value[k] * covered[v].mean() / max(d2, p.d_min**2)
+                own = math.pi * p.ranges[action[v]] ** 2
+                area = own if p.fitness == "activation" else covered[v].mean()
+                fitness[v] += value[k] * area / max(d2, p.d_min**2)
                 credited[v] += value[k]
             if partners:
                 detected[k] = t
@@ -368,8 +385,10 @@ def run(
         log["energy"][t] = energy
         log["covered"][t] = covered.mean(axis=1)
 
-    if p.fitness == "value_times_area":
+    if p.fitness == "product":
         fitness = credited * covered.mean(axis=1)
+    if p.fitness == "value":
+        fitness = credited
     # The lander records a detection one iteration after it, so those of the last are lost.
     recorded = (detected >= 0) & (detected <= n_iterations - 2)
     return log | {

@@ -32,20 +32,24 @@ def crowd(scenarios, n_robots, seed, side=0.12):
 
 
 def oracle_params(p: RoverParams) -> rover_oracle.Params:
+    def reach(value: float) -> float:
+        return float(np.sqrt(value / np.pi)) if p.range_is == "area" else value
+
     return rover_oracle.Params(
         iterations=p.iterations,
         energy=p.energy,
-        ranges=(p.low_range, p.med_range, p.hi_range),
+        ranges=(reach(p.low_range), reach(p.med_range), reach(p.hi_range)),
         accuracies=(p.low_accuracy, p.med_accuracy, p.hi_accuracy),
         costs=(p.low_cost, p.med_cost, p.hi_cost),
-        rover_range=p.rover_sensor_range,
+        rover_range=reach(p.rover_sensor_range),
         sensing_cost=p.rover_sensor_cost,
         d_max=p.move_range,
         move_cost=p.move_cost,
         report_cost=p.report_cost,
         d_min=p.min_distance,
         separation=p.separation,
-        fitness="eq54" if p.fitness == "eq_5_4" else "value_times_area",
+        fitness=p.fitness,
+        rocks_per_activation=p.rocks_per_activation,
     )
 
 
@@ -96,12 +100,32 @@ def test_kernel_equals_the_oracle(environment, seed):
         n_robots=7,
         iterations=60,
         energy=9.013 if seed == 3 else 1000.0,  # some die within the run
-        fitness="value_times_area" if seed == 2 else "eq_5_4",
+        fitness="product" if seed == 2 else "cumulative",
     )
+    compare_with_oracle(a_world, environment, seed, kinds[seed])
+
+
+@pytest.mark.parametrize(
+    ("environment", "options"),
+    [
+        ("complex-5", {"rocks_per_activation": 1}),
+        ("simple-3", {"rocks_per_activation": 1, "fitness": "value"}),
+        ("complex-5", {"fitness": "activation"}),
+        ("complex-5", {"range_is": "area", "fitness": "value"}),
+        ("complex-1", {"range_is": "area", "rocks_per_activation": 1, "fitness": "activation"}),
+    ],
+)
+def test_kernel_equals_the_oracle_with_other_readings(environment, options):
+    a_world = world(f"rover/{environment}", n_robots=7, iterations=60, **options)
+    expected = compare_with_oracle(a_world, environment, 3, "both")
+    assert (expected["credited"] > 0).sum() > 2
+
+
+def compare_with_oracle(a_world, environment, seed, kind):
     genes, slots = random_team(a_world, seed)
     heuristic = np.full(7, -1, dtype=np.int32)
-    if kinds[seed] != "networks":
-        heuristic[:: 2 if kinds[seed] == "both" else 1] = 3
+    if kind != "networks":
+        heuristic[:: 2 if kind == "both" else 1] = 3
         heuristic[0] = 0
     scenarios = crowd(a_world.scenarios([fold(seed, environment)]), 7, seed)
     seen = Rollout(a_world).record(genes, slots, scenarios, heuristic)
@@ -129,6 +153,7 @@ def test_kernel_equals_the_oracle(environment, seed):
         assert out.performance["value"][0, 0] == expected["value"]
         assert abs(out.performance["area"][0, 0] - expected["area"]) < 2e-4
         assert np.allclose(out.fitness[0, 0], expected["fitness"], rtol=1e-3, atol=1e-3)
+    return expected
 
 
 def test_the_comparison_above_is_not_vacuous():
@@ -261,6 +286,47 @@ def test_accuracy_is_the_chance_of_each_rover():
     )
     n = out.performance["value"][0, 0] / 2
     assert abs(n - 560) < 5 * np.sqrt(1000 * 0.56 * 0.44)
+
+
+def test_one_rock_per_activation_is_the_same_one_for_both():
+    """Of twenty in reach of both, each activation detects one, until none is left."""
+    rocks = [(0.5 + 0.0005 * k, 0.5, "A") for k in range(20)]
+    robots = [(0.5, 0.49, LOW), (0.5, 0.51, LOW), (0.1, 0.1, LOW)]
+    _, seen = situation(robots, rocks, iterations=25, rocks_per_activation=1)
+    steps = np.minimum(np.arange(1, 26), 20)
+    assert seen["value"].tolist() == np.stack([steps, steps, 0 * steps], axis=1).tolist()
+    order = np.sort(seen["detected"][seen["detected"] < 25])
+    assert order.tolist() == list(range(20))
+
+
+def test_a_third_rover_takes_the_same_rock_or_none():
+    """Three that reach the same rocks take the same one: all are credited, the team counts it."""
+    rocks = [(0.5, 0.5 + 0.0005 * k, "E") for k in range(6)]
+    robots = [(0.5, 0.49, MED), (0.5, 0.515, MED), (0.49, 0.5, MED)]
+    out, seen = situation(robots, rocks, iterations=4, rocks_per_activation=1)
+    assert seen["value"][0].tolist() == [1, 1, 1]
+    assert out.performance["value"][0, 0] == 3
+
+
+def test_fitness_readings_by_hand():
+    robots, rocks = [(0.5, 0.48, MED), (0.5, 0.515, HI)], [(0.5, 0.5, "C"), (0.5, 0.5, "D")]
+    for fitness, expected in {
+        "activation": 3 * np.pi * np.array([0.05**2 / 0.02**2, 0.03**2 / 0.015**2]),
+        "value": [3, 3],
+    }.items():
+        out, seen = situation(robots, rocks, iterations=6, fitness=fitness)
+        assert out.fitness[0, 0] == pytest.approx(expected, rel=1e-4)
+        assert seen["value"][-1].tolist() == [3, 3]
+    out, seen = situation(robots, rocks, iterations=6, fitness="product")
+    assert out.fitness[0, 0] == pytest.approx(3 * seen["covered"][-1] / 1e4, rel=1e-5)
+
+
+def test_a_range_as_a_share_of_the_area_is_a_disc_of_that_area():
+    """Nitschke 2009, 5.2.1: "a portion of the environment's size"; 0.05 is a radius of 0.126."""
+    p = world("rover/complex-1", range_is="area").params
+    assert p.ranges == pytest.approx((0.1493, 0.1262, 0.0977), abs=1e-4)
+    assert np.pi * np.square(p.ranges) == pytest.approx([0.07, 0.05, 0.03])
+    assert p.rover_sensor_radius == pytest.approx(0.0798, abs=1e-4)
 
 
 def test_the_lander_hears_one_iteration_later():

@@ -9,10 +9,12 @@ from conevo.worlds.rollout import Rollout
 from conevo.worlds.stepping import Stepper
 from worlds.test_rover import crowd, random_team
 
+ONE_ROCK = {"rocks_per_activation": 1, "fitness": "activation"}
 
-def meeting(n_robots, iterations):
+
+def meeting(n_robots, iterations, **options):
     """Return a world, and a team of networks and heuristic rovers that meet and detect rocks."""
-    a_world = world("rover/complex-5", n_robots=n_robots, iterations=iterations)
+    a_world = world("rover/complex-5", n_robots=n_robots, iterations=iterations, **options)
     genes, slots = random_team(a_world, 6)
     robots = np.arange(n_robots)
     heuristic = np.where(robots < 5, -1, robots % 4).astype(np.int32)
@@ -42,9 +44,20 @@ def test_any_number_of_lanes_gives_the_same_bits(epoch, serial, cpu_blocks, lane
     assert (serial["fitness"][-1] > 0).sum() > 5
 
 
-def test_what_is_kept_changes_nothing():
+def test_lanes_agree_on_the_one_rock_of_an_activation(cpu_blocks):
+    a_world, played = meeting(20, 40, **ONE_ROCK)
+    serial = Rollout(a_world, n_threads=1).record(*played)
+    with cpu_blocks():
+        seen = Rollout(a_world, n_threads=1, lanes=32).record(*played)
+    for name, values in serial.items():
+        assert seen[name].tobytes() == values.tobytes(), name
+    assert (serial["fitness"][-1] > 0).sum() > 5
+
+
+@pytest.mark.parametrize("options", [{}, ONE_ROCK], ids=["all in range", "one rock"])
+def test_what_is_kept_changes_nothing(options):
     """Rovers that look at everything again in each iteration end with the same bits."""
-    a_world, (genes, slots, scenarios, heuristic) = meeting(12, 60)
+    a_world, (genes, slots, scenarios, heuristic) = meeting(12, 60, **options)
     kept, fresh = (
         Stepper(a_world, genes, slots[None], scenarios, heuristic[None]) for _ in range(2)
     )

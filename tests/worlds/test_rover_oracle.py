@@ -200,7 +200,7 @@ def test_the_fitness_counts_the_area_covered_before() -> None:
 
 def test_value_times_area() -> None:
     rocks = [(*ROCK, "A"), (0.5, 0.51, "E")]
-    end = play(team("ll"), PAIR, rocks, fitness="value_times_area")
+    end = play(team("ll"), PAIR, rocks, fitness="product")
     np.testing.assert_allclose(end["fitness"], [2 * LOW_DISC / 10_000] * 2, rtol=1e-12)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 
 import numpy as np
@@ -31,8 +32,7 @@ LANDER = 0.012  # Choice: radius; the lander only records
 def playback(parts: Parts) -> Playback:
     """Return the playback of an epoch of ``rover``."""
     t, r = parts.t, parts.r
-    ranges = tuple(parts.param(f"{name}_range") for name in ("low", "med", "hi"))
-    near = parts.param("rover_sensor_range")
+    *ranges, near = (_radius(parts, name) for name in ("low", "med", "hi", "rover_sensor"))
     return Playback(
         **begun(parts, ACTIONS, CASTES, OUTPUTS),
         unit="sides",
@@ -55,6 +55,13 @@ def playback(parts: Parts) -> Playback:
         event_kinds=(Kind("detection", ROCKS[2]),),
         measures=(_value(parts), _area(parts)),
     )
+
+
+def _radius(parts: Parts, name: str) -> float:
+    """Return how far something reaches."""
+    found = parts.param(f"{name}_range")
+    is_area = parts.about["params"].get("range_is") == "area"
+    return math.sqrt(found / math.pi) if is_area else found
 
 
 def _backdrop(parts: Parts) -> tuple[Backdrop, ...]:

@@ -14,23 +14,29 @@ from conevo.kernels.actions import NONE, begin_counting
 from conevo.kernels.geometry import COVER_CELLS, COVER_WORDS, covered_by_any
 from conevo.kernels.phases import Phase, n_lanes
 from conevo.worlds.rover.act import act, commit
-from conevo.worlds.rover.resolve import RESOLVE
+from conevo.worlds.rover.resolve import RESOLVE, RESOLVE_ONE_ROCK
 from conevo.worlds.rover.sense import SENSE
 from conevo.worlds.rover.state import (
+    FITNESS,
     LISTS,
     N_ACTIONS,
     N_SETTINGS,
+    NO_PICK,
+    PRODUCT,
     ROCK_CELLS,
     SURVEYED,
+    VALUE,
     RoverConstants,
     RoverScene,
     RoverTeam,
 )
 
 __all__ = [
+    "FITNESS",
     "FUNCTIONS",
     "LISTS",
     "N_ACTIONS",
+    "ONE_ROCK",
     "ROCK_CELLS",
     "SCRATCH",
     "SURVEYED",
@@ -64,6 +70,7 @@ def begin(team: RoverTeam, scene: RoverScene, p: RoverConstants, i: int, t: int)
     team.shown[i] = NONE
     team.gain[i] = 0
     team.gain_near[i] = wp.int64(0)
+    team.pick[i] = NO_PICK
     if i == 0:
         team.changed[0] = ~wp.uint64(0)
         for k in range(LISTS):
@@ -117,8 +124,10 @@ def report(team: RoverTeam, scene: RoverScene, p: RoverConstants, i: int, t_end:
     if i == 0:
         team.performance[0] = float(team.total[0])
         team.performance[1] = float(team.total[1]) / cells
-    if p.fitness_is_product != 0:
+    if p.fitness_reading == PRODUCT:
         team.fitness[i] = team.value[i] * float(team.covered[i]) / cells
+    if p.fitness_reading == VALUE:
+        team.fitness[i] = team.value[i]
 
 
 FUNCTIONS = {
@@ -129,3 +138,4 @@ FUNCTIONS = {
     "resolve": RESOLVE,
     "outcome": (Phase(clear_total, 1), Phase(add_up, all_lanes), Phase(report)),
 }
+ONE_ROCK = {**FUNCTIONS, "resolve": RESOLVE_ONE_ROCK}  # an activation detects one rock at most

@@ -9,9 +9,11 @@ from conevo.kernels.random import uniform
 from conevo.kernels.sets import lowest, one, without_lowest
 from conevo.worlds.rover.sense import ROWS, SUBS, share, take_off
 from conevo.worlds.rover.state import (
+    ACTIVATION,
     COVERING,
     DETECTING,
     N_SETTINGS,
+    NO_PICK,
     PARTS,
     ROCK_CELLS,
     UNIT,
@@ -24,7 +26,11 @@ from conevo.worlds.rover.state import (
     rock_cell,
 )
 
-__all__ = ["RESOLVE"]
+__all__ = ["RESOLVE", "RESOLVE_ONE_ROCK"]
+
+ORDER = wp.constant(64)  # above every rover's number: of the order in which rocks are taken
+ROCK_BITS = wp.constant(wp.int64(20))
+DRAWS = wp.constant(2.0**24)  # different numbers that ``uniform`` returns
 
 
 @wp.func
@@ -166,10 +172,13 @@ def pair(team: RoverTeam, scene: RoverScene, p: RoverConstants, i: int, part: in
                 if need != NONE and team.detected[k] >= t:
                     fit = fitting(team, scene, p, team.mates[i], need, k)
                     if fit != wp.uint64(0):
-                        if succeed(scene, p, i, a, fit, need, k, t):
+                        if not succeed(scene, p, i, a, fit, need, k, t):
+                            wp.atomic_or(team.hopeful, i, fit)
+                        elif p.rocks_per_activation == 0:
                             gain(team, scene, p, i, k, d2, t)
                         else:
                             wp.atomic_or(team.hopeful, i, fit)
+                            prefer(team, scene, i, k, t)
             k += subs
         row += rows
 
@@ -245,6 +254,8 @@ def credit(team: RoverTeam, scene: RoverScene, p: RoverConstants, q: int, t: int
     team.barren[at] = team.barren[at] | (team.mates[i] & ~team.hopeful[i])
     if team.gain[i] > 0:
         area = float(team.covered[i]) / float(COVER_CELLS * COVER_CELLS)
+        if p.fitness_reading == ACTIVATION:
+            area = of_setting(p.areas, team.action[i])
         near = float(team.gain_near[i]) / (UNIT * UNIT * p.min_distance_2)
         team.value[i] = team.value[i] + float(team.gain[i])
         team.fitness[i] = team.fitness[i] + near * area
@@ -253,4 +264,46 @@ def credit(team: RoverTeam, scene: RoverScene, p: RoverConstants, q: int, t: int
         team.gain_near[i] = wp.int64(0)
 
 
+@wp.func
+def prefer(team: RoverTeam, scene: RoverScene, i: int, k: int, t: int) -> None:
+    """Let rover ``i``, which can detect rock ``k``, take it if it comes before its others.
+
+    Choice: the order in which rocks are taken is drawn for each iteration, one for all rovers.
+    """
+    rank = wp.int64(uniform(scene.seed[0], t, k, ORDER) * DRAWS)
+    wp.atomic_min(team.pick, i, (rank << ROCK_BITS) | wp.int64(k))
+
+
+@wp.func
+def take(team: RoverTeam, scene: RoverScene, p: RoverConstants, q: int, t: int) -> None:
+    """Let a listed rover detect the rock that it takes if a fitting mate takes the same."""
+    i = team.detecting[q]
+    pick = team.pick[i]
+    if pick == NO_PICK:
+        return
+    k = int(pick & ((wp.int64(1) << ROCK_BITS) - wp.int64(1)))
+    rest = team.mates[i] & team.acting[partner(scene.rock_type[k], team.action[i])]
+    mates = int(0)
+    while rest != wp.uint64(0):
+        mates += int(team.pick[lowest(rest)] == pick)
+        rest = without_lowest(rest)
+    if mates > 0:
+        dx = scene.rock_x[k] - team.x[i]
+        dy = scene.rock_y[k] - team.y[i]
+        gain(team, scene, p, i, k, dx * dx + dy * dy, t)
+
+
+@wp.func
+def credit_one(team: RoverTeam, scene: RoverScene, p: RoverConstants, q: int, t: int) -> None:
+    """Credit a listed rover, and let it choose anew."""
+    credit(team, scene, p, q, t)
+    team.pick[team.detecting[q]] = NO_PICK
+
+
 RESOLVE = (Phase(enlist), Phase(detect, n_detecting), Phase(credit, n_crediting))
+RESOLVE_ONE_ROCK = (
+    Phase(enlist),
+    Phase(detect, n_detecting),
+    Phase(take, n_crediting),
+    Phase(credit_one, n_crediting),
+)

@@ -103,14 +103,14 @@ def see_rovers(team: RoverTeam, p: RoverConstants, i: int) -> None:
         rest = without_lowest(rest)
         dx = team.x[j] - x
         dy = team.y[j] - y
-        if dx * dx + dy * dy < p.rover_sensor_range_2:
+        if dx * dx + dy * dy < p.rover_sensor_radius_2:
             near = near | one(j)
     if near == wp.uint64(0) and team.sees_rovers[i] == 0:
         return
     team.sees_rovers[i] = int(near != wp.uint64(0))
     for o in range(N_SENSORS):
         team.inputs[i, o] = 0.0
-        team.closest[i * N_SENSORS + o] = p.rover_sensor_range_2
+        team.closest[i * N_SENSORS + o] = p.rover_sensor_radius_2
     while near != wp.uint64(0):
         j = lowest(near)
         near = without_lowest(near)

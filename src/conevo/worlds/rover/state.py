@@ -10,19 +10,24 @@ from conevo.kernels.phases import n_lanes
 from conevo.worlds.rover import canals
 
 __all__ = [
+    "ACTIVATION",
     "CANAL_CELLS",
     "COVERING",
     "DETECTING",
+    "FITNESS",
     "LISTS",
     "MOVE",
+    "NO_PICK",
     "N_ACTIONS",
     "N_SETTINGS",
     "OLD",
     "PARTS",
+    "PRODUCT",
     "ROCK_CELLS",
     "SCANNING",
     "SURVEYED",
     "UNIT",
+    "VALUE",
     "RoverConstants",
     "RoverScene",
     "RoverTeam",
@@ -46,6 +51,14 @@ SCANNING = wp.constant(0)
 COVERING = wp.constant(1)
 DETECTING = wp.constant(2)
 
+# What a rover is credited with: ``RoverParams.fitness``, and where in it.
+FITNESS = ("cumulative", "activation", "product", "value")
+ACTIVATION = wp.constant(1)
+PRODUCT = wp.constant(2)
+VALUE = wp.constant(3)
+
+NO_PICK = wp.constant(wp.int64(2**62))
+
 # Every so many iterations each rover's company is looked up: who may be near until the next time.
 SURVEYED = wp.constant(4)
 PARTS = wp.constant(32)  # that lanes cut a scan into: 8 rows x 4 rocks, or 32 rows of cells
@@ -64,7 +77,7 @@ class RoverConstants:
     ranges: wp.vec3f
     accuracy: wp.vec3f
     cost: wp.vec3f
-    rover_sensor_range_2: float
+    rover_sensor_radius_2: float
     rover_sensor_cost: float
     move_range: float
     move_cost: float
@@ -73,7 +86,9 @@ class RoverConstants:
     separation_2: float
     crowd_2: float
     company_2: float
-    fitness_is_product: int
+    areas: wp.vec3f
+    fitness_reading: int
+    rocks_per_activation: int
 
 
 @wp.struct
@@ -134,6 +149,7 @@ class RoverTeam:
     # What an iteration or the outcome adds up, in integers.
     gain: wp.array[int]
     gain_near: wp.array[wp.int64]  # in 1 / UNIT^2
+    pick: wp.array[wp.int64]  # the rock that a rover takes if it may detect one, behind its rank
     total: Annotated[wp.array[int], "measures"]
     # Lists of the iteration, and their lengths.
     n_listed: Annotated[wp.array[int], "lists"]

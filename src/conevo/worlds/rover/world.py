@@ -28,6 +28,10 @@ Choices, all declared in ``RoverParams`` or here, with their sensitivity on the 
   and with ``starts = "by_robot"`` so has a rover.
 - If more than two rovers succeed on one rock in one iteration, all that belong to a valid pair are
   credited; the team's value counts the rock once. So no order of rovers decides who is paid.
+- With ``rocks_per_activation`` 1, a rover that could detect several rocks, with any others, takes
+  the one that comes first in an order drawn for the iteration, the same for all rovers; a rock is
+  detected by those that take it. So two rovers that meet detect one rock at a time.
+- The area of an activation is that of its whole disc, over the edge of the square too.
 - A rover without energy stays where it is as a body that others sense, and does nothing more.
 - The lander records a detection one iteration later (section 5.1), so those of the last iteration
   are not in ``value``.
@@ -41,6 +45,7 @@ Version history:
   scenarios are drawn from other random numbers, those of all keys at once.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Annotated, Any, ClassVar, Literal
@@ -57,8 +62,10 @@ from conevo.worlds.places import draw_places
 from conevo.worlds.protocol import Scenarios, Simulation, kernel_params, names_of
 from conevo.worlds.rover import canals, rocks
 from conevo.worlds.rover.dynamics import (
+    FITNESS,
     FUNCTIONS,
     LISTS,
+    ONE_ROCK,
     SCRATCH,
     SURVEYED,
     RoverConstants,
@@ -90,7 +97,7 @@ class RoverParams:
     energy: Positive = 1000.0
     """(energy) of a rover at the start of an epoch."""
     low_range: Range = 0.07
-    """(side) radius of a detection with setting low."""
+    """(side) radius of a detection with setting low, unless ``range_is`` says otherwise."""
     med_range: Range = 0.05
     """(side) radius of a detection with setting med."""
     hi_range: Range = 0.03
@@ -109,6 +116,8 @@ class RoverParams:
     """(energy) of a detection with setting hi."""
     rover_sensor_range: Range = 0.02
     """(side) how far the rover sensors see."""
+    range_is: Literal["radius", "area"] = "radius"
+    """what these four ranges are: the radius of a disc, or its share of the square's area."""
     rover_sensor_cost: NonNegative = 0.05
     """(energy) of the rover sensors, in every iteration."""
     move_range: Annotated[float, Gt(0), Le(0.02)] = 0.01
@@ -121,8 +130,11 @@ class RoverParams:
     """(side) lower bound of distances in eqs 5.1 and 5.4."""
     separation: NonNegative = 0.002  # Choice: "only one rover can occupy any position" (5.1)
     """(side) a rover may not come closer than this to another."""
-    fitness: Literal["eq_5_4", "value_times_area"] = "eq_5_4"
-    """what a rover is credited with: eq. 5.4, or value times area."""
+    fitness: Literal["cumulative", "activation", "product", "value"] = "cumulative"
+    """what a rover is credited with: eq. 5.4 with the area that it has covered so far, or with the
+    area of the activation; value times area; or value."""
+    rocks_per_activation: Annotated[int, Ge(0), Le(1)] = 0
+    """(rocks) that an activation can detect; 0 is all in range."""
     segregation: Share = 0.0  # Choice: 0, as "each possible x, y position" of a canal (5.1.4)
     """(share) of the rocks of each type A to D that lie in that type's region; the others, and
     those of type E, lie anywhere. 0 draws types independently of place, 1 gives one type to a
@@ -133,7 +145,25 @@ class RoverParams:
     @property
     def ranges(self) -> tuple[float, float, float]:
         """Radius of a detection with each setting."""
-        return self.low_range, self.med_range, self.hi_range
+        return (
+            self._radius(self.low_range),
+            self._radius(self.med_range),
+            self._radius(self.hi_range),
+        )
+
+    @property
+    def areas(self) -> tuple[float, float, float]:
+        """Area of a detection with each setting, as a share of the square's."""
+        low, med, hi = (math.pi * radius**2 for radius in self.ranges)
+        return low, med, hi
+
+    @property
+    def rover_sensor_radius(self) -> float:
+        """Radius within which the rover sensors see."""
+        return self._radius(self.rover_sensor_range)
+
+    def _radius(self, of: float) -> float:
+        return math.sqrt(of / math.pi) if self.range_is == "area" else of
 
     @property
     def accuracy(self) -> tuple[float, float, float]:
@@ -146,9 +176,9 @@ class RoverParams:
         return self.low_cost, self.med_cost, self.hi_cost
 
     @property
-    def fitness_is_product(self) -> bool:
-        """Whether a rover is credited with value times area."""
-        return self.fitness == "value_times_area"
+    def fitness_reading(self) -> int:
+        """What a rover is credited with, as kernels know it."""
+        return FITNESS.index(self.fitness)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -257,7 +287,7 @@ class RoverWorld:
             scene=RoverScene,
             params_type=RoverConstants,
             params=kernel_params(RoverConstants, self.params, **self._reaches()),
-            functions=FUNCTIONS,
+            functions=ONE_ROCK if self.params.rocks_per_activation else FUNCTIONS,
             recorded=("x", "y", "action", "setting", "energy", "covered", "value", "fitness"),
             recorded_at_end=("detected",),
             scratch=SCRATCH,
@@ -268,7 +298,7 @@ class RoverWorld:
         p = self.params
         steps = 2 * int(SURVEYED) * p.move_range
         reaches = {
-            "crowd_2": max(p.rover_sensor_range, p.separation),
+            "crowd_2": max(p.rover_sensor_radius, p.separation),
             "company_2": 2 * max(p.ranges),
         }
         return {name: (1.001 * (reach + steps)) ** 2 for name, reach in reaches.items()}
