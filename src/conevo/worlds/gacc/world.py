@@ -327,6 +327,7 @@ class GaccWorld:
                 ordered=sum(1 << k for k, ordered in enumerate(plan.is_ordered) if ordered),
             ),
             functions=FUNCTIONS,
+            lanes=96,  # Choice: as of the rover world; there are as many neurons and sensors
             recorded=(
                 *("x", "y", "energy", "fitness", "action", "held", "waited", "dropped"),
                 *("situation", "object_x", "object_y", "life", "detected", "part", "demand"),

@@ -290,6 +290,7 @@ class RoverWorld:
             functions=ONE_ROCK if self.params.rocks_per_activation else FUNCTIONS,
             recorded=("x", "y", "action", "setting", "energy", "covered", "value", "fitness"),
             recorded_at_end=("detected",),
+            lanes=96,  # Choice: the best of a prototype on an H100; most phases have 20 x 8 items
             scratch=SCRATCH,
         )
 
