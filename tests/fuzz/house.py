@@ -87,7 +87,7 @@ def build(folder: Path) -> None:
     report.mkdir()
     (report / "manifest.json").write_text('{"files": {}}')  # as of a report of nothing
     record(run, threads=1).save(folder / "epoch.npz")
-    shipped = Path(conevo.__file__).parent / "worlds" / "pursuit" / "prey-v1.npz"
+    shipped = Path(conevo.__file__).parent / "worlds" / "pursuit" / "prey-v2.npz"
     shutil.copy(shipped, folder / "prey.npz")
     shutil.copy(write_plan(folder / "plans"), folder / "plan.toml")
     shutil.copy(folder / "run" / "config.toml", folder / "settings.toml")

@@ -23,7 +23,7 @@ from conevo.reading import parse_json, read_arrays
 __all__ = ["PreySet", "load", "save"]
 
 FORMAT = "conevo prey set 1"
-SHIPPED = "prey-v1.npz"  # evolved in prey-v1
+SHIPPED = "prey-v2.npz"  # evolved in prey-v2
 MOST_BYTES = 2**24  # of a file, packed and unpacked
 N_GENES = 10  # eight sensors, two wheels (fig. 4.2)
 WEIGHT_SCALE = 10.0  # weight of gene 1 (table 4.3)
