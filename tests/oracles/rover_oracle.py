@@ -52,6 +52,10 @@ class Params:
     coverage_cells: int = 100
     fitness: str = "cumulative"  # area so far; "activation": its own; "product", "value"
     rocks_per_activation: int = 0  # all in range
+    sensor_noise: float = 0.0
+    action_noise: float = 0.0
+    failure: float = 0.0
+    failure_at: int = 0
 
 
 # --- controllers --------------------------------------------------------------------------------
@@ -309,7 +313,12 @@ def run(
                 rover_sensors(p, v, xy, shown)
                 + rock_sensors(p, xy[v], previous[v], rock_xy, value, detected)
             )
+            if p.sensor_noise:
+                u = np.array([uniform(t, 2**20 - 512 + k, v) for k in range(16)])
+                sensors = np.clip(sensors + p.sensor_noise * (2 * u - 1), 0.0, 1.0)
             outputs = controllers[v](t, sensors)
+            if uniform(t, 2**20 - 320, v) < p.action_noise:
+                outputs = [sigmoid(8 * uniform(t, 2**20 - 384 + o, v) - 4) for o in range(5)]
             action[v] = choose(outputs)
             log["sensors"][t, v] = sensors
             log["outputs"][t, v] = outputs
@@ -372,6 +381,9 @@ def run(
         for v in alive:
             energy[v] -= p.sensing_cost
             energy[v] -= p.move_cost if action[v] == MOVE else p.costs[action[v]]
+            may_fail = p.failure_at in (0, t + 1)
+            if may_fail and uniform(t, 2**20 - 319, v) < p.failure:
+                energy[v] = min(energy[v], 0.0)  # for good
             if v in reporting:
                 energy[v] -= p.report_cost
             counts[v, action[v]] += 1

@@ -50,6 +50,10 @@ def oracle_params(p: RoverParams) -> rover_oracle.Params:
         separation=p.separation,
         fitness=p.fitness,
         rocks_per_activation=p.rocks_per_activation,
+        sensor_noise=p.sensor_noise,
+        action_noise=p.action_noise,
+        failure=p.failure,
+        failure_at=p.failure_at,
     )
 
 
@@ -112,6 +116,7 @@ def test_kernel_equals_the_oracle(environment, seed):
         ("simple-3", {"rocks_per_activation": 1, "fitness": "value"}),
         ("complex-5", {"fitness": "activation"}),
         ("complex-5", {"range_is": "area", "fitness": "value"}),
+        ("complex-5", {"sensor_noise": 0.2, "action_noise": 0.1, "failure": 0.005}),
         ("complex-1", {"range_is": "area", "rocks_per_activation": 1, "fitness": "activation"}),
     ],
 )

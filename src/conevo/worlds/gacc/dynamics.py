@@ -8,6 +8,7 @@ object that only this robot holds; words that robots share are added to by atomi
 import warp as wp
 
 from conevo.kernels.actions import begin_counting, count_action
+from conevo.kernels.disturbances import fails
 from conevo.kernels.phases import Phase
 from conevo.kernels.sets import all_below, all_of, one
 from conevo.worlds.gacc.act import act
@@ -36,7 +37,7 @@ from conevo.worlds.gacc.state import (
 )
 from conevo.worlds.gacc.survey import spread, survey, survey_parts
 
-__all__ = ["FUNCTIONS"]
+__all__ = ["FUNCTIONS", "fail"]
 
 
 # --- reset ----------------------------------------------------------------------------------------
@@ -182,6 +183,16 @@ def commit(team: GaccTeam, scene: GaccScene, p: GaccConstants, i: int, t: int) -
     if setting != team.view[i] or (setting != NONE and p.object_accuracy < 1.0):
         wp.atomic_or(team.turned, 0, one(i))
     count_action(team.action, team.switches, team.counts, i, a, column)
+
+
+@wp.func
+def fail(team: GaccTeam, scene: GaccScene, p: GaccConstants, i: int, t: int) -> None:
+    """Let robot ``i`` have no energy any more if it fails, and let go of what it holds."""
+    if team.energy[i] > 0.0 and fails(scene.seed[0], p, i, t):
+        team.energy[i] = 0.0
+        team.waited[i] = 0
+        if team.held[i] >= 0:
+            release(team, i)
 
 
 # --- outcome --------------------------------------------------------------------------------------

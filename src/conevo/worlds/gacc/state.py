@@ -100,6 +100,11 @@ class GaccConstants:
     near_2: float  # how far other robots matter to a robot
     reach_2: float  # how far objects do
     walls_2: float  # how far obstacles do
+    sensor_noise: float
+    signed_inputs: int  # the first of the inputs, those with a range of [-1, 1]
+    action_noise: float
+    failure: float
+    failure_at: int
 
 
 @wp.struct
@@ -164,6 +169,8 @@ class GaccTeam:
     shared: Annotated[wp.array[wp.uint64], "team"]  # by several, while the referee is at it
     lying: Annotated[wp.array[wp.uint64], "team"]  # objects that lie somewhere; nobody holds them
     lying_home: Annotated[wp.array[wp.uint64], "team"]  # those of them in the home area
+    kept_inputs: Annotated[wp.array[float], "kept_inputs"]  # without noise
+    kept_heuristic: Annotated[wp.array[int], "kept_robots"]  # while outputs are random
     # What has changed since robots sensed last:
     moved: Annotated[wp.array[wp.uint64], "team"]  # robots that have moved
     stirred: Annotated[wp.array[wp.uint64], "team"]  # those, and robots near which one has

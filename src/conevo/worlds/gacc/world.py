@@ -95,7 +95,8 @@ from annotated_types import Ge, Gt, Le
 from conevo.errors import UsageError
 from conevo.parameters import parameters
 from conevo.rng import fold_all
-from conevo.worlds.gacc.dynamics import FUNCTIONS
+from conevo.worlds.disturbances import Disturbances, disturbed
+from conevo.worlds.gacc.dynamics import FUNCTIONS, fail
 from conevo.worlds.gacc.obstacles import are_clear, draw_obstacles
 from conevo.worlds.gacc.plans import TYPES, Plan, plan
 from conevo.worlds.gacc.state import GaccConstants, GaccScene, GaccTeam
@@ -113,7 +114,7 @@ SLACK = 1e-3  # of what is in reach of a robot: more than float32 rounds
 
 
 @parameters("world")
-class GaccParams:
+class GaccParams(Disturbances):
     """Parameters of the world; lengths in sides of the square, energy in units.
 
     Nitschke 2009, table 6.4, unless marked. Choice: tables 6.1 and 6.2 have lost the settings of
@@ -313,12 +314,14 @@ class GaccWorld:
         sight = max(p.object_range, p.robot_range, p.move_range)
         return Simulation(
             state=GaccTeam,
-            sizes={"objects": plan.parts.size, "complex_objects": c, "types": 3},
+            sizes={"objects": plan.parts.size, "complex_objects": c, "types": 3}
+            | p.kept(self.n_robots, len(self.inputs)),
             scene=GaccScene,
             params_type=GaccConstants,
             params=kernel_params(
                 GaccConstants,
                 self.params,
+                signed_inputs=8,  # an obstacle is less than 0
                 n_objects=plan.parts.size,
                 n_complex=c,
                 near_2=(max(p.robot_range, 2 * p.move_range + p.separation) + SLACK) ** 2,
@@ -326,7 +329,7 @@ class GaccWorld:
                 walls_2=(sight + SLACK) ** 2,
                 ordered=sum(1 << k for k, ordered in enumerate(plan.is_ordered) if ordered),
             ),
-            functions=FUNCTIONS,
+            functions=disturbed(FUNCTIONS, (GaccTeam, GaccScene, GaccConstants), p, fail),
             lanes=96,  # Choice: as of the rover world; there are as many neurons and sensors
             recorded=(
                 *("x", "y", "energy", "fitness", "action", "held", "waited", "dropped"),

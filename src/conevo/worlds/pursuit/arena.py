@@ -16,6 +16,7 @@ from conevo.errors import UsageError
 from conevo.kernels.khepera import RADIUS
 from conevo.parameters import parameters
 from conevo.rng import fold_all, numbers, uniforms
+from conevo.worlds.disturbances import Disturbances, disturbed
 from conevo.worlds.places import NoRoom, draw_places
 from conevo.worlds.protocol import Scenarios, Simulation, World, kernel_params
 from conevo.worlds.pursuit.bodies import (
@@ -25,6 +26,7 @@ from conevo.worlds.pursuit.bodies import (
     PursuitScene,
     PursuitTeam,
 )
+from conevo.worlds.pursuit.dynamics import fail, stand
 
 __all__ = ["ArenaParams", "ArenaScenarios", "draw_scenarios", "simulate"]
 
@@ -32,7 +34,7 @@ RECORDED = ("x", "y", "heading", "left", "right", "collided", "action", "fitness
 
 
 @parameters("world")
-class ArenaParams:
+class ArenaParams(Disturbances):
     """What both worlds have in common; lengths in cm, one iteration is 0.1 s.
 
     Nitschke 2009, table 4.1, unless marked.
@@ -191,17 +193,22 @@ def simulate(
         given: fields of ``bodies.Params`` that its parameters do not have.
     """
     robots = world.n_robots
-    p = kernel_params(PursuitConstants, world.params, world, team_is_prey=team_is_prey, **given)
+    given |= {"team_is_prey": team_is_prey, "signed_inputs": 0}
+    p = kernel_params(PursuitConstants, world.params, world, **given)
     prey = 1 if team_is_prey else bodies - robots
     slots = max(1, -(-p.prey_hidden // int(SLOTS))) * int(SLOTS)
     sizes = {"bodies": bodies, "sensors": 8, "wheels": 2, "prey": prey, "slots": slots}
     sizes["window"] = p.capture_window
+    sizes["failing"] = robots if world.params.failure > 0 else 1
+    sizes |= world.params.kept(robots, len(world.inputs))
     return Simulation(
         state=PursuitTeam,
         sizes=sizes,
         scene=PursuitScene,
         params_type=PursuitConstants,
         params=p,
-        functions=functions,
+        functions=disturbed(
+            functions, (PursuitTeam, PursuitScene, PursuitConstants), world.params, fail, stand
+        ),
         recorded=RECORDED if team_is_prey else (*RECORDED, "captured"),
     )

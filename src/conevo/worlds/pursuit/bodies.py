@@ -50,6 +50,11 @@ class PursuitConstants:
     capture_predators: int
     sight_cm_2: float  # of the squared distance at which a body may be seen at all
     touch_cm_2: float  # of the squared distance at which two bodies may meet in one iteration
+    sensor_noise: float
+    signed_inputs: int  # the first of the inputs, those with a range of [-1, 1]
+    action_noise: float
+    failure: float
+    failure_at: int
 
 
 @wp.struct
@@ -109,6 +114,9 @@ class PursuitTeam:
     captured: Annotated[wp.array[int], "prey"]
     captures: Annotated[wp.array[int], "prey"]
     first: Annotated[wp.array[int], "team"]  # iteration of the first capture, NONE before
+    kept_inputs: Annotated[wp.array[float], "kept_inputs"]  # without noise
+    kept_heuristic: Annotated[wp.array[int], "kept_robots"]  # while outputs are random
+    failed: Annotated[wp.array[int], "failing"]  # robots that do nothing any more
     action: wp.array[int]
     fitness: wp.array[float]
     counts: wp.array[int]

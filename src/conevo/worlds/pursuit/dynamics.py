@@ -7,6 +7,7 @@ One set of rules serves two worlds: in ``pursuit.world`` the team are the predat
 import warp as wp
 
 from conevo.kernels.actions import begin_counting
+from conevo.kernels.disturbances import fails
 from conevo.kernels.phases import Phase
 from conevo.kernels.trigonometry import cosine_sine
 from conevo.worlds.pursuit.bodies import NONE, PursuitConstants, PursuitScene, PursuitTeam
@@ -14,7 +15,7 @@ from conevo.worlds.pursuit.commands import set_up_prey
 from conevo.worlds.pursuit.motion import ACT, ACTIONS, COMMIT, N_ACTIONS, WAY_UNITS
 from conevo.worlds.pursuit.senses import SENSE
 
-__all__ = ["ACTIONS", "N_ACTIONS", "PREY_FUNCTIONS", "PURSUIT_FUNCTIONS"]
+__all__ = ["ACTIONS", "N_ACTIONS", "PREY_FUNCTIONS", "PURSUIT_FUNCTIONS", "fail", "stand"]
 
 
 # --- reset ----------------------------------------------------------------------------------------
@@ -84,6 +85,27 @@ def reset_prey(team: PursuitTeam, scene: PursuitScene, p: PursuitConstants, q: i
         team.commanded[q * p.capture_window + k] = 0
         k += 1
     set_up_prey(team, scene, p, q, t)
+
+
+# --- failures ------------------------------------------------------------------------------------
+
+
+@wp.func
+def fail(team: PursuitTeam, scene: PursuitScene, p: PursuitConstants, i: int, t: int) -> None:
+    """Note if robot ``i`` fails."""
+    if fails(scene.seed[0], p, i, t):
+        team.failed[i] = 1
+
+
+@wp.func
+def stand(team: PursuitTeam, scene: PursuitScene, p: PursuitConstants, i: int, t: int) -> None:
+    """Let the wheels of robot ``i`` stand still if it has failed, whatever controls it."""
+    if t == 0:
+        team.failed[i] = 0
+    if team.failed[i] != 0:
+        team.heuristic[i] = NONE
+        for k in range(team.outputs.shape[1]):
+            team.outputs[i, k] = 0.0
 
 
 # --- resolve --------------------------------------------------------------------------------------

@@ -3,6 +3,7 @@
 import warp as wp
 
 from conevo.kernels.actions import NONE, count_action, heuristic_action
+from conevo.kernels.disturbances import fails
 from conevo.kernels.outputs import highest
 from conevo.kernels.random import uniform
 from conevo.kernels.sets import all_below, lowest, one, without_lowest
@@ -19,7 +20,7 @@ from conevo.worlds.rover.state import (
     of_setting,
 )
 
-__all__ = ["act", "commit"]
+__all__ = ["act", "commit", "fail"]
 
 HEURISTIC = wp.constant(2**20 - 4)  # counters above every rock's, for heuristic controllers
 
@@ -123,3 +124,10 @@ def commit(team: RoverTeam, scene: RoverScene, p: RoverConstants, i: int, t: int
             wp.atomic_or(team.changed, 0, one(i))
         wp.atomic_or(team.acting, a, one(i))
         team.energy[i] = team.energy[i] - p.rover_sensor_cost - of_setting(p.cost, a)
+
+
+@wp.func
+def fail(team: RoverTeam, scene: RoverScene, p: RoverConstants, i: int, t: int) -> None:
+    """Let rover ``i`` have no energy any more if it fails."""
+    if fails(scene.seed[0], p, i, t):
+        team.energy[i] = wp.min(team.energy[i], 0.0)

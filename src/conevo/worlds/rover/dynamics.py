@@ -14,14 +14,13 @@ from conevo.kernels.actions import NONE, begin_counting
 from conevo.kernels.geometry import COVER_CELLS, COVER_WORDS, covered_by_any
 from conevo.kernels.phases import Phase, n_lanes
 from conevo.worlds.rover.act import act, commit
-from conevo.worlds.rover.resolve import RESOLVE, RESOLVE_ONE_ROCK
+from conevo.worlds.rover.resolve import RESOLVE, RESOLVE_ONE_ROCK, forget
 from conevo.worlds.rover.sense import SENSE
 from conevo.worlds.rover.state import (
     FITNESS,
     LISTS,
     N_ACTIONS,
     N_SETTINGS,
-    NO_PICK,
     PRODUCT,
     ROCK_CELLS,
     SURVEYED,
@@ -70,7 +69,6 @@ def begin(team: RoverTeam, scene: RoverScene, p: RoverConstants, i: int, t: int)
     team.shown[i] = NONE
     team.gain[i] = 0
     team.gain_near[i] = wp.int64(0)
-    team.pick[i] = NO_PICK
     if i == 0:
         team.changed[0] = ~wp.uint64(0)
         for k in range(LISTS):
@@ -138,4 +136,8 @@ FUNCTIONS = {
     "resolve": RESOLVE,
     "outcome": (Phase(clear_total, 1), Phase(add_up, all_lanes), Phase(report)),
 }
-ONE_ROCK = {**FUNCTIONS, "resolve": RESOLVE_ONE_ROCK}  # an activation detects one rock at most
+ONE_ROCK = {  # an activation detects one rock at most
+    **FUNCTIONS,
+    "reset": (Phase(begin), Phase(hide_rocks, all_lanes), Phase(forget)),
+    "resolve": RESOLVE_ONE_ROCK,
+}

@@ -26,7 +26,7 @@ from conevo.worlds.rover.state import (
     rock_cell,
 )
 
-__all__ = ["RESOLVE", "RESOLVE_ONE_ROCK"]
+__all__ = ["RESOLVE", "RESOLVE_ONE_ROCK", "forget"]
 
 ORDER = wp.constant(64)  # above every rover's number: of the order in which rocks are taken
 ROCK_BITS = wp.constant(wp.int64(20))
@@ -262,6 +262,12 @@ def credit(team: RoverTeam, scene: RoverScene, p: RoverConstants, q: int, t: int
         team.energy[i] = team.energy[i] - p.report_cost
         team.gain[i] = 0
         team.gain_near[i] = wp.int64(0)
+
+
+@wp.func
+def forget(team: RoverTeam, scene: RoverScene, p: RoverConstants, i: int, t: int) -> None:
+    """Let rover ``i`` take no rock yet."""
+    team.pick[i] = NO_PICK
 
 
 @wp.func

@@ -89,6 +89,11 @@ class RoverConstants:
     areas: wp.vec3f
     fitness_reading: int
     rocks_per_activation: int
+    sensor_noise: float
+    signed_inputs: int  # the first of the inputs, those with a range of [-1, 1]
+    action_noise: float
+    failure: float
+    failure_at: int
 
 
 @wp.struct
@@ -131,6 +136,8 @@ class RoverTeam:
     counts: wp.array[int]
     switches: wp.array[int]
     performance: wp.array[float]  # value, area
+    kept_inputs: Annotated[wp.array[float], "kept_inputs"]  # without noise
+    kept_heuristic: Annotated[wp.array[int], "kept_robots"]  # while outputs are random
     # What is kept.
     changed: Annotated[wp.array[wp.uint64], "team"]  # who has moved or has another setting
     acting: Annotated[wp.array[wp.uint64], "settings"]  # who activates with each setting
@@ -149,7 +156,8 @@ class RoverTeam:
     # What an iteration or the outcome adds up, in integers.
     gain: wp.array[int]
     gain_near: wp.array[wp.int64]  # in 1 / UNIT^2
-    pick: wp.array[wp.int64]  # the rock that a rover takes if it may detect one, behind its rank
+    # the rock that a rover takes, behind its rank, if it may detect one only
+    pick: Annotated[wp.array[wp.int64], "picks"]
     total: Annotated[wp.array[int], "measures"]
     # Lists of the iteration, and their lengths.
     n_listed: Annotated[wp.array[int], "lists"]

@@ -35,6 +35,7 @@ Choices, all declared in ``RoverParams`` or here, with their sensitivity on the 
 - A rover without energy stays where it is as a body that others sense, and does nothing more.
 - The lander records a detection one iteration later (section 5.1), so those of the last iteration
   are not in ``value``.
+- A rover that fails (``worlds.disturbances``) is one without energy.
 - A rover that has not activated yet shows setting 1, or rovers would be invisible at the start.
 
 Version history:
@@ -57,10 +58,12 @@ from annotated_types import Ge, Gt, Le
 from conevo.kernels.geometry import COVER_WORDS
 from conevo.parameters import parameters
 from conevo.rng import fold_all, uniforms
+from conevo.worlds.disturbances import Disturbances, disturbed
 from conevo.worlds.measures import Measure
 from conevo.worlds.places import draw_places
 from conevo.worlds.protocol import Scenarios, Simulation, kernel_params, names_of
 from conevo.worlds.rover import canals, rocks
+from conevo.worlds.rover.act import fail
 from conevo.worlds.rover.dynamics import (
     FITNESS,
     FUNCTIONS,
@@ -83,7 +86,7 @@ Range = Annotated[float, Gt(0), Le(0.5)]
 
 
 @parameters("world")
-class RoverParams:
+class RoverParams(Disturbances):
     """Parameters of the world; lengths in sides of the square, energy in units.
 
     Nitschke 2009, table 5.4, unless marked. Choice: the sensor settings (range, accuracy, cost) are
@@ -283,11 +286,18 @@ class RoverWorld:
                 "octants": 8,
                 "lists": LISTS,
                 "settings": 3,
-            },
+                "picks": self.n_robots if self.params.rocks_per_activation else 1,
+            }
+            | self.params.kept(self.n_robots, len(self.inputs)),
             scene=RoverScene,
             params_type=RoverConstants,
-            params=kernel_params(RoverConstants, self.params, **self._reaches()),
-            functions=ONE_ROCK if self.params.rocks_per_activation else FUNCTIONS,
+            params=kernel_params(RoverConstants, self.params, signed_inputs=0, **self._reaches()),
+            functions=disturbed(
+                ONE_ROCK if self.params.rocks_per_activation else FUNCTIONS,
+                (RoverTeam, RoverScene, RoverConstants),
+                self.params,
+                fail,
+            ),
             recorded=("x", "y", "action", "setting", "energy", "covered", "value", "fitness"),
             recorded_at_end=("detected",),
             lanes=96,  # Choice: the best of a prototype on an H100; most phases have 20 x 8 items
