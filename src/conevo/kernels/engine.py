@@ -30,12 +30,15 @@ __all__ = [
     "memory_named",
     "options",
     "start",
+    "threads_of",
     "usable_threads",
 ]
 
 # Measured: no adjoints and no unrolling pay; fast_math and -O3 do not. No fused
 # multiply-add: CPU and CUDA must agree to the bit.
 options = {"enable_backward": False, "max_unroll": 0, "fuse_fp": False}
+
+MOST_THREADS = 4096
 
 # Held while kernels are made, identified, compiled and loaded: Warp generates code for one of them
 # at a time, whatever the number of threads that ask for it.
@@ -146,6 +149,19 @@ def _without_line(word: bytes) -> Iterator[None]:
             for line in caught:
                 if word not in line:
                     real.write(line)
+
+
+def threads_of(given: Any) -> int:
+    """Return how many CPU threads are meant: those that are given, or all that are usable.
+
+    Raises:
+        UsageError: not a number of threads.
+    """
+    if given is None:
+        return usable_threads()
+    if isinstance(given, bool) or not isinstance(given, int) or not 1 <= given <= MOST_THREADS:
+        raise UsageError(f"threads = {given!r}: must be an integer from 1 to {MOST_THREADS}")
+    return given
 
 
 def usable_threads() -> int:

@@ -249,11 +249,15 @@ def _of_scene(scene: Any) -> Iterator[str]:
         yield f"{scene.key}.seed must be declared as 'seed: wp.array[wp.uint64]'"
 
 
-def scenario_faults(scene: Any, scenarios: Any, n: int) -> Iterator[str]:
-    """Yield what is wrong with ``n`` scenarios: their arrays must be those of the scene."""
+def scenario_faults(scene: Any, scenarios: Any, n: int, example: Any = None) -> Iterator[str]:
+    """Yield what is wrong with ``n`` scenarios: their arrays must be those of the scene.
+
+    And of the shapes of an ``example`` of the same world, if there is one: a kernel trusts them.
+    """
     kind = type(scenarios).__name__
     for name, var in scene.vars.items():
-        values = getattr(scenarios, name, None)
+        values, alike = getattr(scenarios, name, None), getattr(example, name, None)
+        each = 0 if var.type.ndim > 1 else 1  # where the shape of one scenario begins
         if not isinstance(values, np.ndarray):
             yield f"{kind} needs an array {name}, as {scene.key} has one"
             continue
@@ -266,5 +270,8 @@ def scenario_faults(scene: Any, scenarios: Any, n: int) -> Iterator[str]:
         elif values.shape[:1] != (n,):
             got = list(values.shape)
             yield f"{kind}.{name} must have a row for each of {n} scenarios, got shape {got}"
-        elif values.dtype.kind == "f" and not np.isfinite(values).all():
+        if isinstance(alike, np.ndarray) and values.shape[each:] != alike.shape[each:]:
+            got, there = list(values.shape[each:]), list(alike.shape[each:])
+            yield f"{kind}.{name} has shape {got} in a scenario, and {there} in this world"
+        elif var.type.ndim == 1 and values.dtype.kind == "f" and not np.isfinite(values).all():
             yield f"{kind}.{name} has values that are not finite"

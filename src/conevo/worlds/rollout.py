@@ -81,10 +81,14 @@ class Rollout:
         shared_bytes: int = SHARED_BYTES,
     ) -> None:
         engine.start()
+        if not hasattr(world, "simulation"):
+            raise UsageError(
+                f"world {world.name} is not written in Warp: its own simulator(...) plays it"
+            )
         self.world = world
         self.controller = controller or make_controller(world=world)
         self.device = device = device_here(device)
-        self.n_threads = n_threads or engine.usable_threads()
+        self.n_threads = engine.threads_of(n_threads)
         self._chunk = CHUNK if device == "cpu" else CUDA_CHUNK
         with engine.building:
             self._simulation = world.simulation()
@@ -109,6 +113,7 @@ class Rollout:
         stages = stages_of(self._simulation).items()
         self._phases = ["think", *(f"{at} {one.name}" for at, those in stages for one in those)]
         self._clock = wp.zeros(len(self._phases) if timed else 0, dtype=wp.int64, device=device)
+        self._one_scenario: Scenarios | None = None  # of this world: what others must look like
         self._is_built = False
         self._workspace: _Workspace | None = None
 
@@ -256,7 +261,11 @@ class Rollout:
     def _refuse_faulty(self, scenarios: Scenarios) -> None:
         """Raise UsageError for scenarios that are not those of the world's scene."""
         n = len(getattr(scenarios, "seed", ()))
-        for fault in scenario_faults(self._simulation.scene, scenarios, n):
+        if not n:
+            raise UsageError(f"world {self.world.name}: there must be at least one scenario")
+        if self._one_scenario is None:
+            self._one_scenario = self.world.scenarios([0])
+        for fault in scenario_faults(self._simulation.scene, scenarios, n, self._one_scenario):
             raise UsageError(f"world {self.world.name}: scenarios: {fault}")
 
     def _checked(

@@ -48,7 +48,7 @@ def simulator(
         EnvironmentFailure: there is no such device, it gives other results than the CPU, or there
             is no place for compiled kernels.
     """
-    from conevo.kernels.engine import usable_threads
+    from conevo.kernels.engine import threads_of
 
     device = device_for(world, device)
     if not has_own_simulator(world):
@@ -62,4 +62,4 @@ def simulator(
     refuse_misfit(controller, world)
     from conevo.worlds.own_simulator import build_own
 
-    return build_own(world, controller, n_threads or usable_threads())
+    return build_own(world, controller, threads_of(n_threads))
