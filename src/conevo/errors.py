@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 
 __all__ = [
     "ConevoError",
     "EnvironmentFailure",
+    "UnknownName",
     "UsageError",
+    "placed",
     "shown",
     "unknown_name",
     "without_team",
@@ -28,6 +31,10 @@ class UsageError(ConevoError):
     """The request cannot be carried out as written (exit code 2)."""
 
 
+class UnknownName(UsageError):
+    """There is nothing of this name."""
+
+
 class EnvironmentFailure(ConevoError):
     """The environment failed: disk full, no permission, no such device (exit code 3)."""
 
@@ -43,7 +50,7 @@ def shown(value: object, most: int = 60) -> str:
     return text if len(text) <= most else f"{text[: most - 3]}..."
 
 
-def unknown_name(kind: str, name: str, allowed: Iterable[str], where: str = "") -> UsageError:
+def unknown_name(kind: str, name: str, allowed: Iterable[str], where: str = "") -> UnknownName:
     """Return the error for an unknown name, naming the nearest known one.
 
     Args:
@@ -57,7 +64,25 @@ def unknown_name(kind: str, name: str, allowed: Iterable[str], where: str = "") 
     hint = f"; did you mean {near[0]!r}?" if near else ""
     place = f" {where}" if where else ""
     listed = ", ".join(names) if len(names) <= 40 else ", ".join(names[:40]) + ", ..."
-    return UsageError(f"unknown {kind} {shown(name, 200)}{place}{hint} (known: {listed or 'none'})")
+    return UnknownName(
+        f"unknown {kind} {shown(name, 200)}{place}{hint} (known: {listed or 'none'})"
+    )
+
+
+@contextmanager
+def placed(key: str, place: str | None) -> Iterator[None]:
+    """Let the error for an unknown name say which setting it is of, if that has a place.
+
+    Args:
+        key: the setting, "controller.name".
+        place: where it was read from, "in config.toml".
+    """
+    try:
+        yield
+    except UnknownName as error:
+        if not place:
+            raise
+        raise UsageError(f"{key} {place}: {error}") from error
 
 
 def _by_number(name: str, names: Iterable[str]) -> list[str]:

@@ -103,6 +103,8 @@ def refuse_unknown(
     """Raise UsageError if a class of parameters has no ``key``; ``also`` names others like it."""
     known = [field.name for field in fields(part)]
     if key not in known:
+        if section == "controller":
+            known.append("name")  # the key that chooses the class
         names = [*(f"{section}.{one}" for one in known), *also]
         raise unknown_name("key", f"{section}.{key}", names, place)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 from dataclasses import fields
 from pathlib import Path
 
@@ -132,3 +133,38 @@ def test_settings_of_another_controller_are_listed(say) -> None:
             "name": name,
             **expected,
         }
+
+
+def test_a_controller_is_named_and_kept_in_the_advice(say, tmp_path: Path) -> None:
+    chosen = ("--set", "controller.name=ctrnn", "--set", "controller.slowest=5")
+    said = say(*tiny(*chosen, "--out", "ct"))
+    assert (said.code, said.err) == (0, "")
+    assert said.out.splitlines()[0].endswith(", controller ctrnn")
+    advice = next(line for line in said.out.splitlines() if " --method mesp " in line)
+    assert " --set controller.name=ctrnn " in advice
+    assert " --set controller.slowest=5.0" in advice
+    again = say(*shlex.split(advice)[1:], "--dry-run").out
+    assert 'name = "ctrnn"' in again
+    assert "slowest = 5" in again
+    shown = say("show", "ct").out
+    assert shown.splitlines()[0].endswith(", controller ctrnn")
+    changed = next(line for line in shown.splitlines() if line.startswith("changed from preset"))
+    assert {"controller.name", "controller.slowest"} <= set(changed.split(": ")[1].split(", "))
+
+
+def test_advice_keeps_the_length_that_was_asked_for(say, monkeypatch) -> None:
+    say(*tiny("--quiet", "--out", "here"))
+    monkeypatch.setattr("conevo.kernels.devices.cards_here", lambda: ())
+    said = say("resume", "here", "--generations", "9", "--device", "cuda")
+    assert said.code == 3
+    assert said.err.endswith("; once fixed: conevo resume here --generations 9\n")
+
+
+def test_watch_refuses_a_device_that_is_not_here(say, monkeypatch) -> None:
+    say(*tiny("--quiet", "--out", "here"))
+    monkeypatch.setattr("conevo.kernels.devices.cards_here", lambda: ())
+    monkeypatch.setattr("conevo.replay.live.server.serve", lambda *_: None)
+    said = say("watch", "here", "--device", "cuda:7", "--no-browser")
+    assert said.code == 3
+    assert said.err.startswith("conevo: error: device 'cuda:7': no CUDA device on this machine")
+    assert say("watch", "here", "--device", "cpu", "--no-browser").code == 0

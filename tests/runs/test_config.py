@@ -182,6 +182,12 @@ BAD = [
     ({"overrides": {"world.low_range": 3.0}}, ["world.low_range = 3.0", "must be less than"]),
     ({"overrides": {"world.low_accuracy": "x"}}, ["world.low_accuracy = 'x'", "valid number"]),
     ({"overrides": {"controller.max_hidden": 4}}, ["max_hidden", "n_hidden"]),
+    ({"overrides": {"controller.nam": "gru"}}, ["'controller.nam'", "mean 'controller.name'?"]),
+    ({"overrides": {"controller.name": "gru", "controller.recurrent": False}},
+     ["controller.recurrent in overrides", "gru has no setting 'recurrent'", "of srn", "name"]),
+    ({"overrides": {"controller.name": "gru", "recurrent": False}}, ["gru has no setting"]),
+    ({"overrides": {"controller.name": "gri"}},
+     ["controller.name in overrides: unknown controller 'gri'", "'gru'"]),
     ({"overrides": {"method.evaluation": "all"}}, ["method.evaluation", "'systematic'"]),
     ({"overrides": {"method.elite_portion": 0}}, ["method.elite_portion = 0", "greater than 0"]),
 ]  # fmt: skip
@@ -208,6 +214,9 @@ def test_bad_input_is_one_line_that_names_what_and_what_is_allowed(
         ("[rn]\nepochs = 1\n", ["unknown section 'rn'", "'run'", "mine.toml"]),
         ("run = 5\n", ["must be a table", "mine.toml"]),
         ("[run\n", ["not valid TOML", "mine.toml"]),
+        ("[run]\nmethod = 'coen'\n", ["run.method in ", "mine.toml: unknown method 'coen'"]),
+        ("[run]\npreset = 'dek'\n", ["run.preset in ", "mine.toml: unknown preset 'dek'"]),
+        ("[controller]\nname = 'gri'\n", ["controller.name in ", "mine.toml: unknown"]),
         ("[run]\nmethod = 3\n", ["run.method = 3", "mine.toml"]),
     ],
 )

@@ -121,10 +121,15 @@ def carry_on(
     from conevo.outside import line_of
     from conevo.runs.run import Run
 
+    plain = f"conevo resume {quoted(found.path)}"
+    given = [f" --{name.replace('_', '-')} {value}" for name, value in (length or {}).items()]
+    advice = plain + "".join(given)
+
     def remark(text: str) -> None:
         click.echo(f"conevo: note: {text}", err=True)
 
     def carry(run: Run, stage: int = 0) -> None:
+        nonlocal advice
         of = before = 0
         if not isinstance(found, Run):
             of, before = len(found.outlines), len(found.generations()) - len(run.generations())
@@ -132,6 +137,7 @@ def carry_on(
             run.extend(
                 **length, threads=threads, device=device, accept_other_code=accept_other_code
             )
+            advice = plain  # the run has its new length
         with watching(run, style, stage, of, before) as watch:
             run.resume(
                 time_limit=limit,
@@ -151,7 +157,6 @@ def carry_on(
             f"--from {quoted(found.path)}"
         )
     found.refuse_other_code(accept_other_code)
-    advice = f"conevo resume {quoted(found.path)}"
     try:
         if isinstance(found, Run):
             carry(found)

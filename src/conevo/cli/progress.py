@@ -10,7 +10,7 @@ from typing import Any
 
 import click
 
-from conevo.cli.summary import declared, measures_text, title
+from conevo.cli.summary import declared, heading_of, measures_text
 from conevo.cli.text import bars, castes, count, duration, neurons, number
 from conevo.runs.run import Run
 from conevo.terms import S_MEANS, counted
@@ -35,7 +35,7 @@ def watching(
         n_stages: the stages of that shaping.
         before: generations of its stages before this one.
     """
-    heading = (f"stage {stage} of {n_stages}: " if stage else "") + title(run.outline)
+    heading = (f"stage {stage} of {n_stages}: " if stage else "") + heading_of(run)
     if style == "live":
         from rich.live import Live
 
@@ -127,7 +127,7 @@ class Display:
     """The live view on a terminal."""
 
     def __init__(self, run: Run, heading: str = "") -> None:
-        self.run, self.heading, self.pace = run, heading or title(run.outline), Pace(run)
+        self.run, self.heading, self.pace = run, heading or heading_of(run), Pace(run)
         self.records, self.started = run.generations(), time.monotonic()
         self.measures = declared(run.provenance)
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from conevo.cli.summary import generations_table, spaced, title
+from conevo.cli.summary import controlled, generations_table, spaced, title
 from conevo.cli.text import castes, count, duration, number, progress, spread, table
 from conevo.runs.code import changes_text
 from conevo.runs.run import Run
@@ -54,7 +54,8 @@ def shaping_text(shaping: Shaping, n_rows: int = 0) -> str:
     records = shaping.generations()
     seconds = sum(record["seconds"] for record in records)
     parts = [
-        title(shaping.outlines[-1]).replace(shaping.outlines[-1].task, span(shaping)),
+        title(shaping.outlines[-1]).replace(shaping.outlines[-1].task, span(shaping))
+        + (controlled(stages[0]) if stages else ""),
         f"{shaping.path}: {state}",
         f"{len(stages)} of {counted(len(shaping.outlines), 'stage')} begun, "
         f"{counted(len(records), 'generation')}, "

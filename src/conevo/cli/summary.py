@@ -22,6 +22,7 @@ from conevo.cli.text import (
     spread,
     table,
 )
+from conevo.controllers.registry import DEFAULT
 from conevo.evolution.methods.registry import title_of
 from conevo.runs.code import changes_text, last_code, sessions_of
 from conevo.runs.outline import Outline
@@ -33,9 +34,11 @@ from conevo.worlds.measures import Measure
 
 __all__ = [
     "conditions_text",
+    "controlled",
     "declared",
     "exchange_text",
     "generations_table",
+    "heading_of",
     "measures_text",
     "next_commands",
     "print_end",
@@ -51,6 +54,17 @@ def title(outline: Outline) -> str:
     """Return one line that names a run."""
     method = title_of(outline.method)
     return f"{outline.task}, {method}, preset {outline.preset}, seed {outline.seed}"
+
+
+def heading_of(run: Run) -> str:
+    """Return the title of a run, with its controller if that is not the default one."""
+    return title(run.outline) + controlled(run)
+
+
+def controlled(run: Run) -> str:
+    """Return what a title says of a run's controller: nothing if it is the default one."""
+    name = run.tables().get("controller", {}).get("name", DEFAULT)
+    return f", controller {name}" if name != DEFAULT else ""
 
 
 def print_end(run: Run, style: str) -> None:
@@ -72,7 +86,7 @@ def run_text(run: Run, n_rows: int) -> str:
     """Return a finished or unfinished run as text."""
     records = run.generations()
     about = run.provenance
-    parts = [title(run.outline), _state(run), *changes_text(sessions_of(about))]
+    parts = [heading_of(run), _state(run), *changes_text(sessions_of(about))]
     if changed := about.get("changed"):
         parts.append(f"changed from preset {run.outline.preset}: {', '.join(changed)}")
     if records:
@@ -239,7 +253,7 @@ def next_commands(run: Run) -> list[str]:
     changes = [
         f" --set {quoted(f'{section}.{key}={tables[section][key]}')}"
         for section, _, key in (name.partition(".") for name in config.changed)
-        if section in ("run", "world") and key in tables[section]
+        if section != "method" and key in tables[section]
     ]
     seed = config.run.seed
     world, path = quoted(config.address), quoted(run.path)

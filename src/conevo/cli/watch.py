@@ -34,9 +34,12 @@ def watch(what: str | None, port: int, device: str | None, no_browser: bool) -> 
 
     Try: conevo watch runs/first
     """
+    from conevo.kernels.devices import device_here
     from conevo.replay.live.server import serve
 
     watched = _watched(what)
+    if device is not None:
+        device_here(device)
 
     def on_ready(address: str) -> None:
         click.echo(f"{address}  (Ctrl-C stops this page; runs continue)")

@@ -19,6 +19,7 @@ __all__ = [
     "controller",
     "find",
     "genome_of",
+    "refuse_foreign",
     "refuse_misfit",
     "suggested",
 ]
@@ -133,6 +134,24 @@ def controller(name: str = DEFAULT, world: Any = None, **settings: Any) -> Contr
 def genome_of(controller: Controller, world: Any) -> Genome:
     """Return what a world's controllers are built from."""
     return controller.genome(len(world.inputs), len(world.outputs))
+
+
+def refuse_foreign(kind: type[Any], key: str, place: str) -> None:
+    """Raise UsageError for a setting that this kind of controller lacks and another one has."""
+    own = [field.name for field in fields(kind)]
+    if key in own:
+        return
+    others = [
+        one.name
+        for one in CONTROLLERS.values()
+        if key in {field.name for field in fields(one.settings_class)}
+    ]
+    if others:
+        known = ", ".join(f"controller.{one}" for one in sorted([*own, "name"]))
+        raise UsageError(
+            f"controller.{key} {place}: {kind.name} has no setting {key!r}; it is one of "
+            f"{' and '.join(others)} (known: {known})"
+        )
 
 
 def refuse_misfit(controller: Controller, world: Any) -> None:

@@ -48,8 +48,8 @@ from typing import TYPE_CHECKING, Any
 
 import tomli_w
 
-from conevo.controllers.registry import DEFAULT, suggested
-from conevo.errors import UsageError, shown, unknown_name
+from conevo.controllers.registry import DEFAULT, refuse_foreign, suggested
+from conevo.errors import UsageError, placed, shown, unknown_name
 from conevo.parameters import WrongValue, refuse_unknown
 from conevo.reading import parse_toml, read_toml
 from conevo.runs.outline import LENGTH, Outline, identify, outline_of
@@ -292,26 +292,33 @@ def resolve(
                 f"run.{name} = {shown(twice.value)} {twice.place}: the {name} is given as {asked}"
             )
     own_preset = layers[0].get("run", {}).get("preset") if layers else None
-    names = _take_names([*layers, single], {"world": world, "method": method, "preset": preset})
+    names, places = _take_names(
+        [*layers, single], {"world": world, "method": method, "preset": preset}
+    )
     if not names["world"]:
         named = "" if file is None else f"{file} names none: give run.world there, or n"
         raise UsageError(
             f"which world? {named or 'N'}ame one as WORLD/ENVIRONMENT, for example rover/complex-1"
         )
-    entry, environment = resolve_world(names["world"], names["world_digest"])
-    method_entry = resolve_method(names["method"], names["method_digest"])
-    controller = _take_controller([*layers, single])
+    with placed("run.world", places.get("world")):
+        entry, environment = resolve_world(names["world"], names["world_digest"])
+    with placed("run.method", places.get("method")):
+        method_entry = resolve_method(names["method"], names["method_digest"])
+    controller, controller_place = _take_controller([*layers, single])
+    with placed("controller.name", controller_place):
+        controller_class = find(controller).settings_class
     parts: dict[str, type] = {
         "run": RunSettings,
         "world": entry.params_class,
-        "controller": find(controller).settings_class,
+        "controller": controller_class,
         "method": method_entry.config_class,
     }
     for key, value in short.items():
         single.setdefault(_section_of(key, parts, place), {})[key] = value
     if seed is not None:
         single.setdefault("run", {})["seed"] = _Value(seed, "as the seed")
-    base = _read_preset(names["preset"], entry, method_entry, controller)
+    with placed("run.preset", places.get("preset")):
+        base = _read_preset(names["preset"], entry, method_entry, controller)
     if own_preset is not None and names["preset"] != own_preset.value:
         _refuse_label(names["preset"], base, layers[0], own_preset.place)
     built = {name: _build(name, parts, [base, *layers, single]) for name in parts}
@@ -364,9 +371,11 @@ def _split_keys(
     return dotted, short
 
 
-def _take_names(layers: list[Layer], asked: Mapping[str, str | None]) -> dict[str, str]:
-    """Remove the names from the layers' [run] tables and return those that hold."""
-    names = dict(NAMES)
+def _take_names(
+    layers: list[Layer], asked: Mapping[str, str | None]
+) -> tuple[dict[str, str], dict[str, str]]:
+    """Remove the names from the layers' [run] tables; return those that hold, and their places."""
+    names, places = dict(NAMES), {}
     for layer in layers:
         given = {name: layer.get("run", {}).pop(name, None) for name in NAMES}
         for name in IN_FILES:
@@ -379,21 +388,24 @@ def _take_names(layers: list[Layer], asked: Mapping[str, str | None]) -> dict[st
                 raise UsageError(f"run.{name} = {shown(found.value)} {found.place}: must be a name")
             if found is not None:
                 names[name] = found.as_file if name in IN_FILES else found.value
+                places[name] = found.place
     names |= {f"{name}_digest": "" for name in IN_FILES if asked[name] is not None}
-    return names | {name: value for name, value in asked.items() if value is not None}
+    chosen = {name: value for name, value in asked.items() if value is not None}
+    return names | chosen, {name: places[name] for name in places.keys() - chosen.keys()}
 
 
-def _take_controller(layers: list[Layer]) -> str:
-    """Remove the name from the layers' [controller] tables and return the one that holds."""
-    name = DEFAULT
+def _take_controller(layers: list[Layer]) -> tuple[str, str]:
+    """Remove the name from the layers' [controller] tables; return what holds, and its place."""
+    name, place = DEFAULT, ""
     for layer in layers:
         found = layer.get("controller", {}).pop("name", None)
         if found is not None and not isinstance(found.value, str):
             raise UsageError(
                 f"controller.name = {shown(found.value)} {found.place}: must be a name"
             )
-        name = name if found is None else found.value
-    return name
+        if found is not None:
+            name, place = found.value, found.place
+    return name, place
 
 
 def _refuse_label(preset: str, base: Layer, file: Layer, place: str) -> None:
@@ -409,6 +421,8 @@ def _changed(parts: Mapping[str, type], built: Mapping[str, Any], base: Layer) -
     """Yield the settings that are not as the preset has them, without the seed and digests."""
     for section, part in parts.items():
         preset = base.get(section, {})
+        if section == "controller" and built[section].name != DEFAULT:
+            yield "controller.name"
         for field in dataclasses.fields(part):
             plain = preset[field.name].value if field.name in preset else field.default
             is_own = field.name != "seed" and not field.name.endswith("_digest")
@@ -424,6 +438,7 @@ def _section_of(key: str, parts: Mapping[str, type], place: str) -> str:
         options = " or ".join(f"{home}.{key}" for home in homes)
         raise UsageError(f"key {key!r} {place} is ambiguous: write {options}")
     if not homes:
+        refuse_foreign(parts["controller"], key, place)
         raise unknown_name("key", key, [key for keys in known.values() for key in keys], place)
     return homes[0]
 
@@ -459,6 +474,8 @@ def _build(section: str, parts: Mapping[str, Any], layers: Iterable[Layer]) -> A
     for layer in layers:
         for key, given in layer.get(section, {}).items():
             also = [f"{one}.{key}" for one in parts if key in parts[one].__dataclass_fields__]
+            if section == "controller":
+                refuse_foreign(part, key, given.place)
             refuse_unknown(part, section, key, given.place, also)
             is_file = f"{key}_digest" in part.__dataclass_fields__
             values[key] = given.as_file if is_file else given.value
