@@ -42,6 +42,10 @@ METHODS = {
     "not crowned": ("            progress = progress.crowned(trials, scores)\n", "",
                     "tell must record the team of the portrait as the fittest"),
     "no portrait": (", portrait=True", "", "without a portrait"),
+    "endless": ("generation=progress.generation + 1", "generation=progress.generation",
+                "Team ES: tell has not ended the first generation after 1000 requests"),
+    "luck": ('stream(state.progress.root, "steps", state.progress.generation)',
+             "np.random.default_rng()", "Team ES: ask returns other teams when it is asked again"),
     "words": ("with_numbers(step_size=state.step_size)", "with_numbers(step_size='wide')",
               "Team ES: step_size is not a number: 'wide'"),
 }  # fmt: skip

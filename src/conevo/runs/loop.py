@@ -20,6 +20,7 @@ from conevo.worlds.measures import Measure
 __all__ = ["check_budget", "evolve_generations", "has_reached", "price", "rehearse"]
 
 Record = dict[str, Any]
+MOST_REQUESTS = 1000  # of one generation: a method that asks for more never ends it
 OF_METHODS = {"type_c_evaluations", "sst", "gst", "recombinations"}  # every log has them
 
 
@@ -76,7 +77,9 @@ def price(method: Method, state: State) -> int:
 
     ask and tell are pure, so it can be priced with empty scores.
     """
+    requests = 0
     while state.progress.generation == 0:
+        requests = _counted(requests, method)
         trials = _asked(method, state)
         empty = np.zeros(trials.teams.shape[:2])
         state = _told(method, state, trials, Scores(fitness=empty, specialization=empty))
@@ -93,8 +96,11 @@ def rehearse(method: Method, first: State) -> State:
     """
     state, has_portrait = first, False
     made_up = stream(first.progress.root, "rehearsal")
+    requests = 0
     while state.progress.generation == first.progress.generation:
+        requests = _counted(requests, method)
         trials = _asked(method, state)
+        _refuse_luck(method, trials, _asked(method, state))
         shape = trials.teams.shape[:2]
         scores = Scores(fitness=made_up.random(shape), specialization=made_up.random(shape))
         state = _told(method, state, trials, scores)
@@ -102,6 +108,26 @@ def rehearse(method: Method, first: State) -> State:
     portrait = Portrait({}, [], [], {}) if has_portrait else None
     _record(method, first.progress, state.progress, portrait, 0, 0.0)
     return state
+
+
+def _counted(requests: int, method: Method) -> int:
+    """Return one more request of a generation, unless there are too many."""
+    if requests == MOST_REQUESTS:
+        raise UsageError(
+            f"{method.title}: tell has not ended the first generation after {requests} requests "
+            f"(it ends where progress.generation is one higher)"
+        )
+    return requests + 1
+
+
+def _refuse_luck(method: Method, trials: Trials, again: Trials) -> None:
+    """Refuse a method that asks for other teams if it is asked twice in the same state."""
+    alike = (np.array_equal(getattr(trials, n), getattr(again, n)) for n in ("genes", "teams"))
+    if not all(alike):
+        raise UsageError(
+            f"{method.title}: ask returns other teams when it is asked again in the same state; "
+            f"random numbers must be drawn from an address (conevo.rng.stream)"
+        )
 
 
 def _asked(method: Method, state: State) -> Trials:
