@@ -19,6 +19,7 @@ from runs.tiny import evolve_tiny
 @pytest.fixture
 def earlier(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, say: Any) -> Path:
     """Make a finished run, ``old``, and a recorded epoch of it, as rover-v1 had made them."""
+    order = list(WORLDS.items())
     with monkeypatch.context() as then:
         newest = WORLDS["rover-v2"]
         then.delitem(registry.EARLIER, "rover-v1")
@@ -29,6 +30,8 @@ def earlier(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, say: Any) -> Path:
         assert run.config.task == "rover-v1/complex-1"
         made = say("replay", "old", "--no-browser", "--out", "old.html", "--keep", "old.npz")
         assert made.code == 0, made.err
+    WORLDS.clear()
+    WORLDS.update(order)  # the world that was away is not the last one now
     return run.path
 
 

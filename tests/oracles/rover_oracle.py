@@ -317,7 +317,7 @@ def run(
                 u = np.array([uniform(t, 2**20 - 512 + k, v) for k in range(16)])
                 sensors = np.clip(sensors + p.sensor_noise * (2 * u - 1), 0.0, 1.0)
             outputs = controllers[v](t, sensors)
-            if uniform(t, 2**20 - 320, v) < p.action_noise:
+            if p.action_noise and uniform(t, 2**20 - 320, v) < p.action_noise:
                 outputs = [sigmoid(8 * uniform(t, 2**20 - 384 + o, v) - 4) for o in range(5)]
             action[v] = choose(outputs)
             log["sensors"][t, v] = sensors
@@ -382,7 +382,7 @@ def run(
             energy[v] -= p.sensing_cost
             energy[v] -= p.move_cost if action[v] == MOVE else p.costs[action[v]]
             may_fail = p.failure_at in (0, t + 1)
-            if may_fail and uniform(t, 2**20 - 319, v) < p.failure:
+            if p.failure and may_fail and uniform(t, 2**20 - 319, v) < p.failure:
                 energy[v] = min(energy[v], 0.0)  # for good
             if v in reporting:
                 energy[v] -= p.report_cost

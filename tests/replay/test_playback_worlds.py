@@ -133,7 +133,7 @@ def test_who_is_in_the_arena(task):
 
 
 def test_captures():
-    trajectory = played("pursuit")
+    trajectory = played("pursuit", 9)
     playback = playback_of(trajectory)
     captured = values(trajectory, "captured")[:, 0]
     performance = trajectory.about["performance"]

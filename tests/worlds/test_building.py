@@ -117,7 +117,7 @@ def test_a_cache_that_cannot_be_written_is_named_with_its_variable(
     monkeypatch.setattr(wp.config, "kernel_cache_dir", str(tmp_path))
     monkeypatch.setattr(wp, "init", refuse)
     monkeypatch.setattr(type(rollout._kernel.module), "load", refuse)
-    monkeypatch.setattr(engine, "_without_driver_warning", nullcontext)
+    monkeypatch.setattr(engine, "_without_line", nullcontext)
     monkeypatch.setattr(engine, "_is_started", False)
     words = (
         f"compiled kernels cannot be kept in {tmp_path}: Read-only file system; set .*CACHE_PATH"

@@ -29,6 +29,7 @@ __all__ = [
 
 DECIDING = (
     "rng.py",
+    "outside.py",
     "kernels",
     "worlds",
     "controllers",

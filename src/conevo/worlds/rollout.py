@@ -261,7 +261,7 @@ class Rollout:
     def _refuse_faulty(self, scenarios: Scenarios) -> None:
         """Raise UsageError for scenarios that are not those of the world's scene."""
         n = len(getattr(scenarios, "seed", ()))
-        if not n:
+        if isinstance(getattr(scenarios, "seed", None), np.ndarray) and not n:
             raise UsageError(f"world {self.world.name}: there must be at least one scenario")
         if self._one_scenario is None:
             self._one_scenario = self.world.scenarios([0])
