@@ -130,21 +130,6 @@ def test_the_cuda_form_compiles_for_sm_90_without_a_device(entry, tmp_path):
         assert files[0].stat().st_size > size
 
 
-@pytest.mark.cuda
-@pytest.mark.skipif(not wp.is_cuda_available(), reason="no CUDA device on this machine")
-@pytest.mark.parametrize("entry", PLAYED.values(), ids=PLAYED)
-def test_a_cuda_device_gives_the_bits_of_the_cpu(entry):
-    from contracts.test_worlds import assert_same_bits, keys, random_teams
-
-    task = first_environment(entry)
-    genes, teams = random_teams(task, 8)
-    scenarios = task.scenarios(keys(2))
-    assert_same_bits(
-        Rollout(task).evaluate(genes, teams, scenarios),
-        Rollout(task, device="cuda").evaluate(genes, teams, scenarios),
-    )
-
-
 @pytest.mark.skipif(wp.is_cuda_available(), reason="there is a CUDA device here")
 def test_a_missing_cuda_device_is_one_clear_line():
     with pytest.raises(EnvironmentFailure, match="no CUDA device on this machine"):
