@@ -28,7 +28,7 @@ def degree(switches: npt.ArrayLike, counts: npt.ArrayLike) -> npt.NDArray[np.flo
         switches: [...] A.
         counts: [..., A] how often each action was executed.
     """
-    possible = np.asarray(counts, dtype=np.float64).sum(axis=-1) - 1
+    possible = np.asarray(counts).sum(axis=-1, dtype=np.float64) - 1
     changed = np.asarray(switches, dtype=np.float64)
     s: npt.NDArray[np.floating[Any]] = np.zeros_like(possible)
     np.divide(changed, possible, out=s, where=possible > 0)
