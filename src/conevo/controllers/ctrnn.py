@@ -20,7 +20,7 @@ import warp as wp
 from annotated_types import Ge, Gt, Le
 
 from conevo.controllers.protocol import Bools, Floats, Genome, Mind
-from conevo.controllers.slots import Slots
+from conevo.controllers.slots import Slots, n_neurons, n_sums, sum_up
 from conevo.kernels.arrays import named_arrays
 from conevo.kernels.outputs import sigmoid, sigmoid_of
 from conevo.kernels.phases import Phase
@@ -99,32 +99,6 @@ def clear(memory: CtrnnMemory, shape: CtrnnShape, i: int) -> None:
 
 
 @wp.func
-def n_neurons(
-    weights: CtrnnWeights,
-    memory: CtrnnMemory,
-    shape: CtrnnShape,
-    inputs: wp.array2d[float],
-    outputs: wp.array2d[float],
-    heuristic: wp.array[int],
-) -> int:
-    """Return how many slots for neurons a team has."""
-    return inputs.shape[0] * shape.n_slots
-
-
-@wp.func
-def n_sums(
-    weights: CtrnnWeights,
-    memory: CtrnnMemory,
-    shape: CtrnnShape,
-    inputs: wp.array2d[float],
-    outputs: wp.array2d[float],
-    heuristic: wp.array[int],
-) -> int:
-    """Return how many outputs a team has."""
-    return inputs.shape[0] * shape.n_outputs
-
-
-@wp.func
 def step(
     weights: CtrnnWeights,
     memory: CtrnnMemory,
@@ -166,31 +140,6 @@ def activate(
     """Let neuron ``q`` show its state: only now, since every neuron sees what was before."""
     if heuristic[q // shape.n_slots] < 0 and weights.filled[q] != 0:
         memory.hidden[q] = sigmoid(memory.state[q])
-
-
-@wp.func
-def sum_up(
-    weights: CtrnnWeights,
-    memory: CtrnnMemory,
-    shape: CtrnnShape,
-    inputs: wp.array2d[float],
-    outputs: wp.array2d[float],
-    heuristic: wp.array[int],
-    q: int,
-) -> None:
-    """Sum up output ``q`` of the team."""
-    i = q // shape.n_outputs
-    o = q % shape.n_outputs
-    if heuristic[i] >= 0:
-        return
-    total = float(0.0)
-    slot = i * shape.n_slots
-    last = slot + shape.n_slots
-    while slot < last:
-        if weights.filled[slot] != 0:
-            total += weights.w_out[slot * shape.n_outputs + o] * memory.hidden[slot]
-        slot += 1
-    outputs[i, o] = total
 
 
 @parameters("controller")

@@ -21,7 +21,7 @@ import warp as wp
 from annotated_types import Gt, Le
 
 from conevo.controllers.protocol import Bools, Floats, Genome, Mind
-from conevo.controllers.slots import Slots
+from conevo.controllers.slots import Slots, n_neurons, n_sums, sum_up
 from conevo.kernels.arrays import named_arrays
 from conevo.kernels.outputs import sigmoid, sigmoid_of
 from conevo.kernels.phases import Phase
@@ -120,32 +120,6 @@ def recurrent(shape: GruShape, slot: int, gate: int) -> int:
 
 
 @wp.func
-def n_neurons(
-    weights: GruWeights,
-    memory: GruMemory,
-    shape: GruShape,
-    inputs: wp.array2d[float],
-    outputs: wp.array2d[float],
-    heuristic: wp.array[int],
-) -> int:
-    """Return how many slots for neurons a team has."""
-    return inputs.shape[0] * shape.n_slots
-
-
-@wp.func
-def n_sums(
-    weights: GruWeights,
-    memory: GruMemory,
-    shape: GruShape,
-    inputs: wp.array2d[float],
-    outputs: wp.array2d[float],
-    heuristic: wp.array[int],
-) -> int:
-    """Return how many outputs a team has."""
-    return inputs.shape[0] * shape.n_outputs
-
-
-@wp.func
 def open_gates(
     weights: GruWeights,
     memory: GruMemory,
@@ -212,31 +186,6 @@ def activate(
     if heuristic[q // shape.n_slots] < 0 and weights.filled[q] != 0:
         z = memory.update[q]
         memory.hidden[q] = z * memory.hidden[q] + (1.0 - z) * memory.candidate[q]
-
-
-@wp.func
-def sum_up(
-    weights: GruWeights,
-    memory: GruMemory,
-    shape: GruShape,
-    inputs: wp.array2d[float],
-    outputs: wp.array2d[float],
-    heuristic: wp.array[int],
-    q: int,
-) -> None:
-    """Sum up output ``q`` of the team."""
-    i = q // shape.n_outputs
-    o = q % shape.n_outputs
-    if heuristic[i] >= 0:
-        return
-    total = float(0.0)
-    slot = i * shape.n_slots
-    last = slot + shape.n_slots
-    while slot < last:
-        if weights.filled[slot] != 0:
-            total += weights.w_out[slot * shape.n_outputs + o] * memory.hidden[slot]
-        slot += 1
-    outputs[i, o] = total
 
 
 @parameters("controller")

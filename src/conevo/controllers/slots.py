@@ -1,13 +1,65 @@
-"""What controllers made of hidden neurons have in common: numbered slots for them."""
+"""What controllers made of hidden neurons have in common: numbered slots, and sums over them."""
 
-from typing import Annotated
+from typing import Annotated, Any
 
+import warp as wp
 from annotated_types import Ge, Le
 
 from conevo.errors import UsageError
 from conevo.parameters import parameters
 
-__all__ = ["Slots"]
+__all__ = ["Slots", "n_neurons", "n_sums", "sum_up"]
+
+
+@wp.func
+def n_neurons(
+    weights: Any,
+    memory: Any,
+    shape: Any,
+    inputs: wp.array2d[float],
+    outputs: wp.array2d[float],
+    heuristic: wp.array[int],
+) -> int:
+    """Return how many slots for neurons a team has."""
+    return inputs.shape[0] * shape.n_slots
+
+
+@wp.func
+def n_sums(
+    weights: Any,
+    memory: Any,
+    shape: Any,
+    inputs: wp.array2d[float],
+    outputs: wp.array2d[float],
+    heuristic: wp.array[int],
+) -> int:
+    """Return how many outputs a team has."""
+    return inputs.shape[0] * shape.n_outputs
+
+
+@wp.func
+def sum_up(
+    weights: Any,
+    memory: Any,
+    shape: Any,
+    inputs: wp.array2d[float],
+    outputs: wp.array2d[float],
+    heuristic: wp.array[int],
+    q: int,
+) -> None:
+    """Sum up output ``q`` of the team from the activations of its robot's neurons."""
+    i = q // shape.n_outputs
+    o = q % shape.n_outputs
+    if heuristic[i] >= 0:
+        return
+    total = float(0.0)
+    slot = i * shape.n_slots
+    last = slot + shape.n_slots
+    while slot < last:
+        if weights.filled[slot] != 0:
+            total += weights.w_out[slot * shape.n_outputs + o] * memory.hidden[slot]
+        slot += 1
+    outputs[i, o] = total
 
 
 @parameters("controller")
