@@ -94,14 +94,17 @@ def view_of(struct: Any, has_shared: bool = False, near: Near = ()) -> Any:
 
 @cache
 def _place(struct: Any, name: str, size: int) -> Any:
-    """Return the function that gives the place of an array: its own, or one in shared memory."""
+    """Return the function that gives the place of an array in shared memory, not its own.
+
+    On the CPU, where such kernels are only tested, it is memory that one block has at a time.
+    """
     snippet = f"""
 #if defined(__CUDA_ARCH__)
     __shared__ __align__(16) char near_{name}[{size}];
-    return (wp::uint64)near_{name};
 #else
-    return own;
+    alignas(16) static char near_{name}[{size}];
 #endif
+    return (wp::uint64)near_{name};
 """
     key = f"place_{struct.key.rpartition('.')[2]}_{name}"
     lines = ["@wp.func_native(snippet)", f"def {key}(own: wp.uint64) -> wp.uint64: ..."]
