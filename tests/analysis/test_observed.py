@@ -24,7 +24,7 @@ from conevo.rng import fold, stream
 from conevo.runs.champions import Team
 from conevo.runs.shrinkage import shrinkage
 from conevo.worlds.pursuit.study.behaviours import BEHAVIOURS
-from conevo.worlds.pursuit.study.captures import COLLECTIVES, Capture, composition
+from conevo.worlds.pursuit.study.captures import COLLECTIVES
 from conevo.worlds.pursuit.study.observation import Observation, record_team
 from conevo.worlds.pursuit.study.predators import Predators
 from conevo.worlds.pursuit.study.reproduction import (
@@ -353,48 +353,6 @@ def test_predators_put_together_are_clamped_only_if_asked(seen, played, is_clamp
 
 
 # --- tables ---------------------------------------------------------------------------------------
-
-
-def capture(collective: str, *roles: str) -> Capture:
-    return Capture(
-        0, 0, 1, 2, tuple((role,) if role else () for role in roles), False, 0, collective
-    )
-
-
-def test_composition_counts_predators_by_the_captures_they_took_part_in() -> None:
-    captures = [
-        capture("pursuer-blocker", "pursuer", "pursuer", "blocker", ""),
-        capture("pursuer-blocker", "pursuer", "pursuer", "blocker", ""),
-        capture("spiders-fly", "", "pursuer", "blocker", "flanker"),
-        capture("spiders-fly", "", "pursuer", "blocker", ""),
-        capture("spiders-fly", "", "pursuer", "blocker", ""),
-        capture("none", "flanker", "", "", "flanker"),
-    ]
-    labels = ["pursuer", "pursuer", "non-specialized", "flanker"]
-    assert composition(labels, captures) == {
-        "entrapment": None,
-        "pursuer-blocker": 1,
-        "spiders-fly": 1,
-        "role-switcher": None,
-        "non-specialized": 2,
-    }
-
-
-def test_composition_of_a_team_that_shows_a_behaviour_without_being_specialized_to_it() -> None:
-    """Table 4.4's first row: entrapment 0/3, the rest not applicable, 3/3 non-specialized."""
-    captures = [capture("entrapment", "pursuer", "pursuer", "pursuer")]
-    table = composition(["non-specialized"] * 3, captures)
-    assert table["entrapment"] == 0
-    assert table["non-specialized"] == 3
-    assert [table[name] for name in ("pursuer-blocker", "spiders-fly", "role-switcher")] == [
-        None
-    ] * 3
-
-
-def test_composition_without_captures() -> None:
-    assert composition(["idle", "pursuer"], []) == dict.fromkeys(COLLECTIVES[:-1]) | {
-        "non-specialized": 2
-    }
 
 
 def fake(method: str, fitness: float | None, validated: float | None = None) -> Any:

@@ -7,8 +7,10 @@ import pytest
 
 from conevo.worlds.pursuit.study.behaviours import BEHAVIOURS, NONE, Conduct, Rules, conduct
 from conevo.worlds.pursuit.study.captures import (
+    COLLECTIVES,
     COMPOSITIONS,
     Capture,
+    composition,
     find_captures,
     most_frequent,
     name,
@@ -218,3 +220,45 @@ def test_the_most_frequent():
 
 def test_every_role_is_a_behaviour():
     assert {role for one in COMPOSITIONS.values() for role in one} == set(BEHAVIOURS)
+
+
+def instance(collective: str, *roles: str) -> Capture:
+    return Capture(
+        0, 0, 1, 2, tuple((role,) if role else () for role in roles), False, 0, collective
+    )
+
+
+def test_composition_counts_predators_by_the_captures_they_took_part_in() -> None:
+    captures = [
+        instance("pursuer-blocker", "pursuer", "pursuer", "blocker", ""),
+        instance("pursuer-blocker", "pursuer", "pursuer", "blocker", ""),
+        instance("spiders-fly", "", "pursuer", "blocker", "flanker"),
+        instance("spiders-fly", "", "pursuer", "blocker", ""),
+        instance("spiders-fly", "", "pursuer", "blocker", ""),
+        instance("none", "flanker", "", "", "flanker"),
+    ]
+    labels = ["pursuer", "pursuer", "non-specialized", "flanker"]
+    assert composition(labels, captures) == {
+        "entrapment": None,
+        "pursuer-blocker": 1,
+        "spiders-fly": 1,
+        "role-switcher": None,
+        "non-specialized": 2,
+    }
+
+
+def test_composition_of_a_team_that_shows_a_behaviour_without_being_specialized_to_it() -> None:
+    """Table 4.4's first row: entrapment 0/3, the rest not applicable, 3/3 non-specialized."""
+    captures = [instance("entrapment", "pursuer", "pursuer", "pursuer")]
+    table = composition(["non-specialized"] * 3, captures)
+    assert table["entrapment"] == 0
+    assert table["non-specialized"] == 3
+    assert [table[name] for name in ("pursuer-blocker", "spiders-fly", "role-switcher")] == [
+        None
+    ] * 3
+
+
+def test_composition_without_captures() -> None:
+    assert composition(["idle", "pursuer"], []) == dict.fromkeys(COLLECTIVES[:-1]) | {
+        "non-specialized": 2
+    }
