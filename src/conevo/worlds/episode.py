@@ -53,8 +53,7 @@ def episode_kernel(
         mind: of the controller.
         timed: whether the cycles of each phase are added up in the job's ``clock``.
         near: arrays of the state, and of the memory, that lie in shared memory on a CUDA device.
-        lanes: of a block on a CUDA device, where so many blocks are to fit on a multiprocessor that
-            its registers suffice; 0 on the CPU.
+        lanes: of a block on a CUDA device, which bound the registers of a thread; 0 on the CPU.
     """
     structs = (simulation.state, simulation.scene, simulation.params_type)
     brain = (mind.weights, mind.memory, mind.shape_type, mind.clear, mind.think, mind.shared)
