@@ -371,6 +371,8 @@ def test_scores_must_answer_the_question():
     trials = learner.ask(state)
     with pytest.raises(UsageError, match=r"fitness has shape \(3,\), teams x robots is \(8, 2\)"):
         learner.tell(state, trials, Scores(np.zeros(3), np.zeros((8, 2))))
+    with pytest.raises(UsageError, match=r"shares has shape \(8, 2\), teams x robots x actions"):
+        learner.tell(state, trials, Scores(*np.zeros((3, 8, 2))))
     later = learner.tell(state, trials, scores(trials))
     with pytest.raises(UsageError, match=r"'genotypes' of generation 0.*'fittest' of 0"):
         learner.tell(later, trials, scores(trials))

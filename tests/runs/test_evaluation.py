@@ -56,6 +56,16 @@ def test_specialization_is_the_mean_of_switches_over_possible_switches() -> None
     np.testing.assert_allclose(score(OUTCOME).specialization, [[0, 1, 0.3]])
 
 
+def test_shares_are_means_over_epochs_and_doing_nothing_counts() -> None:
+    """Robot 2: 3 of 8 and then 1 of 5; robot 0 does nothing in the second of its epochs."""
+    counts = OUTCOME.counts.copy()
+    counts[0, :, 2] = [[3, 5], [1, 4]]
+    counts[0, 1, 0] = 0
+    seen = Outcome(OUTCOME.fitness, counts, OUTCOME.switches, OUTCOME.performance)
+    shares = [[[0.5, 0], [6 / 11, 5 / 11], [(3 / 8 + 1 / 5) / 2, (5 / 8 + 4 / 5) / 2]]]
+    np.testing.assert_allclose(score(seen).shares, shares, rtol=1e-15)
+
+
 def test_non_finite_fitness_is_passed_on() -> None:
     fitness = OUTCOME.fitness.copy()
     fitness[0, 1, 2] = np.inf

@@ -25,10 +25,12 @@ from conevo.evolution.protocol import (
     Trials,
 )
 from conevo.evolution.variation import VariationConfig, breed
+from conevo.parameters import parameters
 from conevo.rng import stream
 
 __all__ = [
     "Populations",
+    "StartConfig",
     "advance",
     "begin",
     "breed_networks",
@@ -42,6 +44,16 @@ __all__ = [
 ]
 
 FITTEST = ("fittest", "lesion")  # phases in which the fittest team plays
+
+
+@parameters("method")
+class StartConfig:
+    """How several populations begin."""
+
+    common_start: bool = False
+    """whether random populations begin as copies of the first one: similar at first, they drift
+    apart. Those of a run that others are from (``--from``, shaping) are not random. Choice: off;
+    section 3.7 only says that n populations are initialized."""
 
 
 @dataclass(frozen=True)
@@ -112,6 +124,7 @@ def begin(
     n_populations: int,
     n_genotypes: int,
     networks: bool = False,
+    common_start: bool = False,
     **own: Any,
 ) -> Kind:
     """Return generation 0: random genotypes in the first ``n_hidden`` slots.
@@ -123,16 +136,20 @@ def begin(
         n_populations: P, one per robot or 1.
         n_genotypes: M, genotypes per slot.
         networks: whether a genotype is a whole network, so that fitness has no U axis.
+        common_start: whether all populations are copies of the first.
         own: fields that the method's state has of its own.
     """
     shape = (n_populations, layout.max_hidden, n_genotypes, layout.n_genes)
     active = np.zeros(shape[:2], dtype=np.bool_)
     active[:, : layout.n_hidden] = True
     graded = (n_populations,) if networks else active.shape
+    genes = random_genes(stream(root, "genotypes"), shape)
+    if common_start:
+        genes = genes[:1]
     return kind(
         progress=Progress.first(layout, root, n_populations),
         phase="genotypes",
-        genes=random_genes(stream(root, "genotypes"), shape) * active[:, :, None, None],
+        genes=genes * active[:, :, None, None],
         active=active,
         fitness=np.full((*graded, n_genotypes), np.nan),
         elite=np.zeros((*graded, 0), dtype=np.int32),

@@ -124,10 +124,14 @@ class Scores:
         fitness: [N, R] float64 credit of each robot, mean over epochs; may be non-finite.
         specialization: [N, R] float64 degree of specialization S of each robot (Nitschke 2009,
             eq. 3.4), mean over epochs. Zeros where there is no such thing.
+        shares: [N, R, A] float64 share of each of A actions in all that a robot executed, mean over
+            epochs; what is missing to 1 is the share of epochs in which it did nothing. None where
+            there is no such thing.
     """
 
     fitness: FloatArray
     specialization: FloatArray
+    shares: FloatArray | None = None
 
 
 @dataclass(frozen=True)
@@ -199,6 +203,13 @@ class Progress:
             shape = np.shape(getattr(scores, name))
             if shape != expected:
                 raise UsageError(f"scores.{name} has shape {shape}, teams x robots is {expected}")
+        if scores.shares is not None:
+            shape = np.shape(scores.shares)
+            if len(shape) != 3 or shape[:2] != expected:
+                wanted = f"({expected[0]}, {expected[1]}, A)"
+                raise UsageError(
+                    f"scores.shares has shape {shape}, teams x robots x actions is {wanted}"
+                )
         return replace(
             self,
             team_evaluations=self.team_evaluations + expected[0],

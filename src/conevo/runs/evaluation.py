@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from conevo.evolution.protocol import Scores, Trials
 from conevo.rng import fold
-from conevo.specialization import individual
+from conevo.specialization import activity, individual
 from conevo.worlds.protocol import Outcome, Scenarios, Simulator, World
 
 __all__ = ["Evaluation", "Portrait", "describe", "make_evaluator", "score"]
@@ -100,7 +100,17 @@ def score(outcome: Outcome, credit: str = "robot") -> Scores:
     if credit == "team":
         fitness = np.repeat(fitness.sum(axis=1, keepdims=True), fitness.shape[1], axis=1)
     specialization = individual.degree(outcome.switches, outcome.counts).mean(axis=1)
-    return Scores(fitness=fitness, specialization=specialization)
+    return Scores(fitness, specialization, _mean_shares(outcome.counts))
+
+
+def _mean_shares(counts: npt.NDArray[np.int32]) -> npt.NDArray[np.float64]:
+    """Return the shares [N, R, C] of counts [N, E, R, C]; one epoch at a time, to save memory."""
+    n_teams, n_epochs, n_robots, n_castes = counts.shape
+    total = np.zeros((n_teams, n_robots, n_castes))
+    for epoch in range(n_epochs):
+        total += activity.shares(counts[:, epoch])
+    total /= n_epochs
+    return total
 
 
 def describe(outcome: Outcome, castes: tuple[str, ...], team: int = 0) -> Portrait:

@@ -81,8 +81,7 @@ def price(method: Method, state: State) -> int:
     while state.progress.generation == 0:
         requests = _counted(requests, method)
         trials = _asked(method, state)
-        empty = np.zeros(trials.teams.shape[:2])
-        state = _told(method, state, trials, Scores(fitness=empty, specialization=empty))
+        state = _told(method, state, trials, _scores(trials, np.zeros))
     return int(state.progress.team_evaluations)
 
 
@@ -101,13 +100,17 @@ def rehearse(method: Method, first: State) -> State:
         requests = _counted(requests, method)
         trials = _asked(method, state)
         _refuse_luck(method, trials, _asked(method, state))
-        shape = trials.teams.shape[:2]
-        scores = Scores(fitness=made_up.random(shape), specialization=made_up.random(shape))
-        state = _told(method, state, trials, scores)
+        state = _told(method, state, trials, _scores(trials, made_up.random))
         has_portrait = has_portrait or trials.portrait
     portrait = Portrait({}, [], [], {}) if has_portrait else None
     _record(method, first.progress, state.progress, portrait, 0, 0.0)
     return state
+
+
+def _scores(trials: Trials, numbers: Callable[[tuple[int, ...]], Any]) -> Scores:
+    """Return scores of these numbers in [0, 1], as if robots had two actions."""
+    shape = trials.teams.shape[:2]
+    return Scores(numbers(shape), numbers(shape), numbers((*shape, 2)) / 2)
 
 
 def _counted(requests: int, method: Method) -> int:

@@ -19,6 +19,7 @@ from conevo.evolution import credit
 from conevo.evolution.assembly import SchemeConfig, best_team, rows, shared
 from conevo.evolution.generation import (
     Populations,
+    StartConfig,
     advance,
     begin,
     breed_networks,
@@ -38,7 +39,7 @@ __all__ = ["Ccga", "CcgaConfig", "CcgaState"]
 
 
 @parameters("method")
-class CcgaConfig(VariationConfig, SchemeConfig):
+class CcgaConfig(VariationConfig, SchemeConfig, StartConfig):
     """Parameters of CCGA; under the scheme "shared" no partners come from the elite."""
 
     genotypes: Annotated[int, Ge(2), Le(1_000_000)] = 500
@@ -74,6 +75,7 @@ class Ccga:
             n_populations=layout.n_robots,
             n_genotypes=self.config.genotypes,
             networks=True,
+            common_start=self.config.common_start,
             partners=np.zeros(nobody, dtype=np.float32),
         )
 

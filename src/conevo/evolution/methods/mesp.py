@@ -23,6 +23,7 @@ from conevo.evolution.assembly import (
 )
 from conevo.evolution.generation import (
     Populations,
+    StartConfig,
     advance,
     begin,
     count,
@@ -49,7 +50,7 @@ __all__ = ["Mesp", "MespConfig", "MespState"]
 
 
 @parameters("method")
-class MespConfig(VariationConfig, SchemeConfig):
+class MespConfig(VariationConfig, SchemeConfig, StartConfig):
     """Parameters of Multi-Agent ESP."""
 
     genotypes: Annotated[int, Ge(2), Le(1_000_000)] = 50
@@ -124,6 +125,7 @@ class Mesp(Generic[Kind]):
         return {
             "n_populations": layout.n_robots,
             "n_genotypes": self.config.genotypes,
+            "common_start": self.config.common_start,
             "past_fitness": np.full((self.patience + 1, layout.n_robots), np.nan),
             "watched_since": np.zeros(layout.n_robots, dtype=np.int64),
         }
