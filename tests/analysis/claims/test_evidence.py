@@ -12,7 +12,8 @@ import pytest
 
 from analysis.claims.known_truth import Cell, rover, write_tables
 from conevo.analysis.claims import CLAIMS, verdicts
-from conevo.analysis.claims.evidence import QUANTITIES, read_evidence
+from conevo.analysis.claims.evidence import read_evidence
+from conevo.analysis.claims.quantities import QUANTITIES
 from conevo.analysis.claims.statements import Compare, Sample, Within
 from conevo.analysis.frames import SCHEMA, Tables
 

@@ -39,7 +39,7 @@ VARIANTS = ("cone-1", "cone-2", "cone-3")
 
 ABOUT = 0.1  # how far from a published share a share may be
 MOST = 0.5  # of the runs
-BY_WORLD = "decided by the world as well: heuristic teams also differ between the two families"
+BY_WORLD = "heuristic teams, which nothing evolved, also differ between the two families"
 
 
 def _named(family: str) -> tuple[str, ...]:

@@ -18,7 +18,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 
-from conevo.analysis.claims.evidence import QUANTITIES, Evidence, Gathered
+from conevo.analysis.claims.evidence import Evidence, Gathered
+from conevo.analysis.claims.quantities import QUANTITIES
 from conevo.analysis.claims.statements import Compare, Statement
 from conevo.analysis.statistics import (
     ALPHA,

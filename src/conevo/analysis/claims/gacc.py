@@ -48,7 +48,7 @@ GACC: tuple[Claim, ...] = (
                 across("share of the optimum", COEVOLUTION, zip(COMPLEX_9, SIMPLE[:9], strict=True))
             ),
         ),
-        caution=BY_WORLD,
+        decided=BY_WORLD,
     ),
     Claim(
         "G3",
@@ -78,7 +78,7 @@ GACC: tuple[Claim, ...] = (
             SIMPLE,
             {"homcne": 0.48, "hetcne": 0.47, "ccga": 0.51, "mesp": 0.54, "cone": 0.55},
         ),
-        caution=BY_WORLD,
+        decided=BY_WORLD,
     ),
     Claim(
         "G6",

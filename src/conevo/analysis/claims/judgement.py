@@ -2,8 +2,8 @@
 
 A claim is reproduced if its statements hold in all the environments that it needs, not reproduced
 if they are contradicted in too many for that, and undecided otherwise; not tested if all that is
-open depends on an exchange between populations that hardly ran, and not judged if the thesis says
-the opposite elsewhere.
+open depends on an exchange between populations that hardly ran, not judged if the thesis says the
+opposite elsewhere, and decided by the world if teams that nothing evolved differ in the same way.
 
 - Choice: where the two tests lead to different verdicts the claim is undecided, and both are told.
 - Choice: the effect that is shown is that of the statement on which the verdict hangs: of the
@@ -22,7 +22,8 @@ import numpy.typing as npt
 from conevo.analysis.claims import wording
 from conevo.analysis.claims.catalogue import CLAIMS
 from conevo.analysis.claims.cells import Cell, Outcome, measure
-from conevo.analysis.claims.evidence import QUANTITIES, Evidence, read_evidence
+from conevo.analysis.claims.evidence import Evidence, read_evidence
+from conevo.analysis.claims.quantities import QUANTITIES
 from conevo.analysis.claims.statements import Claim, Compare, Part, Sample
 from conevo.analysis.frames import Tables
 from conevo.analysis.power import CAMPAIGNS, Drawn, draw, found_alike
@@ -34,6 +35,7 @@ NOT_REPRODUCED = "not reproduced"
 UNDECIDED = "undecided: "
 UNTESTED = "not tested: no exchange"
 NOT_JUDGED = "not judged: the thesis contradicts itself"
+BY_WORLD = "decided by the world"
 
 
 @dataclass(frozen=True)
@@ -49,7 +51,7 @@ class Verdict:
         budget: preset and team evaluations.
         variant: the levels of the campaign's further factors, "gst=0.1, rounds=2"; empty without.
         verdict: "reproduced", "not reproduced", "not tested: no exchange", "not judged: the thesis
-            contradicts itself", or "undecided: " and why.
+            contradicts itself", "decided by the world", or "undecided: " and why.
         alone: the verdict if nothing else in the thesis counted.
         caution: what the thesis says elsewhere, what the verdict does not cover, what decides it.
         power: how likely the claim's methods would be found alike if they were exactly so; None of
@@ -130,9 +132,9 @@ def judge(claim: Claim, evidence: Evidence) -> Verdict:
         n=wording.sizes(cells),
         budget="; ".join(one for one in spent if one),
         variant=evidence.variant,
-        verdict=NOT_JUDGED if claim.contradiction and key else alone,
+        verdict=_marked(claim, alone) if key else alone,
         alone=alone,
-        caution=claim.contradiction or claim.caution,
+        caution=claim.contradiction or claim.decided or claim.caution,
         power=power,
         exchange=min(
             (cell.gathered.exchange for cell in cells if cell.gathered.exchange[0] is not None),
@@ -141,6 +143,11 @@ def judge(claim: Claim, evidence: Evidence) -> Verdict:
         why="; ".join(why),
         cells=tuple(cells),
     )
+
+
+def _marked(claim: Claim, alone: str) -> str:
+    """Return the verdict of a claim that something else than the runs speaks about."""
+    return NOT_JUDGED if claim.contradiction else BY_WORLD if claim.decided else alone
 
 
 def _concerns(claim: Claim, evidence: Evidence) -> bool:

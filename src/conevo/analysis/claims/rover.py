@@ -69,7 +69,7 @@ ROVER: tuple[Claim, ...] = (
         "5.4.1",
         "rover",
         (Part(across("value", COEVOLUTION, zip(COMPLEX, SIMPLE, strict=True))),),
-        caution=BY_WORLD,
+        decided=BY_WORLD,
     ),
     Claim(
         "R6",

@@ -105,7 +105,8 @@ class Claim:
         world: name without version.
         parts: what has to hold.
         contradiction: where the thesis says the opposite; such a claim is not judged.
-        caution: what a verdict does not cover, or what else decides it.
+        decided: what decides it besides the methods; it then has a verdict of its own.
+        caution: what a verdict does not cover.
     """
 
     id: str
@@ -114,6 +115,7 @@ class Claim:
     world: str
     parts: tuple[Part, ...]
     contradiction: str = ""
+    decided: str = ""
     caution: str = ""
 
 

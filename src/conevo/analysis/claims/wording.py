@@ -6,7 +6,8 @@ from collections import defaultdict
 from collections.abc import Sequence
 
 from conevo.analysis.claims.cells import Cell, Outcome
-from conevo.analysis.claims.evidence import QUANTITIES, Evidence
+from conevo.analysis.claims.evidence import Evidence
+from conevo.analysis.claims.quantities import QUANTITIES
 from conevo.analysis.claims.statements import Compare, Sample, Statement
 from conevo.analysis.statistics import ALPHA
 

@@ -13,6 +13,13 @@ from conevo.analysis.frames import Tables
 
 __all__ = ["claims"]
 
+INCONSISTENT = (
+    "Not every statement of the thesis can be judged, for it is not consistent: its appendices A, "
+    'C and D call a rejected null hypothesis "no significant difference", appendix D gives four '
+    "values of P for five methods, and many numbers of its tables and figures are lost in the text "
+    "that conevo was made from. Claims that it contradicts elsewhere are not judged."
+)
+
 
 def claims(tables: Tables) -> Section:
     """Return every claim that the runs are about, with effect, interval, tests and verdict."""
@@ -53,7 +60,7 @@ def claims(tables: Tables) -> Section:
         "methods that are exactly alike would be found so, with as many runs that scatter as much."
     )
     table = Table("claims", title, note, columns, [_row(one) for one in found])
-    return Section(title, text, [table, _statements(found)])
+    return Section(title, [*text, INCONSISTENT], [table, _statements(found)])
 
 
 def _row(one: Verdict) -> dict[str, Any]:
