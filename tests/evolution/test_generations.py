@@ -8,6 +8,7 @@ import pytest
 
 from conevo.errors import UsageError
 from conevo.evolution import Layout, Scores, method
+from conevo.evolution.assembly import place_on_trial
 
 SMALL = Layout(n_robots=2, n_hidden=2, max_hidden=3, n_genes=4)
 
@@ -64,17 +65,33 @@ def test_homcne_clones_and_averages():
     assert not after.genes[0, 2].any()
 
 
+def test_a_clones_credit_may_be_that_of_one_robot_the_same_for_all_genotypes():
+    learner = method("homcne", genotypes=4, elite_portion=0.5, clone_credit="one")
+    state = learner.init(SMALL, root=7)
+    credit = np.array([[1.0, 3.0], [0.0, 10.0], [4.0, 4.0], [-1.0, 0.0]])
+    seen = []
+    for _ in range(8):
+        state = learner.tell(state, learner.ask(state), Scores(credit, np.zeros((4, 2))))
+        seen.append(state.fitness.tolist())
+        final = learner.ask(state)
+        state = learner.tell(state, final, scores(final))
+    of_robots = [[[1.0, 0.0, 4.0, -1.0]], [[3.0, 10.0, 4.0, 0.0]]]
+    assert [of_robots.index(one) for one in seen] == [place_on_trial(7, g, 2) for g in range(8)]
+    assert all(one in seen for one in of_robots)  # no place holds for all generations
+
+
 def test_hetcne_partners_are_others_first_then_last_generations_elite():
     learner = method("hetcne", genotypes=6, elite_portion=0.5)
     layout = replace(SMALL, n_robots=3)
-    state = learner.init(layout, root=7)
+    state = learner.init(layout, root=10)
     trials = learner.ask(state)
     members = trials.teams[:, :, 0]
-    assert members[:, 0].tolist() == [0, 1, 2, 3, 4, 5]
+    own = [place_on_trial(10, generation, 3) for generation in range(2)]
+    assert own == [2, 0]
+    assert members[:, 2].tolist() == [0, 1, 2, 3, 4, 5]
     assert all(len(set(team)) == 3 for team in members.tolist())
-    credit = np.zeros((6, 3))
-    credit[:, 0] = [1, 6, 2, 5, 4, 3]  # only robot 0's credit counts
-    credit[:, 1:] = 99
+    credit = np.full((6, 3), 99)
+    credit[:, 2] = [1, 6, 2, 5, 4, 3]  # only the credit of the robot on trial counts
     state = learner.tell(state, trials, Scores(credit, np.zeros((6, 3))))
     final = learner.ask(state)
     assert final.teams[0].tolist() == [[1, 7, -1], [3, 9, -1], [4, 10, -1]]
@@ -87,7 +104,59 @@ def test_hetcne_partners_are_others_first_then_last_generations_elite():
         partners = {tuple(robot[:2].ravel()) for robot in team[1:]}
         assert len(partners) == 2
         assert partners <= elite
-    np.testing.assert_array_equal(networks[4, 0], state.genes[0, :, 4])
+    np.testing.assert_array_equal(networks[:, 0], state.genes[0].swapaxes(0, 1))
+
+
+@pytest.mark.parametrize("name", ["hetcne", "ccga", "mesp", "cone", "cone-3"])
+def test_partners_are_any_genotypes_of_the_same_generation(name):
+    learner = method(name, genotypes=6, elite_portion=0.5, partners="any")
+    state = play(learner, learner.init(SMALL, root=3), 2)[-1]
+    trials = learner.ask(state)
+    assert len(trials.genes) == state.genes[..., 0].size  # no further pool
+    assert len(trials.teams) == {"hetcne": 6, "ccga": 12}.get(name, 24)
+    np.testing.assert_array_equal(
+        np.unique(trials.teams), [-1, *np.flatnonzero(trials.genes.any(1))]
+    )
+
+
+@pytest.mark.parametrize("name", ["ccga", "mesp", "cone"])
+def test_elite_partners_need_a_team_for_each_genotype(name):
+    with pytest.raises(UsageError, match=r'needs method\.evaluation = "systematic"'):
+        method(name, evaluation="shared", partners="elite")
+    shared = method(name, genotypes=4, evaluation="shared", partners="any")
+    plain = method(name, genotypes=4, evaluation="shared")
+    a, b = (play(learner, learner.init(SMALL, root=3), 2)[-1] for learner in (shared, plain))
+    np.testing.assert_array_equal(a.genes, b.genes)
+
+
+def test_neurons_play_with_the_elite_of_the_generation_before():
+    """Two robots with one neuron each, which one has in slot 0 and the other adds to."""
+    learner = method("mesp", genotypes=4, elite_portion=0.5)
+    state = learner.init(replace(SMALL, n_hidden=1), root=3)
+    trials = learner.ask(state)
+    # Rows: population 0 has 0-3, 4-7, 8-11 in its three slots, population 1 has 12-15, ...
+    assert trials.teams[:4, 0, 0].tolist() == [0, 1, 2, 3]
+    assert set(trials.teams[:4, 1, 0]) <= {12, 13, 14, 15}
+    credit = np.array([[1, 0], [4, 0], [2, 0], [3, 0], [0, 9], [0, 7], [0, 8], [0, 6]], float)
+    state = learner.tell(state, trials, Scores(credit, np.zeros((8, 2))))
+    assert state.elite[:, 0].tolist() == [[1, 3], [0, 2]]
+    # Population 1 gets a second neuron, as if its lesions had asked for one.
+    grown = np.array([[True, False, False], [True, True, False]])
+    after = learner.finish(state, grown)
+    assert after.partners[0, 0].tolist() == state.genes[0, 0, [1, 3]].tolist()
+    assert after.partners[1, 0].tolist() == state.genes[1, 0, [0, 2]].tolist()
+    assert after.partners[1, 1].tolist() == after.genes[1, 1, :2].tolist()  # it is new
+    trials = learner.ask(after)
+    assert trials.genes[24:].tolist() == after.partners.reshape(12, 4).tolist()
+    # Behind the 24 rows come two partners in each slot: 24, 25 | 30, 31 and 32, 33 are in use.
+    own, others = trials.teams[:4, 0, 0], trials.teams[:4, 1]
+    assert own.tolist() == [0, 1, 2, 3]
+    assert set(others[:, 0]) <= {30, 31}
+    assert set(others[:, 1]) <= {32, 33}
+    assert trials.teams[8:, 1, 1].tolist() == [16, 17, 18, 19]  # the new slot's turn
+    assert set(trials.teams[8:, 1, 0]) <= {30, 31}
+    assert set(trials.teams[4:, 0, 0]) <= {24, 25}
+    assert (trials.teams[:, :, 2] == -1).all()
 
 
 def test_hetcne_needs_a_genotype_per_robot():
@@ -292,8 +361,8 @@ def test_a_method_remembers_only_what_it_needs():
         "homcne": set(),
         "hetcne": {"partners"},
         "ccga": {"partners"},
-        "mesp": windows,
-        "cone": windows | thresholds,
+        "mesp": {"partners"} | windows,
+        "cone": {"partners"} | windows | thresholds,
     }
     for name, more in own.items():
         state = method(name, genotypes=2).init(SMALL, root=1)

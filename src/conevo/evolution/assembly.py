@@ -12,8 +12,10 @@ from typing import Annotated, Literal
 import numpy as np
 from annotated_types import Ge, Le
 
+from conevo.errors import UsageError
 from conevo.evolution.protocol import BoolArray, IntArray
 from conevo.parameters import parameters
+from conevo.rng import stream
 
 __all__ = [
     "SchemeConfig",
@@ -22,6 +24,7 @@ __all__ = [
     "elite_teams",
     "lesion_teams",
     "on_trial",
+    "place_on_trial",
     "rows",
     "shared",
     "systematic",
@@ -44,6 +47,25 @@ class SchemeConfig:
     """whether each round is played in scenarios of its own: for the same evaluations every genotype
     meets ``rounds`` times as many, and all genotypes meet the same ones. Choice: on, since without
     it co-evolved teams do not learn the shipped example."""
+
+    partners: Literal["by_scheme", "elite", "any"] = "by_scheme"
+    """with whom a genotype on trial plays: genotypes of the elite portion of the generation before
+    ("elite", 5.3.3), or "any" of its own generation (3.3.1). Choice: "by_scheme" is "elite" under
+    "systematic", for all methods with several populations alike; under "shared" all members of a
+    team are on trial, so it is "any" there and "elite" is refused."""
+
+    def __post_init__(self) -> None:
+        """Refuse partners that a scheme does not have."""
+        if self.evaluation == "shared" and self.partners == "elite":
+            raise UsageError(
+                'method.partners = "elite" needs method.evaluation = "systematic": under "shared" '
+                "all members of a team are on trial"
+            )
+
+    @property
+    def has_elite_partners(self) -> bool:
+        """Whether the elite portion of a generation plays with the genotypes of the next one."""
+        return self.evaluation == "systematic" and self.partners != "any"
 
     @property
     def n_parts(self) -> int:
@@ -72,17 +94,45 @@ def on_trial(active: BoolArray, n_genotypes: int) -> tuple[IntArray, IntArray, I
     return population.repeat(n_genotypes), slot.repeat(n_genotypes), genotype
 
 
-def systematic(active: BoolArray, n_genotypes: int, generator: np.random.Generator) -> IntArray:
+def systematic(
+    active: BoolArray,
+    n_genotypes: int,
+    generator: np.random.Generator,
+    n_partners: int = 0,
+    *,
+    networks: bool = False,
+) -> IntArray:
     """Return one team per genotype, [N, P, U]: every other place is filled at random.
 
     Nitschke 2009, 3.3.1: genotype g with random genotypes of its population's other
     sub-populations, and controllers of random genotypes of the other populations.
+
+    Args:
+        active: [P, U] slots in use.
+        n_genotypes: M.
+        generator: the source of the random partners.
+        n_partners: L, partners per slot in a second pool behind the first, from which the other
+            places are filled; 0: from the first.
+        networks: a genotype is a whole network: all slots of a population hold the same one.
     """
-    population, slot, genotype = on_trial(active, n_genotypes)
-    shape = (len(population), *active.shape)
-    choice = generator.integers(n_genotypes, size=shape, dtype=np.int32)
-    choice[np.arange(len(population)), population, slot] = genotype
-    return rows(active, choice, n_genotypes)
+    tried = active[:, :1] if networks else active
+    population, slot, genotype = on_trial(tried, n_genotypes)
+    n_from, offset = (n_partners, active.size * n_genotypes) if n_partners else (n_genotypes, 0)
+    shape = (len(population), *tried.shape)
+    teams = rows(active, generator.integers(n_from, size=shape, dtype=np.int32), n_from, offset)
+    own = rows(active, genotype[:, None, None], n_genotypes)
+    place = np.arange(len(population)), population, slice(None) if networks else slot
+    teams[place] = own[place]
+    return teams
+
+
+def place_on_trial(root: int, generation: int, n_robots: int) -> int:
+    """Return the robot whose credit counts in all teams of a generation.
+
+    Choice: it is drawn for each generation, so that all genotypes of one are compared in the same
+    place, and none is bred for one place where robots have places of their own.
+    """
+    return int(stream(root, "place", generation).integers(n_robots))
 
 
 def shared(

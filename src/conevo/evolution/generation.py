@@ -157,9 +157,17 @@ def begin(
     )
 
 
-def pool(state: Populations) -> FloatArray:
-    """Return the neuron genotypes as one list of rows, [P * U * M, G]."""
-    return state.genes.reshape(-1, state.genes.shape[-1])
+def pool(state: Populations, partners: FloatArray | None = None) -> FloatArray:
+    """Return the neuron genotypes as one list of rows, [P * U * M, G].
+
+    Args:
+        state: whose genotypes.
+        partners: [P, U, L, G] further ones, which come after them.
+    """
+    rows: FloatArray = state.genes.reshape(-1, state.genes.shape[-1])
+    if partners is None or not partners.size:
+        return rows
+    return np.concatenate([rows, partners.reshape(-1, rows.shape[-1])])
 
 
 def trials(

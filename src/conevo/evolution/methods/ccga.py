@@ -3,8 +3,8 @@
 Nitschke 2009, sections 2.3.3 and 5.3.3, after Potter and De Jong. Populations are genetically
 isolated; a genotype is judged by its own robot's fitness in a team with partners from the others.
 
-Choice: partners come from the elite portion of the generation before, which the state keeps, since
-children have no fitness before they are tried; the first generation takes any genotypes.
+Choice: "elite" partners are those of the generation before, which the state keeps, since children
+have no fitness before they are tried; the first generation takes any genotypes.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 from annotated_types import Ge, Le
 
 from conevo.evolution import credit
-from conevo.evolution.assembly import SchemeConfig, best_team, rows, shared
+from conevo.evolution.assembly import SchemeConfig, best_team, shared, systematic
 from conevo.evolution.generation import (
     Populations,
     StartConfig,
@@ -40,7 +40,7 @@ __all__ = ["Ccga", "CcgaConfig", "CcgaState"]
 
 @parameters("method")
 class CcgaConfig(VariationConfig, SchemeConfig, StartConfig):
-    """Parameters of CCGA; under the scheme "shared" no partners come from the elite."""
+    """Parameters of CCGA."""
 
     genotypes: Annotated[int, Ge(2), Le(1_000_000)] = 500
     """M, whole networks per population (table 5.5: 500; 600 in all for pursuit)."""
@@ -51,7 +51,8 @@ class CcgaState(Populations):
     """What CCGA remembers.
 
     Attributes:
-        partners: [P, U, L, G] float32 last generation's elite; L = 0 in the first.
+        partners: [P, U, L, G] float32 last generation's elite; L = 0 in the first, and always if
+            partners do not come from it.
     """
 
     partners: FloatArray
@@ -88,15 +89,9 @@ class Ccga:
         if config.evaluation == "shared":
             teams = shared(state.active, m, config.rounds, generator, networks=True)
             return trials(state, teams, rounds=config.n_parts)
-        n_robots, n_kept = len(state.active), state.partners.shape[2]
-        n_from, offset = (n_kept, len(pool(state))) if n_kept else (m, 0)
-        choice = generator.integers(n_from, size=(n_robots * m, n_robots, 1), dtype=np.int32)
-        teams = rows(state.active, choice, n_from, offset)
-        team, robot = np.arange(n_robots * m), np.arange(n_robots).repeat(m)
-        everyone = rows(state.active, np.arange(m)[:, None, None], m)
-        teams[team, robot] = everyone.swapaxes(0, 1).reshape(n_robots * m, -1)
-        genes = np.concatenate([pool(state), state.partners.reshape(-1, state.genes.shape[-1])])
-        return trials(state, teams, genes)
+        n_partners = state.partners.shape[2]
+        teams = systematic(state.active, m, generator, n_partners, networks=True)
+        return trials(state, teams, pool(state, state.partners))
 
     def tell(self, state: CcgaState, trials: Trials, scores: Scores) -> CcgaState:
         """Return the state after these scores."""
@@ -107,7 +102,7 @@ class Ccga:
             return grade(state, self._fitness(trials, scores, state), n_elite, phase="fittest")
         state = crown(state, trials, scores)
         children = breed_networks(state, state.elite, config)
-        if config.evaluation == "shared":
+        if not config.has_elite_partners:
             return advance(state, children, state.active)
         population = np.arange(len(state.elite))[:, None]
         partners = state.genes[population, :, state.elite].swapaxes(1, 2)

@@ -1,14 +1,13 @@
 """HetCNE, heterogeneous conventional neuro-evolution: one population, teams of different networks.
 
 Nitschke 2009, sections 2.3.1 and 5.3.3. Every genotype is a whole network; it is tried once with
-n - 1 different genotypes of the elite and credited with its own robot's fitness. One team
-evaluation per genotype and generation.
+n - 1 different genotypes and credited with its own robot's fitness. One team evaluation per
+genotype and generation.
 
 Choice: children replace all genotypes and have no fitness before they are tried, so "elite" means
 the elite portion of the generation before, which the state keeps; the first generation takes any
 other genotypes. An elite portion of fewer than n - 1 is filled up with the next in rank. With
 ``n_elitist`` a survivor may meet its own copy.
-Choice: the genotype on trial is robot 0, so that all are compared in the same place.
 Choice: the fittest team is the n fittest genotypes, robot r holding rank r (section 2.3.1: "M of
 the fittest genotypes ... decoded into a group of M different ANNs").
 """
@@ -16,14 +15,14 @@ the fittest genotypes ... decoded into a group of M different ANNs").
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
 from annotated_types import Ge, Le
 
 from conevo.errors import UsageError
 from conevo.evolution import credit
-from conevo.evolution.assembly import distinct, rows
+from conevo.evolution.assembly import distinct, place_on_trial, rows
 from conevo.evolution.generation import (
     Populations,
     advance,
@@ -51,6 +50,9 @@ class HetCneConfig(VariationConfig):
     genotypes: Annotated[int, Ge(2), Le(1_000_000)] = 10_000
     """M, whole networks in the population, at least as many as robots; each costs one team
     evaluation. Choice: 10000, as for HomCNE."""
+    partners: Literal["elite", "any"] = "elite"
+    """with whom a genotype on trial plays: different genotypes of the elite portion of the
+    generation before ("elite", 5.3.3), or "any" others of its own generation."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +60,8 @@ class HetCneState(Populations):
     """What HetCNE remembers.
 
     Attributes:
-        partners: [1, U, L, G] float32 last generation's elite; L = 0 in the first.
+        partners: [1, U, L, G] float32 last generation's elite; L = 0 in the first, and always if
+            partners do not come from it.
     """
 
     partners: FloatArray
@@ -102,24 +105,27 @@ class HetCne:
             chosen = distinct(m, n_robots - 1, m - 1, generator)
             chosen = chosen + (chosen >= own)
             partners = rows(state.active, chosen[:, :, None], m)
-            genes = pool(state)
         else:
             chosen = distinct(m, n_robots - 1, n_kept, generator)
             partners = rows(state.active, chosen[:, :, None], n_kept, offset=len(pool(state)))
-            genes = np.concatenate([pool(state), state.partners.reshape(-1, pool(state).shape[1])])
-        first = rows(state.active, own[:, :, None], m)
-        return trials(state, np.concatenate([first, partners], axis=1), genes)
+        robot = place_on_trial(state.root, state.generation, n_robots)
+        teams = np.insert(partners, robot, rows(state.active, own, m), axis=1)
+        return trials(state, teams, pool(state, state.partners))
 
     def tell(self, state: HetCneState, trials: Trials, scores: Scores) -> HetCneState:
-        """Return the state after these scores; a genotype's fitness is robot 0's credit."""
+        """Return the state after these scores; a genotype's fitness is its own robot's credit."""
         state = count(state, trials, scores)
         config = self.config
         n_elite = elite_count(config.elite_portion, config.genotypes)
         if state.phase == "genotypes":
-            fitness = credit.of_robot(scores.fitness, 0)[None]
-            n_named = max(n_elite, scores.fitness.shape[1])
+            n_robots = scores.fitness.shape[1]
+            robot = place_on_trial(state.root, state.generation, n_robots)
+            fitness = credit.of_robot(scores.fitness, robot)[None]
+            n_named = max(n_elite, n_robots)
             return grade(state, fitness, n_named, phase="fittest")
         state = crown(state, trials, scores)
         children = breed_networks(state, state.elite[:, :n_elite], config)
+        if config.partners == "any":
+            return advance(state, children, state.active)
         kept: IntArray = state.elite[0, : max(n_elite, scores.fitness.shape[1] - 1)]
         return advance(state, children, state.active, partners=state.genes[:, :, kept])

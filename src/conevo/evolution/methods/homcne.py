@@ -7,13 +7,13 @@ the clones are evaluated together. One team evaluation per genotype and generati
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
 from annotated_types import Ge, Le
 
 from conevo.evolution import credit
-from conevo.evolution.assembly import rows
+from conevo.evolution.assembly import place_on_trial, rows
 from conevo.evolution.generation import (
     Populations,
     advance,
@@ -25,7 +25,7 @@ from conevo.evolution.generation import (
     trials,
 )
 from conevo.evolution.population import elite_count
-from conevo.evolution.protocol import Layout, Scores, Trials
+from conevo.evolution.protocol import FloatArray, Layout, Scores, Trials
 from conevo.evolution.variation import VariationConfig
 from conevo.parameters import parameters
 
@@ -40,6 +40,10 @@ class HomCneConfig(VariationConfig):
     """M, whole networks in the population; each costs one team evaluation. Choice: 10000, the 20 x
     500 of the methods with many populations (table 5.5's own number is lost), so that all methods
     spend the same team evaluations per generation."""
+    clone_credit: Literal["mean", "one"] = "mean"
+    """whose credit is a genotype's fitness: the "mean" of all its clones, or that of "one", the
+    same robot for all genotypes of a generation, drawn anew for each. Choice: the mean; 5.3.3 says
+    only that a genotype is replicated, and one clone is less evidence."""
 
 
 @dataclass(frozen=True)
@@ -70,12 +74,19 @@ class HomCne:
         return trials(state, rows(state.active, clones, m))
 
     def tell(self, state: Populations, trials: Trials, scores: Scores) -> Populations:
-        """Return the state after these scores; a genotype's fitness is its clones' mean credit."""
+        """Return the state after these scores; a genotype's fitness is its clones' credit."""
         state = count(state, trials, scores)
         config = self.config
         if state.phase == "genotypes":
-            fitness = credit.of_clones(scores.fitness)[None]
+            fitness = self._fitness(state, scores)[None]
             n_elite = elite_count(config.elite_portion, config.genotypes)
             return grade(state, fitness, n_elite, phase="fittest")
         state = crown(state, trials, scores)
         return advance(state, breed_networks(state, state.elite, config), state.active)
+
+    def _fitness(self, state: Populations, scores: Scores) -> FloatArray:
+        """Return type A fitness [M]."""
+        if self.config.clone_credit == "mean":
+            return credit.of_clones(scores.fitness)
+        robot = place_on_trial(state.root, state.generation, scores.fitness.shape[1])
+        return credit.of_robot(scores.fitness, robot)

@@ -29,6 +29,7 @@ from conevo.evolution.generation import (
     count,
     crown,
     grade,
+    pool,
     push,
     trials,
 )
@@ -71,10 +72,13 @@ class MespState(Populations):
         past_fitness: [H, R] float64 credits of the fittest team in the last H generations, the
             newest last, NaN before the first. H is what the window needs.
         watched_since: [P] int64 generation at which the controller-size window started.
+        partners: [P, U, L, G] float32 last generation's elite; L = 0 in the first, and always if
+            partners do not come from it.
     """
 
     past_fitness: FloatArray
     watched_since: IntArray
+    partners: FloatArray
 
 
 Kind = TypeVar("Kind", bound=MespState)
@@ -100,7 +104,8 @@ class Mesp(Generic[Kind]):
             if self.config.evaluation == "shared":
                 teams = shared(state.active, m, self.config.rounds, generator)
                 return trials(state, teams, rounds=self.config.n_parts)
-            return trials(state, systematic(state.active, m, generator))
+            teams = systematic(state.active, m, generator, state.partners.shape[2])
+            return trials(state, teams, pool(state, state.partners))
         fittest = best_team(state.active, state.elite, m)
         if state.phase == "lesion":
             return trials(state, lesion_teams(fittest[0], self.suspects(state))[0])
@@ -128,6 +133,9 @@ class Mesp(Generic[Kind]):
             "common_start": self.config.common_start,
             "past_fitness": np.full((self.patience + 1, layout.n_robots), np.nan),
             "watched_since": np.zeros(layout.n_robots, dtype=np.int64),
+            "partners": np.zeros(
+                (layout.n_robots, layout.max_hidden, 0, layout.n_genes), dtype=np.float32
+            ),
         }
 
     @property
@@ -187,4 +195,22 @@ class Mesp(Generic[Kind]):
         if judged is not None:
             since = np.where(judged, state.generation + 1, since)
         numbers = {"recombinations": len(pairs)}
-        return advance(state, children, active, numbers, watched_since=since)
+        partners = self.partners(state, children, active & ~used)
+        return advance(state, children, active, numbers, watched_since=since, partners=partners)
+
+    def partners(self, state: Kind, children: FloatArray, added: BoolArray) -> FloatArray:
+        """Return with whom the next generation plays, [P, U, L, G]: the elite of this one.
+
+        Choice: a sub-population that is added has none yet, and its first L genotypes take the
+        place; they are random, as all in it are.
+
+        Args:
+            state: the generation that ends.
+            children: [P, U, M, G] the next one.
+            added: [P, U] slots that this generation did not use.
+        """
+        if not self.config.has_elite_partners:
+            return state.partners
+        elites = np.take_along_axis(state.genes, state.elite[..., None], axis=2)
+        first = children[:, :, : elites.shape[2]]
+        return np.where(added[:, :, None, None], first, elites)
