@@ -5,11 +5,15 @@ import pytest
 
 from conevo.evolution.selection import (
     elite_distance,
+    label_distance,
     pair_populations,
     pair_similar,
     pair_slots,
+    shares_distance,
     specialization_distance,
 )
+from conevo.specialization import shares
+from conevo.specialization.diversity import differences
 
 
 def test_specialization_distance_of_the_thesis_controllers():
@@ -21,22 +25,66 @@ def test_specialization_distance_of_the_thesis_controllers():
 def test_populations_pair_from_the_most_similar_on():
     # SD: (0,1) 1/64, (2,3) 3/64, (1,2) and the others far.
     s = np.array([0.125, 0.140625, 0.5, 0.453125])
-    assert pair_populations(s, 0.1).tolist() == [[0, 1], [2, 3]]
-    assert pair_populations(s, 0.03).tolist() == [[0, 1]]
-    assert pair_populations(s[::-1], 0.1).tolist() == [[2, 3], [0, 1]]
+    assert pair_populations(specialization_distance(s), 0.1).tolist() == [[0, 1], [2, 3]]
+    assert pair_populations(specialization_distance(s), 0.03).tolist() == [[0, 1]]
+    assert pair_populations(specialization_distance(s[::-1]), 0.1).tolist() == [[2, 3], [0, 1]]
 
 
 def test_a_population_is_taken_once_and_the_rest_stays_alone():
     # SD: (1,2) 1/16 first; then (0,1) 1/8 and (0,2) 3/16 are similar too, but 1 and 2 are gone.
     s = np.array([0.0, 0.125, 0.1875])
-    assert pair_populations(s, 0.25).tolist() == [[1, 2]]
+    assert pair_populations(specialization_distance(s), 0.25).tolist() == [[1, 2]]
+
+
+def test_all_pairs_below_the_threshold_come_from_the_most_similar_on():
+    distance = specialization_distance(np.array([0.0, 0.125, 0.1875]))
+    assert pair_populations(distance, 0.25, "all").tolist() == [[1, 2], [0, 1], [0, 2]]
+    assert pair_populations(distance, 0.1875, "all").tolist() == [[1, 2], [0, 1]]
+    assert pair_populations(distance, 0.0625, "all").tolist() == []
+    distance[0] = distance[:, 0] = np.nan
+    assert pair_populations(distance, 1.0, "all").tolist() == [[1, 2]]
+
+
+def test_lives_are_as_different_as_what_would_have_to_be_spent_otherwise():
+    # Both actions alike; one more of the second; nothing at all; half of the epochs nothing.
+    lives = np.array([[0.5, 0.5], [0.25, 0.75], [0.0, 0.0], [0.5, 0.0]])
+    assert shares_distance(lives).tolist() == [
+        [0, 0.25, 1, 0.5],
+        [0.25, 0, 1, 0.75],
+        [1, 1, 0, 0.5],
+        [0.5, 0.75, 0.5, 0],
+    ]
+    # Two perfect specialists in different actions: alike by eq. 3.5, not by what they do.
+    assert specialization_distance(np.zeros(2))[0, 1] == 0
+    assert shares_distance(np.eye(2))[0, 1] == 1
+
+
+def test_lives_differ_as_the_measure_of_a_teams_diversity_says():
+    counts = np.random.default_rng(1).integers(0, 9, (6, 4))
+    counts[2] = 0
+    np.testing.assert_allclose(shares_distance(shares(counts)), differences(counts), atol=1e-15)
+
+
+def test_labels_are_the_action_done_most_and_whether_a_robot_is_specialized():
+    does = np.array([[0.6, 0.4], [0.9, 0.1], [0.5, 0.5], [0.4, 0.6], [0.0, 0.0], [0.6, 0.4]])
+    s = np.array([0.25, 0.0, 0.5, 0.25, 0.0, np.nan])
+    # 0 and 1: the first action, specialized. 2: the first of equals, S = 0.5 is not specialized.
+    # 3: the second action. 4: nothing. 5: S is not known.
+    alike = {(0, 1)} | {(k, k) for k in range(5)}
+    for i, row in enumerate(label_distance(s, does)):
+        for j, distance in enumerate(row):
+            assert distance == (0 if (min(i, j), max(i, j)) in alike else 1), (i, j)
 
 
 def test_similar_means_below_the_threshold_and_known():
-    assert pair_populations(np.array([0.0, 0.25]), 0.25).tolist() == []
-    assert pair_populations(np.array([0.5, 0.5]), 0.0).tolist() == []
-    assert pair_populations(np.array([np.nan, 0.5, 0.5]), 1.0).tolist() == [[1, 2]]
-    assert pair_populations(np.array([0.5, 0.5]), float("nan")).tolist() == []
+    assert pair_populations(specialization_distance(np.array([0.0, 0.25])), 0.25).tolist() == []
+    assert pair_populations(specialization_distance(np.array([0.5, 0.5])), 0.0).tolist() == []
+    assert pair_populations(
+        specialization_distance(np.array([np.nan, 0.5, 0.5])), 1.0
+    ).tolist() == [[1, 2]]
+    assert (
+        pair_populations(specialization_distance(np.array([0.5, 0.5])), float("nan")).tolist() == []
+    )
 
 
 def test_elite_distance_pairs_ranks():
@@ -74,6 +122,19 @@ def test_empty_slots_never_pair():
     assert pair_similar(elites, active, np.array([[0, 1]]), 1.0).tolist() == [[1, 4]]
 
 
+def test_sub_populations_of_the_same_slot_only():
+    # Crosswise they are the same, slot by slot GD is 0.25.
+    elites = elites_of([[0.0, 0.5], [0.5, 0.0]])
+    active = np.ones((2, 2), dtype=bool)
+    pair = np.array([[0, 1]])
+    assert pair_similar(elites, active, pair, 0.3).tolist() == [[0, 3], [1, 2]]
+    assert pair_similar(elites, active, pair, 0.3, slots="same").tolist() == [[0, 2], [1, 3]]
+    assert pair_similar(elites, active, pair, 0.25, slots="same").tolist() == []
+    active[0, 0] = active[1, 1] = False  # slot 1 of the one, slot 0 of the other
+    assert pair_similar(elites, active, pair, 0.3).tolist() == [[1, 2]]
+    assert pair_similar(elites, active, pair, 0.3, slots="same").tolist() == []
+
+
 def test_without_population_pairs_the_most_similar_of_all_come_first():
     # CONE-2: (0)-(2) 0.03125 before (0)-(1) 0.0625; then (1) is left without a partner.
     elites = elites_of([[0.0], [0.125], [-0.0625]])
@@ -87,3 +148,10 @@ def test_slots_pair_where_both_are_used(candidates):
     active = np.array([[True, True, False], [True, True, True], [False, True, True]])
     expected = [[1, 7]] if len(candidates) else []
     assert pair_slots(active, candidates).tolist() == expected
+
+
+def test_a_population_in_several_pairs_gives_each_slot_to_the_first():
+    # Unit p * 3 + u. 1 and 2 have slots 1 and 2 in common, 0 and 1 slots 0 and 1: 1 is taken.
+    active = np.array([[True, True, False], [True, True, True], [False, True, True]])
+    candidates = np.array([[1, 2], [0, 1], [0, 2]])
+    assert pair_slots(active, candidates).tolist() == [[4, 7], [5, 8], [0, 3]]

@@ -4,7 +4,8 @@ Nitschke 2009, section 3.4.1 and 3.4.2. Similar behaviour makes two populations 
 genotypes let their sub-populations recombine; everything else recombines within itself.
 
 Choice: the thesis' loop over all pairs would overwrite a population n - 1 times. Here the most
-similar pairs come first and each population, and each sub-population, is taken at most once.
+similar pairs come first and each population, and each sub-population, is taken at most once; with
+the pairing "all" a population may be in many pairs, but each of its sub-populations in one.
 """
 
 from __future__ import annotations
@@ -18,9 +19,11 @@ from conevo.evolution.protocol import BoolArray, FloatArray, IntArray
 
 __all__ = [
     "elite_distance",
+    "label_distance",
     "pair_populations",
     "pair_similar",
     "pair_slots",
+    "shares_distance",
     "specialization_distance",
 ]
 
@@ -30,17 +33,61 @@ def specialization_distance(specialization: FloatArray) -> FloatArray:
     return np.abs(specialization[:, None] - specialization[None, :])
 
 
-def pair_populations(specialization: FloatArray, sst: float) -> IntArray:
+def shares_distance(shares: FloatArray) -> FloatArray:
+    """Return how differently controllers divide their lives among actions, [P, P] in [0, 1].
+
+    It is the total variation of their shares. Doing nothing is one more action.
+
+    Args:
+        shares: [P, A] share of each action; what is missing to 1 was spent on nothing.
+    """
+    spent = _with_nothing(shares)
+    distance: FloatArray = np.abs(spent[:, None] - spent[None]).sum(axis=-1) / 2
+    return distance
+
+
+def label_distance(
+    specialization: FloatArray, shares: FloatArray, threshold: float = 0.5
+) -> FloatArray:
+    """Return 0 for controllers that do the same and are as specialized, else 1, [P, P].
+
+    That is: they execute the same action most (the first of equals), and both or neither have
+    S < 0.5 (Nitschke 2009, 3.2.3).
+
+    Args:
+        specialization: [P] S. Not a number: like nobody.
+        shares: [P, A] share of each action; what is missing to 1 was spent on nothing.
+        threshold: S from which on a controller is not specialized.
+    """
+    does = _with_nothing(shares).argmax(axis=1)
+    is_specialized = specialization < threshold
+    known = np.isfinite(specialization)
+    same = (does[:, None] == does) & (is_specialized[:, None] == is_specialized)
+    return np.where(same & known & known[:, None], 0.0, 1.0)
+
+
+def _with_nothing(shares: FloatArray) -> FloatArray:
+    """Return the shares with that of doing nothing as a last action, [P, A + 1]."""
+    return np.concatenate([shares, 1 - shares.sum(axis=1, keepdims=True)], axis=1)
+
+
+def pair_populations(
+    distance: FloatArray, sst: float, pairing: Literal["nearest", "all"] = "nearest"
+) -> IntArray:
     """Return the pairs [Q, 2] of populations that may recombine: SD < SST, the most similar first.
 
     Args:
-        specialization: [P] S of each population's fittest controller. Not a number: never paired.
+        distance: [P, P] SD between the populations' fittest controllers. Not a number: never
+            paired.
         sst: specialization similarity threshold. Higher pairs more.
+        pairing: "nearest": each population once; "all": every pair below the threshold.
     """
-    first, second = np.triu_indices(len(specialization), k=1)
-    distance = specialization_distance(specialization)[first, second]
-    similar = np.flatnonzero(distance < sst)
-    order = similar[np.argsort(distance[similar], kind="stable")]
+    first, second = np.triu_indices(len(distance), k=1)
+    of_pair = distance[first, second]
+    similar = np.flatnonzero(of_pair < sst)
+    order = similar[np.argsort(of_pair[similar], kind="stable")]
+    if pairing == "all":
+        return np.stack([first[order], second[order]], axis=1)
     return _greedy(first[order], second[order])
 
 
@@ -68,6 +115,7 @@ def pair_similar(
     candidates: IntArray,
     gst: float,
     aggregate: Literal["mean", "sum"] = "mean",
+    slots: Literal["any", "same"] = "any",
 ) -> IntArray:
     """Return the pairs [Q, 2] of units ``p * U + u`` that recombine: distance < GST.
 
@@ -80,15 +128,20 @@ def pair_similar(
         candidates: [C, 2] pairs of populations.
         gst: genotype similarity threshold. Higher recombines more.
         aggregate: see ``elite_distance``.
+        slots: whether sub-populations of "any" two slots may recombine, or of the "same" slot.
     """
     n_slots = active.shape[1]
-    slots = [np.flatnonzero(used) for used in active]
-    compact = [elites[p, used] for p, used in enumerate(slots)]
+    used_slots = [np.flatnonzero(used) for used in active]
+    compact = [elites[p, used] for p, used in enumerate(used_slots)]
     found = []
     for i, j in candidates:
         distance = elite_distance(compact[i], compact[j], aggregate)
-        u, v = np.nonzero(distance < gst)
-        found.append((distance[u, v], i * n_slots + slots[i][u], j * n_slots + slots[j][v]))
+        a, b = used_slots[i], used_slots[j]
+        similar = distance < gst
+        if slots == "same":
+            similar &= a[:, None] == b
+        u, v = np.nonzero(similar)
+        found.append((distance[u, v], i * n_slots + a[u], j * n_slots + b[v]))
     if not found:
         return np.empty((0, 2), dtype=np.int64)
     distances, first, second = (np.concatenate(column) for column in zip(*found, strict=True))
@@ -97,11 +150,14 @@ def pair_similar(
 
 
 def pair_slots(active: BoolArray, candidates: IntArray) -> IntArray:
-    """Return the pairs [Q, 2] of units ``p * U + u`` of equal slot, for candidate populations."""
+    """Return the pairs [Q, 2] of units ``p * U + u`` of equal slot, for candidate populations.
+
+    Of candidates with a population in common the first takes its slots.
+    """
     n_slots = active.shape[1]
     i, j = candidates.reshape(-1, 2).T
     pair, slot = np.nonzero(active[i] & active[j])
-    return np.stack([i[pair] * n_slots + slot, j[pair] * n_slots + slot], axis=1)
+    return _greedy(i[pair] * n_slots + slot, j[pair] * n_slots + slot)
 
 
 def _greedy(first: IntArray, second: IntArray) -> IntArray:

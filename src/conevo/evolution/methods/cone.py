@@ -12,12 +12,13 @@ with several: the most similar sub-populations of all come first, each is taken 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Annotated, Literal
 
 import numpy as np
 from annotated_types import Ge, Le
 
+from conevo.errors import UsageError, shown
 from conevo.evolution import credit
 from conevo.evolution.assembly import elite_teams
 from conevo.evolution.generation import begin, count, note, push, trials
@@ -25,8 +26,15 @@ from conevo.evolution.methods.mesp import Mesp, MespConfig, MespState
 from conevo.evolution.population import ranking
 from conevo.evolution.protocol import BoolArray, FloatArray, IntArray, Layout, Scores, Trials
 from conevo.evolution.regulation import regulate_gst, regulate_sst
-from conevo.evolution.selection import pair_populations, pair_similar, pair_slots
-from conevo.parameters import parameters
+from conevo.evolution.selection import (
+    label_distance,
+    pair_populations,
+    pair_similar,
+    pair_slots,
+    shares_distance,
+    specialization_distance,
+)
+from conevo.parameters import WrongValue, parameters
 from conevo.rng import stream
 
 __all__ = ["Cone", "Cone1Config", "Cone2Config", "Cone3Config", "ConeConfig", "ConeState"]
@@ -61,10 +69,43 @@ class ConeConfig(MespConfig):
     """teams in which each elite controller is tried for type C; 0 means as many as type A has: one
     if "systematic", ``rounds`` if "shared". Choice: 0, so that type C never overwrites better
     evidence."""
+    pairing: Literal["nearest", "all"] = "nearest"
+    """which pairs of populations below SST may exchange genes: "nearest" takes the most similar
+    first and each population once; "all" takes every pair, and each sub-population once. Choice:
+    "nearest"; the printed loop overwrites a population n - 1 times."""
+    sd: Literal["switching", "shares", "label"] = "switching"
+    """how differently two robots behave: "switching" is the difference of their S (eq. 3.5);
+    "shares" the part of its life that one would have to spend otherwise to be like the other;
+    "label" 0 if they do the same most and are both specialized (S < 0.5) or both not, else 1."""
+    exchange_slots: Literal["any", "same"] = "any"
+    """whether sub-populations of "any" two slots may recombine, or of the "same" slot, as the
+    genotypes' tags have it. CONE-1 always takes the same. Choice: "any"; 3.4.3 compares all i and
+    j."""
+    exchange_share: Annotated[float, Ge(0), Le(1)] = 1.0
+    """chance of each pair of populations that may exchange genes to do so in a generation."""
     use_gdm: bool = True
     """ask for similar genotypes (the genotype difference metric)."""
     use_sdm: bool = True
     """ask for similar behaviour (the specialization difference metric)."""
+
+    def __post_init__(self) -> None:
+        """Refuse what would have no effect."""
+        if not self.use_sdm:
+            self._refuse("pairing", "sd", unless="the specialization difference metric (use_sdm)")
+        if not (self.use_sdm or self.use_gdm):
+            self._refuse(
+                "exchange_slots", "exchange_share", unless="a difference metric (use_sdm, use_gdm)"
+            )
+        if self.type_c == "off":
+            self._refuse("type_c_rounds", unless="type C fitness (type_c)")
+
+    def _refuse(self, *keys: str, unless: str) -> None:
+        """Raise WrongValue for the first of some parameters that does not have its default."""
+        for one in fields(self):
+            value = getattr(self, one.name)
+            if one.name in keys and value != one.default:
+                what = f"method.{one.name} = {shown(value)}"
+                raise WrongValue(one.name, what, f"has no effect without {unless}")
 
     @property
     def n_elite_rounds(self) -> int:
@@ -101,12 +142,15 @@ class ConeState(MespState):
     Attributes:
         past_specialization: [H] float64 mean S of the fittest team, as ``past_fitness``.
         past_recombinations: [H] float64 recombinations between populations.
+        distance: [P, P] float64 SD between the last fittest team's controllers, NaN before there is
+            one and without the SDM.
         sst: specialization similarity threshold, NaN without the SDM.
         gst: genotype similarity threshold, NaN without the GDM.
     """
 
     past_specialization: FloatArray
     past_recombinations: FloatArray
+    distance: FloatArray
     sst: float
     gst: float
 
@@ -129,6 +173,7 @@ class Cone(Mesp[ConeState]):
             **self.beginning(layout),
             past_specialization=np.full(self.patience + 1, np.nan),
             past_recombinations=np.full(self.patience + 1, np.nan),
+            distance=np.full((layout.n_robots, layout.n_robots), np.nan),
             sst=float(config.sst if config.use_sdm else np.nan),
             gst=float(config.gst if config.use_gdm else np.nan),
         )
@@ -175,6 +220,26 @@ class Cone(Mesp[ConeState]):
         elite = np.take_along_axis(state.elite, np.broadcast_to(order, state.elite.shape), axis=2)
         return replace(state, phase="fittest", fitness=fitness, elite=elite)
 
+    def crowned(self, state: ConeState, trials: Trials, scores: Scores) -> ConeState:
+        """Return the state with the fittest team on record, and how its controllers differ."""
+        state = super().crowned(state, trials, scores)
+        return replace(state, distance=self.differ(scores)) if self.config.use_sdm else state
+
+    def differ(self, scores: Scores) -> FloatArray:
+        """Return SD [P, P] between the controllers of the first team of some scores.
+
+        Raises:
+            UsageError: it needs what the scores do not say.
+        """
+        specialization, sd = scores.specialization[0], self.config.sd
+        if sd == "switching":
+            return specialization_distance(specialization)
+        if scores.shares is None:
+            raise UsageError(f"method.sd = {sd!r} needs scores.shares, what each robot did")
+        if sd == "shares":
+            return shares_distance(scores.shares[0])
+        return label_distance(specialization, scores.shares[0])
+
     @property
     def patience(self) -> int:
         """Generations without progress before a controller's size is questioned: V + W + Y."""
@@ -184,16 +249,29 @@ class Cone(Mesp[ConeState]):
     def pairs(self, state: ConeState) -> IntArray:
         """Return the sub-populations [Q, 2] that recombine between populations."""
         config = self.config
-        if config.use_sdm:
-            candidates = pair_populations(state.progress.fittest_specialization, state.sst)
-        elif config.use_gdm:
-            candidates = np.stack(np.triu_indices(len(state.active), k=1), axis=1)
-        else:
+        if not (config.use_sdm or config.use_gdm):
             return super().pairs(state)
+        candidates = self.candidates(state)
         if not config.use_gdm:
             return pair_slots(state.active, candidates)
         elites = np.take_along_axis(state.genes, state.elite[..., None], axis=2)
-        return pair_similar(elites, state.active, candidates, state.gst, config.gd_aggregate)
+        return pair_similar(
+            elites,
+            state.active,
+            candidates,
+            state.gst,
+            config.gd_aggregate,
+            config.exchange_slots,
+        )
+
+    def candidates(self, state: ConeState) -> IntArray:
+        """Return the pairs [C, 2] of populations that may exchange genes in this generation."""
+        if self.config.use_sdm:
+            pairs = pair_populations(state.distance, state.sst, self.config.pairing)
+        else:
+            pairs = np.stack(np.triu_indices(len(state.active), k=1), axis=1)
+        drawn = stream(state.root, "exchange", state.generation).random(len(pairs))
+        return pairs[drawn < self.config.exchange_share]
 
     def finish(
         self, state: ConeState, active: BoolArray, judged: BoolArray | None = None

@@ -118,8 +118,7 @@ class Mesp(Generic[Kind]):
             n_elite = elite_count(self.config.elite_portion, self.config.genotypes)
             return grade(state, self.type_a(state, trials, scores), n_elite, phase="fittest")
         if state.phase == "fittest":
-            past = push(state.past_fitness, scores.fitness[0])
-            state = crown(state, trials, scores, past_fitness=past)
+            state = self.crowned(state, trials, scores)
             if self.suspects(state).any():
                 return replace(state, phase="lesion")
             return self.finish(state, state.active)
@@ -137,6 +136,11 @@ class Mesp(Generic[Kind]):
                 (layout.n_robots, layout.max_hidden, 0, layout.n_genes), dtype=np.float32
             ),
         }
+
+    def crowned(self, state: Kind, trials: Trials, scores: Scores) -> Kind:
+        """Return the state with the fittest team on record."""
+        past = push(state.past_fitness, scores.fitness[0])
+        return crown(state, trials, scores, past_fitness=past)
 
     @property
     def patience(self) -> int:
