@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from conevo.errors import UsageError
-from conevo.worlds.places import draw_places
+from conevo.worlds.places import draw_places, sectors
 from oracles import splitmix
 
 KEYS = np.array([3, 2**40, 5, 77, 2**63 + 1, 6], np.uint64)
@@ -67,3 +67,39 @@ def test_nobody_needs_no_room():
     assert draw_places(KEYS, 0, 0.1).shape == (6, 0, 2)
     assert draw_places(KEYS[:0], 3, 0.1).shape == (0, 3, 2)
     assert not draw_places(KEYS, 3, 2.0, is_there=np.zeros((6, 3), np.bool_)).any()
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "sectors_of_3", "sectors_of_4"),
+    [
+        # once round the square through each, from the corner below on the left, in eighths
+        (0.1, 0.1, 0, 0),  # 0
+        (0.5, 0.1, 0, 0),  # 1
+        (0.9, 0.1, 0, 1),  # 2
+        (0.9, 0.3, 0, 1),  # 2.5, and a third of the way is 2 2/3
+        (0.9, 0.4, 1, 1),  # 2.75
+        (0.9, 0.9, 1, 2),  # 4
+        (0.6, 0.6, 1, 2),  # 4, on a smaller square
+        (0.45, 0.9, 1, 2),  # 5.125, and two thirds of the way are 5 1/3
+        (0.3, 0.9, 2, 2),  # 5.5
+        (0.1, 0.9, 2, 3),  # 6
+        (0.1, 0.11, 2, 3),  # 7.975
+    ],
+)
+def test_sectors_go_round_the_middle(x, y, sectors_of_3, sectors_of_4):
+    xy = np.array([[x, y], [x, y]], np.float32)
+    xy[0] += np.float32(1e-6) * np.sign([0.5 - y, x - 0.5])  # a little on, off the lines between
+    assert sectors(xy, 3)[0] == sectors_of_3
+    assert sectors(xy, 4)[0] == sectors_of_4
+
+
+@pytest.mark.parametrize("n", range(1, 8))
+def test_sectors_have_the_same_area_in_any_frame(n):
+    line = (np.arange(420, dtype=np.float32) + np.float32(0.5)) / np.float32(420)
+    xy = np.stack(np.meshgrid(line, line), axis=-1)
+    found = sectors(xy, n)
+    is_outside = (np.abs(xy - 0.5) > 0.35).any(axis=-1)
+    for some in (found.ravel(), found[is_outside]):
+        counts = np.bincount(some, minlength=n)
+        assert len(counts) == n
+        assert counts == pytest.approx(np.full(n, counts.mean()), rel=0.02)

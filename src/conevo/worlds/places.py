@@ -15,7 +15,7 @@ import numpy.typing as npt
 from conevo.errors import UsageError
 from conevo.rng import uniforms
 
-__all__ = ["NoRoom", "draw_places", "first_that_fits"]
+__all__ = ["NoRoom", "draw_places", "first_that_fits", "sectors"]
 
 MOST = 10_000  # candidates for a place
 
@@ -64,6 +64,24 @@ def first_that_fits(
         tried[rest] += np.where(is_found, first + 1, n)
         rest, n = rest[~is_found], min(2 * n, 1024)  # more at once, where few fit
     return found
+
+
+def sectors(xy: Floats, n: int) -> Ints:
+    """Return the sector, 0 to n - 1, in which each of places [..., 2] of the unit square lies.
+
+    Sectors begin at the corner below on the left and go round the middle counter-clockwise. All
+    have the same area, and so have their parts of any frame around the middle.
+
+    Choice: regions around a middle are sectors of equal area, not of equal angle.
+    """
+    dx, dy = np.moveaxis(xy - np.float32(0.5), -1, 0)
+    half = np.maximum(np.maximum(np.abs(dx), np.abs(dy)), np.float32(1e-12))  # a side's, there
+    way = np.select(
+        [dy == -half, dx == half, dy == half],
+        [half + dx, 3 * half + dy, 5 * half - dx],
+        7 * half - dy,
+    )
+    return np.minimum((way / half * np.float32(n / 8)).astype(np.intp), n - 1)
 
 
 def draw_places(

@@ -72,6 +72,10 @@ Choices, all declared in ``GaccParams`` or here:
   of eq. 6.1 limits a reading, not which thing is the closest.
 - Choice: a step is refused by where it ends; obstacles are too wide to be jumped over.
 
+**Places.** Objects and robots are anywhere outside the home area at first. With ``segregation`` a
+type has a region, and with ``starts = "by_robot"`` so has a robot: three sectors around the middle
+(``worlds.places.sectors``).
+
 **Castes** (6.1.1) go by how a robot spends its time: activating its detection sensors; gripping or
 moving with an object (gatherer); from its arrival in the home area on, or from its grip there, with
 an object that is then built in (constructor). Choice: a robot that mostly moves with empty hands
@@ -86,7 +90,7 @@ Version history:
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -101,7 +105,7 @@ from conevo.worlds.gacc.obstacles import are_clear, draw_obstacles
 from conevo.worlds.gacc.plans import TYPES, Plan, plan
 from conevo.worlds.gacc.state import GaccConstants, GaccScene, GaccTeam
 from conevo.worlds.measures import Measure
-from conevo.worlds.places import draw_places
+from conevo.worlds.places import draw_places, sectors
 from conevo.worlds.protocol import Scenarios, Simulation, kernel_params, names_of
 
 __all__ = ["GaccParams", "GaccScenarios", "GaccWorld"]
@@ -109,6 +113,8 @@ __all__ = ["GaccParams", "GaccScenarios", "GaccWorld"]
 Positive = Annotated[float, Gt(0)]
 NonNegative = Annotated[float, Ge(0)]
 Range = Annotated[float, Gt(0), Le(0.5)]
+Ints = npt.NDArray[np.intp]
+Floats = npt.NDArray[np.float32]
 
 SLACK = 1e-3  # of what is in reach of a robot: more than float32 rounds
 
@@ -167,6 +173,11 @@ class GaccParams(Disturbances):
     """(side) longest side of an obstacle."""
     obstacle_gap: Annotated[float, Gt(0), Le(0.05)] = 0.03  # Choice: around every obstacle
     """(side) least distance of an obstacle from walls, home area and the others."""
+    segregation: Annotated[float, Ge(0), Le(1)] = 0.0
+    """(share) of the objects of each type that lie in that type's region; the others lie anywhere.
+    0 draws types independently of place, 1 gives one type to a region."""
+    starts: Literal["random", "by_robot"] = "random"
+    """where robots start: anywhere outside the home area, or robot i in region i mod 3."""
 
     def __post_init__(self) -> None:
         for low, high in (
@@ -183,6 +194,19 @@ class GaccParams(Disturbances):
     def home(self) -> float:
         """Half a side of the home area."""
         return self.home_side / 2
+
+    def region_of_objects(self, types: npt.NDArray[np.int32]) -> Ints:
+        """Return the region of each object [K], by its type: its type's, or -1, anywhere."""
+        counts = np.bincount(types, minlength=len(TYPES))
+        number = np.arange(len(types)) - (np.cumsum(counts) - counts)[types]  # of its type
+        in_region = (self.segregation * counts + 0.5).astype(np.intp)[types]
+        return np.where(number < in_region, types, -1).astype(np.intp)
+
+    @property
+    def region_of_robots(self) -> Ints:
+        """The region that each robot starts in [R], -1 for anywhere."""
+        robots = np.arange(self.n_robots)
+        return robots % len(TYPES) if self.starts == "by_robot" else np.full_like(robots, -1)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -282,16 +306,21 @@ class GaccWorld:
             p.obstacle_gap,
         ).astype(np.float32)
         edge = np.float32(p.home + 1e-6)  # more than float32 rounds
-
-        def is_free(
-            e: npt.NDArray[np.intp], _: npt.NDArray[np.intp], xy: npt.NDArray[np.float32]
-        ) -> npt.NDArray[np.bool_]:
-            is_home = (np.abs(xy - np.float32(0.5)) <= edge).all(axis=-1)
-            return ~is_home & are_clear(e, xy, blocks)
-
         types = plan.object_types
-        objects = draw_places(fold_all(seed, "gacc", "objects"), len(types), 0.0, is_free)
-        starts = draw_places(fold_all(seed, "gacc", "starts"), self.n_robots, p.separation, is_free)
+
+        def drawn(what: str, separation: float, region: npt.NDArray[np.intp]) -> Floats:
+            """Return places of things outside the home area, each in its region, -1 anywhere."""
+
+            def is_free(e: Ints, k: Ints, xy: Floats) -> npt.NDArray[np.bool_]:
+                is_home = (np.abs(xy - np.float32(0.5)) <= edge).all(axis=-1)
+                own = region[k][:, None]
+                is_there = (own < 0) | (sectors(xy, len(TYPES)) == own)
+                return is_there & ~is_home & are_clear(e, xy, blocks)
+
+            return draw_places(fold_all(seed, "gacc", what), len(region), separation, is_free)
+
+        objects = drawn("objects", 0.0, p.region_of_objects(types))
+        starts = drawn("starts", p.separation, p.region_of_robots)
         left, bottom, right, top = (np.ascontiguousarray(blocks[:, :, k]) for k in range(4))
         return GaccScenarios(
             object_x=objects[:, :, 0],

@@ -17,7 +17,7 @@ from conevo.kernels.khepera import RADIUS
 from conevo.parameters import parameters
 from conevo.rng import fold_all, numbers, uniforms
 from conevo.worlds.disturbances import Disturbances, disturbed
-from conevo.worlds.places import NoRoom, draw_places
+from conevo.worlds.places import NoRoom, draw_places, sectors
 from conevo.worlds.protocol import Scenarios, Simulation, World, kernel_params
 from conevo.worlds.pursuit.bodies import (
     N_OBSTACLES,
@@ -109,6 +109,7 @@ def draw_scenarios(
     obstacles: tuple[int, int],
     *,
     n_sensors: int,
+    by_robot: bool = False,
     prey: tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]] | None = None,
 ) -> ArenaScenarios:
     """Return one scenario per key: numbers of bodies, places and headings, all at random.
@@ -120,6 +121,7 @@ def draw_scenarios(
         others: least and most of the other bodies.
         obstacles: least and most of the obstacles.
         n_sensors: S.
+        by_robot: whether robot i starts in sector i of R around the middle of the arena.
         prey: weights of the prey's networks, [Q * H, 8] and [Q * H, 2].
 
     Raises:
@@ -133,7 +135,8 @@ def draw_scenarios(
         [np.arange(most) < n_bodies[:, None], np.arange(int(N_OBSTACLES)) < n_obstacles[:, None]],
         axis=1,
     )
-    places = _places(fold_all(seed, "arena", "places"), arena_cm, is_there)
+    in_sectors = robots if by_robot else 0
+    places = _places(fold_all(seed, "arena", "places"), arena_cm, is_there, in_sectors)
     turned = uniforms(fold_all(seed, "arena", "headings")[:, None], 0, np.arange(most), 0)
     nobody = np.zeros((0, 8), dtype=np.float32), np.zeros((0, 2), dtype=np.float32)
     prey_in, prey_out = prey or nobody
@@ -162,18 +165,25 @@ def _between(keys: npt.NDArray[np.uint64], bounds: tuple[int, int]) -> npt.NDArr
 
 
 def _places(
-    keys: npt.NDArray[np.uint64], arena_cm: float, is_there: npt.NDArray[np.bool_]
+    keys: npt.NDArray[np.uint64], arena_cm: float, is_there: npt.NDArray[np.bool_], in_sectors: int
 ) -> npt.NDArray[np.float32]:
     """Draw places [E, bodies and obstacles, 2], a little away from walls and from each other.
 
-    Absent bodies are at 0.
+    The first ``in_sectors`` are in a sector of their own, and absent bodies at 0.
     """
+
+    def is_free(
+        _: npt.NDArray[np.intp], body: npt.NDArray[np.intp], xy: npt.NDArray[np.float32]
+    ) -> npt.NDArray[np.bool_]:
+        return (body >= in_sectors)[:, None] | (sectors(xy, in_sectors) == body[:, None])
+
     margin = 0.01  # more than float32 rounds in the largest arena
     edge = float(RADIUS) + margin
     side = max(arena_cm - 2 * edge, margin)
     n = is_there.shape[1]
+    separation = (2 * float(RADIUS) + margin) / side
     try:
-        places = draw_places(keys, n, (2 * float(RADIUS) + margin) / side, is_there=is_there)
+        places = draw_places(keys, n, separation, is_free if in_sectors else None, is_there)
     except NoRoom as error:
         most = is_there.sum(axis=1).max()
         raise UsageError(f"an arena of {arena_cm:g} cm has no room for {most} bodies") from error

@@ -44,7 +44,7 @@ Version history:
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -75,6 +75,9 @@ class PursuitParams(ArenaParams):
     """digest of a prey file; a run fills it in and checks it."""
     n_obstacles: Annotated[int, Ge(0), Le(6)] = 0
     """(obstacles) cylinders in the arena. The thesis has them only when prey are shaped."""
+    starts: Literal["random", "by_robot"] = "random"
+    """where predators start: anywhere, or each in its own sector around the middle of the arena,
+    all of the same area; prey start anywhere."""
     capture_window: Annotated[int, Ge(1), Le(1000)] = 10
     """(iterations) over which a captured prey has hardly moved. Choice: 10, one second."""
     capture_share: Annotated[float, Ge(0), Le(1)] = 0.1
@@ -163,6 +166,7 @@ class PursuitWorld:
             (self.n_prey, self.n_prey),
             (obstacles, obstacles),
             n_sensors=16,
+            by_robot=self.params.starts == "by_robot",
             prey=self._prey_weights(),
         )
 
