@@ -20,6 +20,17 @@ from conevo.runs.checkpoint import difference, load_like, refuse_unkept, save
 LAYOUT = Layout(n_robots=3, n_hidden=3, max_hidden=5, n_genes=4)
 GENOTYPES = 6
 ROUNDS = 4
+EXCHANGE = {  # every option of the exchange between populations
+    "evaluation": "systematic",
+    "common_start": True,
+    "migration_every": 2,
+    "pairing": "all",
+    "sd": "shares",
+    "exchange_slots": "same",
+    "exchange_share": 0.5,
+    "gst": 1.0,
+    "sst": 1.0,
+}
 
 
 def in_files():
@@ -48,12 +59,21 @@ def variants():
         if name == "cone":
             for type_c in ("team", "off"):
                 yield name, {**config, "evaluation": "shared", "rounds": ROUNDS, "type_c": type_c}
+            yield name, config | EXCHANGE
 
 
 VARIANTS = list(variants())
 IDS = [
     "-".join(
-        filter(None, [name_in(name), config.get("evaluation", "single"), config.get("type_c")])
+        filter(
+            None,
+            [
+                name_in(name),
+                config.get("evaluation", "single"),
+                config.get("type_c"),
+                config.get("sd"),
+            ],
+        )
     )
     for name, config in VARIANTS
 ]
@@ -68,7 +88,7 @@ def judge(trials):
     """Return scores that depend on the networks and fall with time: controllers stagnate."""
     networks = trials.networks().astype(np.float64)
     fitness = np.sin(5 * networks).sum(axis=(2, 3)) - 5 * trials.generation
-    return Scores(fitness, np.abs(networks[:, :, 0, 0]))
+    return Scores(fitness, np.abs(networks[:, :, 0, 0]), np.abs(networks[:, :, :2, 1]) / 2)
 
 
 def run(learner, generations, root=3, score=judge, state=None):

@@ -179,3 +179,74 @@ def test_an_option_that_a_variant_has_anyway_is_accepted() -> None:
     assert method("cone-1", exchange_slots="same", exchange_share=0.5, pairing="all", sd="label")
     assert method("cone-2", exchange_slots="same", exchange_share=0.5, pairing="nearest")
     assert method("cone-3", exchange_slots="any", exchange_share=1.0, sd="switching")
+
+
+THREE = NAMES[:3]
+
+
+def worth(of_robot: Any, of_elites: Any = 0.0) -> Any:
+    """Return a function that gives robots these credits, and others in type C's teams."""
+
+    def credits_of(trials: Trials) -> Any:
+        credit = of_elites if trials.purpose == "elites" else of_robot
+        return np.broadcast_to(np.asarray(credit, float), trials.teams.shape[:2]).copy()
+
+    return credits_of
+
+
+@pytest.mark.parametrize(
+    ("name", "config"),
+    [("mesp", {}), ("cone", {"exchange_share": 0.0}), ("cone-3", {})],
+)
+def test_the_fittest_population_replaces_the_least_fit_at_times(
+    name: str, config: dict[str, Any]
+) -> None:
+    learner = method(name, genotypes=4, mutation_probability=0.0, migration_every=2, **config)
+    state = marked(learner, LAYOUT, THREE)
+    active = state.active.copy()
+    active[1] = True, False, True  # population 1 uses other slots
+    genes = np.broadcast_to(np.array(THREE, np.float32)[:, None, None, None], state.genes.shape)
+    state = replace(state, genes=genes * active[:, :, None, None], active=active)
+    credit = worth([1, 5, 3], of_elites=[9, 1, 5])  # by type C it would be the other way round
+    first = generation(learner, state, credit)
+    assert first.population_fitness.tolist() == [1, 5, 3]
+    assert first.progress.numbers["migrations"] == 0
+    assert [set(np.unique(one)) - {0} for one in first.genes] == [{1 / 8}, {2 / 8}, {3 / 8}]
+    second = generation(learner, first, credit)
+    assert second.progress.numbers["migrations"] == 1
+    assert [set(np.unique(one)) - {0} for one in second.genes] == [{2 / 8}, {2 / 8}, {3 / 8}]
+    np.testing.assert_array_equal(second.genes[0], second.genes[1])
+    if second.partners.size:
+        np.testing.assert_array_equal(second.partners[0], second.partners[1])
+    assert second.active.tolist() == [[True, False, True]] * 2 + [[True, True, False]]
+    assert second.progress.n_hidden.tolist() == [2, 2, 2]
+    assert second.watched_since.tolist() == [2, 0, 0]
+    third = generation(learner, second, credit)
+    assert third.progress.numbers["migrations"] == 0
+
+
+def test_populations_are_compared_by_the_mean_of_their_finite_type_a_fitness() -> None:
+    """Population 0 has the best genotype, population 1 the best mean, 2 nothing that is finite."""
+    learner = method("mesp", genotypes=2, mutation_probability=0.0, migration_every=1)
+    state = marked(learner, LAYOUT, THREE)
+    trials = learner.ask(state)  # of each slot of each population both genotypes: 12 teams
+    credit = np.zeros((12, 3))
+    credit[:4, 0] = 20, 0, -10, np.nan
+    credit[4:8, 1] = 4, 4, 4, 5
+    credit[8:, 2] = np.nan, np.inf, np.nan, -np.inf
+    state = learner.tell(state, trials, Scores(credit, np.zeros((12, 3))))
+    np.testing.assert_allclose(state.population_fitness, [10 / 3, 17 / 4, np.nan])
+    assert learner.sources(state).tolist() == [0, 1, 1]
+    for equal in ([2.0, 2.0, 2.0], [np.nan] * 3):
+        same = replace(state, population_fitness=np.array(equal))
+        assert learner.sources(same).tolist() == [0, 1, 2]
+    one = replace(state, population_fitness=np.array([np.nan, np.nan, 2.0]))
+    assert learner.sources(one).tolist() == [2, 1, 2]
+
+
+def test_without_migration_nothing_is_said_of_it() -> None:
+    learner = method("mesp", genotypes=4)
+    state = generation(learner, learner.init(LAYOUT, root=5), worth([1, 5, 3]))
+    assert "migrations" not in state.progress.numbers
+    with pytest.raises(UsageError, match=r"method.migration_every = 3 needs several populations"):
+        method("cone", migration_every=3).init(replace(LAYOUT, n_robots=1), root=5)

@@ -355,7 +355,7 @@ def test_variants_have_no_threshold_they_do_not_use():
 
 def test_a_method_remembers_only_what_it_needs():
     common = {"progress", "phase", "genes", "active", "fitness", "elite"}
-    windows = {"past_fitness", "watched_since"}
+    windows = {"past_fitness", "watched_since", "population_fitness"}
     thresholds = {"past_specialization", "past_recombinations", "distance", "sst", "gst"}
     own = {
         "homcne": set(),

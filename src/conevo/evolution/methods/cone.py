@@ -79,8 +79,8 @@ class ConeConfig(MespConfig):
     "label" 0 if they do the same most and are both specialized (S < 0.5) or both not, else 1."""
     exchange_slots: Literal["any", "same"] = "any"
     """whether sub-populations of "any" two slots may recombine, or of the "same" slot, as the
-    genotypes' tags have it. CONE-1 always takes the same. Choice: "any"; 3.4.3 compares all i and
-    j."""
+    genotypes' tags have it. CONE-1 always takes the same. Choice: "any"; section 3.7 tests each
+    pair of sub-populations."""
     exchange_share: Annotated[float, Ge(0), Le(1)] = 1.0
     """chance of each pair of populations that may exchange genes to do so in a generation."""
     use_gdm: bool = True
@@ -90,6 +90,7 @@ class ConeConfig(MespConfig):
 
     def __post_init__(self) -> None:
         """Refuse what would have no effect."""
+        super().__post_init__()
         if not self.use_sdm:
             self._refuse("pairing", "sd", unless="the specialization difference metric (use_sdm)")
         if not (self.use_sdm or self.use_gdm):

@@ -12,6 +12,7 @@ from typing import Annotated, Any, Generic, TypeVar, cast
 import numpy as np
 from annotated_types import Ge, Gt, Le
 
+from conevo.errors import UsageError
 from conevo.evolution import credit
 from conevo.evolution.assembly import (
     SchemeConfig,
@@ -62,6 +63,9 @@ class MespConfig(VariationConfig, SchemeConfig, StartConfig):
     lesion_ratio: Annotated[float, Gt(0), Le(1)] = 0.9
     """share of its fitness that a controller must keep without its least needed neuron for that
     neuron to go. Lower removes more. Choice: 0.9, the thesis gives none."""
+    migration_every: Annotated[int, Ge(0), Le(1_000_000)] = 0
+    """generations after which the population with the best mean type A fitness replaces the one
+    with the worst, whole; 0 means never. Choice: never, the thesis has nothing of the kind."""
 
 
 @dataclass(frozen=True)
@@ -74,11 +78,14 @@ class MespState(Populations):
         watched_since: [P] int64 generation at which the controller-size window started.
         partners: [P, U, L, G] float32 last generation's elite; L = 0 in the first, and always if
             partners do not come from it.
+        population_fitness: [P] float64 mean type A fitness of this generation's genotypes, of the
+            finite ones; NaN without any, and before the first generation is graded.
     """
 
     past_fitness: FloatArray
     watched_since: IntArray
     partners: FloatArray
+    population_fitness: FloatArray
 
 
 Kind = TypeVar("Kind", bound=MespState)
@@ -116,7 +123,9 @@ class Mesp(Generic[Kind]):
         state = count(state, trials, scores)
         if state.phase == "genotypes":
             n_elite = elite_count(self.config.elite_portion, self.config.genotypes)
-            return grade(state, self.type_a(state, trials, scores), n_elite, phase="fittest")
+            fitness = self.type_a(state, trials, scores)
+            state = replace(state, population_fitness=_mean_of_finite(fitness))
+            return grade(state, fitness, n_elite, phase="fittest")
         if state.phase == "fittest":
             state = self.crowned(state, trials, scores)
             if self.suspects(state).any():
@@ -125,13 +134,23 @@ class Mesp(Generic[Kind]):
         return self.finish(state, self.resize(state, scores), self.suspects(state))
 
     def beginning(self, layout: Layout) -> dict[str, Any]:
-        """Return the sizes of populations and the windows that they begin with."""
+        """Return the sizes of populations and the windows that they begin with.
+
+        Raises:
+            UsageError: one population cannot replace another.
+        """
+        if self.config.migration_every and layout.n_robots == 1:
+            raise UsageError(
+                f"method.migration_every = {self.config.migration_every} needs several "
+                f"populations, one per robot, and this team has one robot"
+            )
         return {
             "n_populations": layout.n_robots,
             "n_genotypes": self.config.genotypes,
             "common_start": self.config.common_start,
             "past_fitness": np.full((self.patience + 1, layout.n_robots), np.nan),
             "watched_since": np.zeros(layout.n_robots, dtype=np.int64),
+            "population_fitness": np.full(layout.n_robots, np.nan),
             "partners": np.zeros(
                 (layout.n_robots, layout.max_hidden, 0, layout.n_genes), dtype=np.float32
             ),
@@ -200,7 +219,27 @@ class Mesp(Generic[Kind]):
             since = np.where(judged, state.generation + 1, since)
         numbers = {"recombinations": len(pairs)}
         partners = self.partners(state, children, active & ~used)
+        if self.config.migration_every:
+            source = self.sources(state)
+            moved = source != np.arange(len(source))
+            children, active, partners = children[source], active[source], partners[source]
+            since = np.where(moved, state.generation + 1, since)
+            numbers["migrations"] = int(moved.sum())
         return advance(state, children, active, numbers, watched_since=since, partners=partners)
+
+    def sources(self, state: Kind) -> IntArray:
+        """Return for each place [P] the population that goes on there: its own, or the fittest.
+
+        Choice: what is copied are the children, with the slots they use and the partners from their
+        parents; the window of the newcomer's size restarts.
+        """
+        source = np.arange(len(state.active))
+        fitness = np.where(np.isfinite(state.population_fitness), state.population_fitness, -np.inf)
+        best, worst = fitness.argmax(), fitness.argmin()
+        is_time = (state.generation + 1) % self.config.migration_every == 0
+        if is_time and fitness[best] > fitness[worst]:
+            source[worst] = best
+        return source
 
     def partners(self, state: Kind, children: FloatArray, added: BoolArray) -> FloatArray:
         """Return with whom the next generation plays, [P, U, L, G]: the elite of this one.
@@ -218,3 +257,12 @@ class Mesp(Generic[Kind]):
         elites = np.take_along_axis(state.genes, state.elite[..., None], axis=2)
         first = children[:, :, : elites.shape[2]]
         return np.where(added[:, :, None, None], first, elites)
+
+
+def _mean_of_finite(fitness: FloatArray) -> FloatArray:
+    """Return the mean over slots and genotypes of the finite values of [P, U, M], NaN of none."""
+    finite = np.isfinite(fitness)
+    mean = np.full(len(fitness), np.nan)
+    total, n = np.where(finite, fitness, 0.0).sum(axis=(1, 2)), finite.sum(axis=(1, 2))
+    np.divide(total, n, out=mean, where=n > 0)
+    return mean
