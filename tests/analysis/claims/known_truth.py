@@ -24,10 +24,10 @@ MEASURES = {
     "pursuit-v2": ("capture_time",),
     "gacc-v2": ("delivered",),
 }
-SPECIALISTS = {
-    "rover-v2": ("low", "hi"),
-    "pursuit-v2": ("pursuer", "blocker"),
-    "gacc-v2": ("A-detector", "B-gatherer"),
+CASTES = {
+    "rover-v2": ("low", "hi", "non-specialized"),
+    "pursuit-v2": ("pursuer", "blocker", "non-specialized"),
+    "gacc-v2": ("A-detector", "B-gatherer", "non-specialized"),
 }
 
 
@@ -39,10 +39,10 @@ class Cell:
         value: mean of the world's main measure.
         area: mean of the rovers' second one.
         loss: share of its performance that a team loses by a lesion.
-        clones: performance of the best team of clones of a specialist, as a share of the team's.
+        clones: performance of a team of clones of a specialist, as a share of the team's.
         mixed: that of the clones of a non-specialized robot.
-        several: share of the runs with two specialized castes and the non-specialized; the others
-            have a single caste.
+        castes: of the team, a robot each; None: two specialized and the non-specialized.
+        several: share of the runs with all of these; the others have the first alone.
         seen: collective behaviour -> share of the runs that show it.
         idle: share of the runs with an idle predator.
         evaluations: team evaluations of every run.
@@ -56,6 +56,7 @@ class Cell:
     loss: float = 0.2
     clones: float = 0.5
     mixed: float = 0.4
+    castes: tuple[str, ...] | None = None
     several: float = 1.0
     seen: dict[str, float] = field(default_factory=dict)
     idle: float = 0.0
@@ -68,6 +69,16 @@ class Cell:
 Truth = dict[tuple[str, str], Cell]  # (environment, method)
 
 
+def of_rovers(method: str, n: int) -> tuple[str, ...]:
+    """Return the castes in complex environment n (tables 5.7 to 5.15)."""
+    if method in ("homcne", "hetcne"):
+        return ("med", "hi") if method == "homcne" and n <= 6 else ("hi", "med")
+    low = {"ccga": 4, "mesp": 3}.get(method, 10)
+    med = {"ccga": 8}.get(method, 10)
+    some = ("low",) * (n <= low) + ("med",) * (n <= med)
+    return (*some, "hi", "non-specialized")
+
+
 def rover() -> Truth:
     """Return what the thesis says of rovers."""
     complex_value = dict(zip(METHODS, (1500, 1500, 2500, 2500, 3500), strict=True))
@@ -75,18 +86,23 @@ def rover() -> Truth:
     loss = dict(zip(METHODS, (0.1, 0.1, 0.3, 0.3, 0.5), strict=True))
     truth: Truth = {}
     for n in range(1, 11):
+        best = 1.2 if n == 10 else 1.0
         for method, value in complex_value.items():
-            # Clones of non-specialized rovers, better than the team, are no specialists.
+            is_cne = method in ("homcne", "hetcne")
+            # Clones of CONE's robots reach what HomCNE and HetCNE do.
             about: dict[str, Any] = {
                 "loss": loss.get(method, 0.3),
-                "several": 0.0 if method in ("homcne", "hetcne") else 1.0,
-                "clones": 0.3,
-                "mixed": 1.5,
+                "several": 0.0 if is_cne else 1.0,
+                "clones": 1500 / 3500,
+                "mixed": 1500 / 3500,
             }
-            truth[f"complex-{n}", method] = Cell(value, **about)
+            covered = best * (0.3 if method in VARIANTS else 0.4)
+            castes = of_rovers(method, n)
+            truth[f"complex-{n}", method] = Cell(best * value, covered, castes=castes, **about)
             if method in METHODS:
-                truth[f"extended-{n}", method] = Cell(value, **about)
-                truth[f"simple-{n}", method] = Cell(1200, **about)
+                covered = 0.3 if is_cne else 0.4
+                truth[f"extended-{n}", method] = Cell(value, covered, **about)
+                truth[f"simple-{n}", method] = Cell(1200, **about | {"several": 0.0})
     return truth
 
 
@@ -245,25 +261,24 @@ def _results(
     number = int(environment.rpartition("-")[2])
     parts = 10 * number if world == "gacc-v2" else 1  # what there is to deliver
     value = cell.value * shift * parts
-    seconds = {"area": cell.area * shift}
 
-    def played(study: str, team: str, mean: float) -> Iterator[tuple[str, dict[str, Any]]]:
+    def played(study: str, team: str, share: float = 1) -> Iterator[tuple[str, dict[str, Any]]]:
         for measure in MEASURES[world]:
-            reached = seconds.get(measure, mean)
+            reached = share * (cell.area * shift if measure == "area" else value)
             for scenario, swing in enumerate((0.9, 1.1)):
                 row = {"run": run, "study": study, "team": team, "measure": measure}
                 yield "scores", row | {"scenario": scenario, "value": reached * swing}
 
-    yield from played("test", "champion", value)
-    yield from played("test", "generation 0", value / 10)
+    yield from played("test", "champion")
+    yield from played("test", "generation 0", 0.1)
     if not studies:
         return
     several = seed <= round(cell.several * n)
-    specialists = SPECIALISTS[world] if several else SPECIALISTS[world][:1]
+    castes = cell.castes or CASTES[world]
+    castes = castes if several else castes[:1]
     is_predator = world == "pursuit-v2"
-    castes = [*specialists, *(["non-specialized"] if several else [])]
     for study in ("lesion", "clones"):
-        yield from played(study, "whole", value)
+        yield from played(study, "whole")
     for k, caste in enumerate(castes):
         yield (
             "robots",
@@ -278,10 +293,11 @@ def _results(
         )
         if caste == "non-specialized" and is_predator:
             continue
-        yield from played("lesion", caste, value * (1 - cell.loss * shift_of_loss))
-        share = cell.mixed if caste == "non-specialized" else cell.clones / (1 + k)
-        yield from played("clones", caste, value * share)
+        yield from played("lesion", caste, 1 - cell.loss * shift_of_loss)
+        share = cell.mixed if caste == "non-specialized" else cell.clones
+        yield from played("clones", caste, share)
     if is_predator:
+        specialists = tuple(caste for caste in castes if caste != "non-specialized")
         yield from _behaviours(run, cell, seed, n, specialists)
 
 

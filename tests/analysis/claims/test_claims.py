@@ -1,4 +1,4 @@
-"""Each of the 32 claims against tables whose truth is known: held, turned round, cut short."""
+"""Each claim against tables whose truth is known: held, turned round, cut short."""
 
 from __future__ import annotations
 
@@ -13,10 +13,11 @@ from conevo.analysis.claims import CLAIMS, Claim, Verdict, verdicts
 from conevo.analysis.frames import Tables
 
 BY_ID = {claim.id: claim for claim in CLAIMS}
-CONTRADICTORY = {"R6", "G8"}  # by the thesis itself
-ALIKE = {"R2", "R4", "R6", "R8", "P2", "G3"}  # claims that something is
-DECIDED = {"R5", "G2", "G5"}  # by the world
-CAUTIOUS = {"R1", "R9", "R10", "P9", "P10"}
+CONTRADICTORY = {"R6", "R20", "G8"}  # by the thesis itself
+ALIKE = {"R2", "R4", "R6", "R8", "R20", "R21", "P2", "G3"}  # claims that something is
+BY_PLAN = {"R22"}  # judged by factors of a plan of its own
+DECIDED = {"R5", "R18", "G2", "G5"}  # by the world
+CAUTIOUS = {"R1", "R9", "R10", "R21", "R24", "P9", "P10"}
 Change = Callable[[Truth], None]
 
 
@@ -48,7 +49,7 @@ SIMPLE = [f"simple-{n}" for n in range(1, 11)]
 WRONG: dict[str, tuple[Change, str]] = {
     "R1": (change(["complex-3"], "mesp", value=4000), "complex-3 value, CONE - MESP"),
     "R2": (change(["complex-3", "complex-8"], "mesp", value=3400), "complex-8 value, CCGA - MESP"),
-    "R3": (change(["complex-10"], "hetcne", value=2600), "complex-10 value, CCGA - HetCNE"),
+    "R3": (change(["complex-9"], "hetcne", value=2600), "complex-9 value, CCGA - HetCNE"),
     "R4": (change(["simple-7"], "homcne", value=1600), "simple-7 value, HomCNE - HetCNE"),
     "R5": (change(["simple-2"], "ccga", value=2500), "complex-2 - simple-2 value, CCGA"),
     "R6": (change(SIMPLE, "cone", area=0.6), "simple-1 area, HomCNE - CONE"),
@@ -62,6 +63,29 @@ WRONG: dict[str, tuple[Change, str]] = {
         "complex-7 evolved, CCGA - clones of a spec",
     ),
     "R13": (change(["complex-2"], "cone-2", value=3500), "complex-2 value, CONE - CONE-2"),
+    "R14": (change(["simple-3"], "mesp", several=0.9), "simple-3 two castes, MESP"),
+    "R15": (change(["complex-9"], "ccga", castes=("hi", "med")), "complex-9 mixed castes, CCGA"),
+    "R16": (
+        change(["complex-5"], "ccga", castes=("low", "med", "hi")),
+        "complex-5 some low, CCGA",
+    ),
+    "R17": (change(["complex-7"], "homcne", castes=("med",)), "complex-7 only hi, HomCNE"),
+    "R18": (change(["complex-8"], "mesp", value=3600), "complex-10 - complex-8 value, MESP"),
+    "R19": (change(["complex-10"], "cone", value=5000), "complex-10 value, CONE"),
+    "R20": (
+        change(["complex-2"], "homcne", value=1900),
+        "complex-2 clones of med, CONE - evolved, HomCNE",
+    ),
+    "R21": (change(["complex-8"], "mesp", area=0.6), "complex-8 area, HomCNE - MESP"),
+    "R23": (
+        change(["complex-6"], "cone", castes=("low", "hi", "non-specialized")),
+        "complex-6 all castes, CONE",
+    ),
+    "R24": (change(["extended-7"], "hetcne", area=0.5), "extended-7 area, CCGA - HetCNE"),
+    "R25": (change(["complex-1"], "mesp", loss=0.6), "complex-1 loss of area, CONE - MESP"),
+    "R26": (change(["extended-4"], "homcne", several=0.9), "extended-4 one caste, HomCNE"),
+    "R27": (change(["complex-2"], "cone-3", area=0.4), "complex-2 area, CONE - CONE-3"),
+    "R28": (change(["complex-4"], "hetcne", area=0.6), "complex-10 - complex-4 area, HetCNE"),
     "P1": (change(["team-9"], "ccga", value=300), "team-9 capture_time, CONE - CCGA"),
     "P2": (change(["team-6"], "cone", value=300), "team-6 capture_time, CONE - HomCNE"),
     "P3": (change(["team-10"], "hetcne", value=500), "team-5 - team-10 capture_time, HetCNE"),
@@ -121,16 +145,17 @@ def as_claimed(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPath
     return write_tables(tmp_path_factory.mktemp("claims") / request.param, world, make(), n)
 
 
-def test_there_are_32_claims_each_with_its_source() -> None:
+def test_every_claim_is_there_once_each_with_its_source() -> None:
     ids = [
         f"{world}{n}"
-        for world, last in (("R", 13), ("P", 10), ("G", 9))
+        for world, last in (("R", 28), ("P", 10), ("G", 9))
         for n in range(1, last + 1)
+        if f"{world}{n}" not in BY_PLAN
     ]
     assert [claim.id for claim in CLAIMS] == ids == list(WRONG)
     chapters = {"R": "5.", "P": "4.", "G": "6."}
     assert all(claim.source.startswith(chapters[claim.id[0]]) for claim in CLAIMS)
-    assert len({claim.text for claim in CLAIMS}) == 32
+    assert len({claim.text for claim in CLAIMS}) == len(CLAIMS)
 
 
 def test_all_are_reproduced_where_all_are_true(as_claimed: Path) -> None:
@@ -172,6 +197,14 @@ FURTHER = [
     ("R8", change(["extended-1", "extended-2"], "mesp", value=3000), "not reproduced"),
     ("R11", change(["complex-5"], "homcne", loss=0.0), "not reproduced"),
     ("R11", change(["complex-2"], "hetcne", loss=0.4), "not reproduced"),
+    ("R12", change([f"complex-{n}" for n in range(1, 11)], "cone", mixed=1.5), "reproduced"),
+    ("R14", change(["complex-3"], "ccga", several=0.0), "not reproduced"),
+    ("R16", change(["complex-2"], "mesp", castes=("med", "hi")), "not reproduced"),
+    ("R16", change(["complex-9"], "ccga", castes=("med", "hi")), "not reproduced"),
+    ("R17", change(["complex-2"], "hetcne", castes=("med",)), "not reproduced"),
+    ("R20", change(["complex-9"], "hetcne", value=1900), "not reproduced"),
+    ("R25", change(["complex-2"], "hetcne", loss=0.4), "not reproduced"),
+    ("R26", change(["extended-2"], "ccga", castes=("low", "move")), "not reproduced"),
     ("P8", change(ALL_TEAMS, "cone", seen={"role-switcher": 0.4}), "not reproduced"),
     ("P8", change(["team-8"], "cone", idle=0.0), "not reproduced"),
 ]
@@ -193,11 +226,19 @@ def test_undecided_where_environments_are_missing(identity: str, tmp_path: Path)
     is_pair = len(statement.samples) == 2 and len({s.environments for s in statement.samples}) == 2
     kept = statement.environments if is_pair else statement.environments[:1]
     all_places = {e for p in claim.parts for s in p.statements for e in s.environments}
+    # One that is compared with others counts when these are there.
+    pairs = [
+        statement.environments
+        for part in claim.parts
+        for statement in part.statements
+        if len({sample.environments for sample in statement.samples}) == 2
+    ]
+    there = [e for e in kept if all(set(pair) <= set(kept) for pair in pairs if e in pair)]
     few = {key: cell for key, cell in truth.items() if key[0] in kept}
     verdict = judged(
         write_tables(tmp_path, world, few, n=20 if world == "pursuit-v2" else 10), claim
     )
-    assert verdict.alone == f"undecided: {len(kept)} of {len(all_places)} environments"
+    assert verdict.alone == f"undecided: {len(there)} of {len(all_places)} environments"
     assert "no runs of" in verdict.why
 
 
@@ -214,7 +255,7 @@ def test_undecided_where_two_runs_scatter_widely(letter: str, tmp_path: Path) ->
     }
     compared = [one for one in found if one.tests.startswith("t-test") and one.n == "2"]
     assert all("Mann-Whitney tests can become significant" in one.why for one in compared)
-    assert len(compared) == {"R": 11, "P": 4, "G": 6}[letter]
+    assert len(compared) == {"R": 18, "P": 4, "G": 6}[letter]
 
 
 def test_undecided_without_a_run(tmp_path: Path) -> None:
@@ -223,13 +264,28 @@ def test_undecided_without_a_run(tmp_path: Path) -> None:
     with Tables(tmp_path) as tables:
         found = verdicts(tables)
     without = [one for one in found if one.id[0] != "P" or one.id in ("P1", "P4", "P6", "P7", "P8")]
-    assert len(without) == 27
+    assert len(without) == len(CLAIMS) - 5
     for one in without:
         assert one.verdict == "undecided: no such runs"
         assert (one.effect, one.n, one.budget, one.low) == ("", "0", "", None)
 
 
-WITHOUT_CONE = {"R2", "R4", "R8", "R10", "P5", "P6", "P9", "G3"}  # or with it among all methods
+WITHOUT_CONE = {
+    "R2",
+    "R4",
+    "R8",
+    "R10",
+    "R15",
+    "R16",
+    "R17",
+    "R20",
+    "R21",
+    "R24",
+    "P5",
+    "P6",
+    "P9",
+    "G3",
+}  # or with it among all methods
 
 
 @pytest.mark.parametrize("letter", TRUTHS)
@@ -247,7 +303,7 @@ def test_not_tested_where_cone_exchanged_next_to_nothing(letter: str, tmp_path: 
 def test_contradicted_without_cone_is_contradicted_without_exchange(tmp_path: Path) -> None:
     world, truth = truth_of(BY_ID["R3"])
     truth = {key: dataclasses.replace(cell, exchanges=0.0) for key, cell in truth.items()}
-    change(["complex-10"], "hetcne", value=2600)(truth)
+    change(["complex-9"], "hetcne", value=2600)(truth)
     assert judged(write_tables(tmp_path, world, truth), BY_ID["R3"]).verdict == "not reproduced"
 
 

@@ -163,6 +163,45 @@ def test_castes_of_a_team(castes: list[str], one: int, several: int, tmp_path: P
     assert read(tmp_path, "several castes") == several
 
 
+@pytest.mark.parametrize(
+    ("castes", "found"),
+    [
+        (["non-specialized", "low", "med", "hi"], {"two", "mixed", "all", "low", "med", "hi"}),
+        (["non-specialized", "hi", "move"], {"two", "mixed", "hi"}),
+        (["low", "hi"], {"two", "low", "hi"}),
+        (["hi", "move"], {"hi"}),
+        (["hi", "hi"], {"hi", "only hi"}),
+        (["med"], {"med", "only med"}),
+        (["non-specialized"] * 2, set()),
+    ],
+)
+def test_which_castes_a_team_has(castes: list[str], found: set[str], tmp_path: Path) -> None:
+    names = {f"{k} castes": k for k in ("two", "mixed", "all")}
+    names |= {f"some {k}": k for k in ("low", "med", "hi")}
+    names |= {k: k for k in ("only med", "only hi")}
+    write(tmp_path, runs=[RUN], robots=robots(castes))
+    assert {short for name, short in names.items() if read(tmp_path, name)} == found
+
+
+def test_clones_of_one_caste_and_the_area_that_is_lost(tmp_path: Path) -> None:
+    scores = [
+        *score("clones", "med", 10, 30),
+        *score("clones", "non-specialized", 70, 90),
+        *score("lesion", "whole", 1, 1),
+        *score("lesion", "low", 1, 1),
+        *score("lesion", "whole", 0.4, 0.6, measure="area"),
+        *score("lesion", "low", 0.3, 0.3, measure="area"),
+    ]
+    write(tmp_path, runs=[RUN], scores=scores)
+    assert read(tmp_path, "clones of med") == 20
+    assert read(tmp_path, "clones of hi") is None
+    assert read(tmp_path, "clones of the non-specialized") == 80
+    assert read(tmp_path, "whole area") == 0.5
+    assert read(tmp_path, "lesioned area") == pytest.approx(0.3)
+    assert read(tmp_path, "loss of area") == pytest.approx(0.4)
+    assert read(tmp_path, "loss") == 0
+
+
 def test_behaviours_that_a_run_shows(tmp_path: Path) -> None:
     rows = behaviours("collective", entrapment=0, pursuer_blocker=3, none=1)
     rows += behaviours("individual", pursuer=2, idle=0, entrapment=5)

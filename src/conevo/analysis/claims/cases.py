@@ -24,8 +24,11 @@ __all__ = [
     "TWO_PREY",
     "VARIANTS",
     "about",
+    "as_cloned",
     "cloned",
     "has_castes",
+    "has_only_in",
+    "lacks_castes",
     "lesioned",
     "teams",
 ]
@@ -70,11 +73,18 @@ def about(
     )
 
 
-def lesioned(environments: tuple[str, ...]) -> tuple[Compare, ...]:
-    """Return: in each environment each method's teams lose by a caste's replacement."""
+def lesioned(environments: tuple[str, ...], of: str = "") -> tuple[Compare, ...]:
+    """Return: in each environment each method's teams lose by a caste's replacement, of a measure.
+
+    Args:
+        environments: of the teams.
+        of: " area", say; empty is the world's main measure.
+    """
     return tuple(
         Compare(
-            "above", Sample("whole", (method,), (place,)), Sample("lesioned", (method,), (place,))
+            "above",
+            Sample(f"whole{of}", (method,), (place,)),
+            Sample(f"lesioned{of}", (method,), (place,)),
         )
         for place in environments
         for method in METHODS
@@ -94,6 +104,18 @@ def cloned(
     )
 
 
+def as_cloned(clones: str, environments: tuple[str, ...], method: str) -> Part:
+    """Return: in each environment clones of CONE's robots are alike to a method's teams."""
+    return Part(
+        tuple(
+            Compare(
+                "alike", Sample(clones, ("cone",), (place,)), Sample("evolved", (method,), (place,))
+            )
+            for place in environments
+        )
+    )
+
+
 def has_castes(
     castes: str, environments: tuple[str, ...], methods: tuple[str, ...]
 ) -> tuple[Part, ...]:
@@ -101,10 +123,46 @@ def has_castes(
 
     Choice: "the fittest teams" have them if the champions of more than half of the runs do.
     """
+    return _champions(castes, environments, methods, (MOST, 1))
+
+
+def lacks_castes(
+    castes: str, environments: tuple[str, ...], methods: tuple[str, ...]
+) -> tuple[Part, ...]:
+    """Return: in each environment most champions of each method do not have these castes."""
+    return _champions(castes, environments, methods, (0, MOST))
+
+
+def has_only_in(
+    castes: str, numbers: range, environments: tuple[str, ...], method: str
+) -> tuple[Part, ...]:
+    """Return: the champions of a method have these castes in some environments, in others not.
+
+    Args:
+        castes: that most champions have, or have not.
+        numbers: of the environments where they do, from 1.
+        environments: all of a family, in order.
+        method: whose champions.
+    """
+    of = dict(enumerate(environments, start=1))
+    there = tuple(place for n, place in of.items() if n in numbers)
+    elsewhere = tuple(place for n, place in of.items() if n not in numbers)
+    return (
+        *has_castes(castes, there, (method,)),
+        *(lacks_castes(castes, elsewhere, (method,)) if elsewhere else ()),
+    )
+
+
+def _champions(
+    castes: str,
+    environments: tuple[str, ...],
+    methods: tuple[str, ...],
+    share: tuple[float, float],
+) -> tuple[Part, ...]:
     return (
         Part(
             tuple(
-                within(castes, method, (place,), MOST, 1)
+                within(castes, method, (place,), *share)
                 for place in environments
                 for method in methods
             )

@@ -14,22 +14,19 @@ PLAYED = """
     WITH played AS (
         SELECT s.run, s.team, avg(s.value) AS value
         FROM scores s JOIN runs r USING (run)
-        WHERE s.study = '{study}' AND s.measure = r.measure AND s.value IS NOT NULL
+        WHERE s.study = '{study}' AND s.measure = {measure} AND s.value IS NOT NULL
         GROUP BY s.run, s.team
     )
 """
-LESIONED = (
-    PLAYED.format(study="lesion")
-    + """
+LESIONED = """
     SELECT whole.run, {value}
     FROM played whole JOIN played lesioned USING (run)
     WHERE whole.team = 'whole' AND lesioned.team <> 'whole'
     GROUP BY whole.run
 """
-)
-CLONED = PLAYED.format(study="clones") + "SELECT run, max(value) FROM played WHERE team NOT IN "
+BEST = "SELECT run, max(value) FROM played WHERE team {teams} GROUP BY run"
 COMPLEMENTARY = (
-    PLAYED.format(study="clones")
+    PLAYED.format(study="clones", measure="r.measure")
     + """
     SELECT run, value FROM played WHERE team = 'whole' AND run IN (
         SELECT run FROM behaviours
@@ -43,10 +40,8 @@ SEEN = """
     FROM behaviours GROUP BY run
 """
 CASTES = "SELECT run, ({condition})::INTEGER FROM robots GROUP BY run"
-SEVERAL_CASTES = (
-    "bool_or(caste = 'non-specialized') AND "
-    "count(DISTINCT caste) FILTER (WHERE caste NOT IN ('non-specialized', 'move')) >= 2"
-)
+HAS_ANY = "bool_or(caste = 'non-specialized')"
+SPECIALIZED = "count(DISTINCT caste) FILTER (WHERE caste NOT IN ('non-specialized', 'move'))"
 LOSS = "avg((whole.value - lesioned.value) / nullif(greatest(whole.value, lesioned.value), 0))"
 
 Reading = Callable[[Tables], dict[str, float]]
@@ -90,6 +85,23 @@ def _share(tables: Tables) -> dict[str, float]:
     return {one.run: one.value / one.optimum for one in tables.values() if one.optimum}
 
 
+def _lesioned(value: str, measure: str = "r.measure") -> Quantity:
+    played = PLAYED.format(study="lesion", measure=measure)
+    return Quantity(_query(played + LESIONED.format(value=value)), "no castes replaced")
+
+
+def _cloned(teams: str, lacks: str) -> Quantity:
+    """Return the best of a run's teams of clones: what one of its robots does."""
+    played = PLAYED.format(study="clones", measure="r.measure")
+    return Quantity(_query(played + BEST.format(teams=teams)), lacks, needs_exchange=False)
+
+
+def _castes(condition: str) -> Quantity:
+    """Return whether the castes of a team fulfil a condition."""
+    read = _query(CASTES.format(condition=condition))
+    return Quantity(read, "no castes recorded", is_share=True)
+
+
 def _collective(behaviour: str) -> Quantity:
     read = _query(SEEN.format(kind="collective", behaviour=behaviour))
     return Quantity(read, "no behaviours recorded", is_share=True)
@@ -101,29 +113,30 @@ QUANTITIES: dict[str, Quantity] = {
     "capture_time": _tested("capture_time"),
     "delivered": _tested("delivered"),
     "share of the optimum": Quantity(_share, "no testing phase"),
-    "whole": Quantity(_query(LESIONED.format(value="avg(whole.value)")), "no castes replaced"),
-    "lesioned": Quantity(
-        _query(LESIONED.format(value="avg(lesioned.value)")), "no castes replaced"
-    ),
-    "loss": Quantity(_query(LESIONED.format(value=LOSS)), "no castes replaced"),
+    "whole": _lesioned("avg(whole.value)"),
+    "lesioned": _lesioned("avg(lesioned.value)"),
+    "loss": _lesioned(LOSS),
+    "whole area": _lesioned("avg(whole.value)", "'area'"),
+    "lesioned area": _lesioned("avg(lesioned.value)", "'area'"),
+    "loss of area": _lesioned(LOSS, "'area'"),
     "evolved": Quantity(_performance(None, "clones", "whole"), "no teams of clones"),
-    "clones": Quantity(
-        _query(CLONED + "('whole') GROUP BY run"), "no teams of clones", needs_exchange=False
+    "clones": _cloned("<> 'whole'", "no teams of clones"),
+    "clones of a specialist": _cloned(
+        "NOT IN ('whole', 'non-specialized')", "no specialist cloned"
     ),
-    "clones of a specialist": Quantity(
-        _query(CLONED + "('whole', 'non-specialized') GROUP BY run"),
-        "no specialist cloned",
-        needs_exchange=False,
+    "clones of med": _cloned("= 'med'", "no med specialist cloned"),
+    "clones of hi": _cloned("= 'hi'", "no hi specialist cloned"),
+    "clones of the non-specialized": _cloned(
+        "= 'non-specialized'", "no non-specialized robot cloned"
     ),
     "complementary": Quantity(_query(COMPLEMENTARY), "no team of two behaviours"),
-    "one caste": Quantity(
-        _query(CASTES.format(condition="count(DISTINCT caste) = 1")),
-        "no castes recorded",
-        is_share=True,
-    ),
-    "several castes": Quantity(
-        _query(CASTES.format(condition=SEVERAL_CASTES)), "no castes recorded", is_share=True
-    ),
+    "one caste": _castes("count(DISTINCT caste) = 1"),
+    "two castes": _castes("count(DISTINCT caste) FILTER (WHERE caste <> 'move') >= 2"),
+    "several castes": _castes(f"{HAS_ANY} AND {SPECIALIZED} >= 2"),
+    "mixed castes": _castes(f"{HAS_ANY} AND {SPECIALIZED} >= 1"),
+    "all castes": _castes(f"{HAS_ANY} AND {SPECIALIZED} >= 3"),
+    **{f"only {caste}": _castes(f"bool_and(caste = '{caste}')") for caste in ("med", "hi")},
+    **{f"some {caste}": _castes(f"bool_or(caste = '{caste}')") for caste in ("low", "med", "hi")},
     "idle predators": Quantity(
         _query(SEEN.format(kind="individual", behaviour="idle")),
         "no behaviours recorded",
@@ -142,5 +155,6 @@ loss: (whole - lesioned) over the larger of them, mean over castes, in [-1, 1]. 
 share of the team's performance that is lost, as in tables 4.5, 5.7 and 6.9, and where a team gains
 it cannot be beyond all bounds; a team that never achieves anything has none. evolved, clones: of
 the clones study, the latter the best team of clones. complementary: evolved, of teams with at least
-two behaviours. The others are 1 or 0.
+two behaviours. The others are 1 or 0; castes are those of ``robots``: several are two specialized
+ones and the non-specialized, mixed one and it, all three and it.
 """
