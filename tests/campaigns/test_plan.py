@@ -168,6 +168,11 @@ def test_some_runs_of_a_plan_may_be_shapings(tmp_path):
         ("[settings]", '[settings]\n"run.preset" = "desk"', "the preset is given as smoke"),
         ("[settings]", '[settings]\n"run.world" = "rover/complex-2"', "the world is given as"),
         ("complex-1", "complex-5..2", "begins with its smaller number"),
+        (
+            "[settings]",
+            '[settings]\n"method.start_noise" = 0.1',
+            r"start_noise = 0.1 does nothing in .*tiny.toml: it is for populations bred from",
+        ),
     ],
 )
 def test_a_wrong_plan_is_one_clear_line(tmp_path, old, new, says):

@@ -322,6 +322,13 @@ def test_a_run_begins_with_what_another_one_ended_with(say) -> None:
         assert words in say("show", option[2:]).out
     both = say("run", "rover/complex-2", *same, "--from", "first", "--from-champion", "first")
     assert (both.code, "mutually exclusive" in both.err) == (2, True)
+    noisy = ("run", "rover/complex-2", *same, "--set", "method.start_noise=.02", "--out", "noisy")
+    for more in ((), ("--from", "first"), ("--dry-run",), ("--shape",), ("--shape", "--dry-run")):
+        said = say(*noisy, *more)
+        assert (said.code, said.err.count("\n")) == (2, 1)
+        assert "method.start_noise = 0.02 does nothing here" in said.err
+        assert not Path("noisy").exists()
+    assert say(*noisy, "--from-champion", "first").code == 0
     smaller = say("run", "rover/complex-2", *same, "--from", "first", "--set", "genotypes=6")
     assert (smaller.code, "4 genotypes per slot became 6" in smaller.err) == (2, True)
     say(*tiny("--out", "part", "--time-limit", "0.001s", "--quiet"))

@@ -144,6 +144,32 @@ def test_populations_bred_from_a_team_have_it_whole_and_vary_around_it(name: str
     assert learner.ask(state).teams.shape == learner.ask(fresh).teams.shape
 
 
+@every_method
+def test_start_noise_is_normal_noise_on_every_gene_but_those_of_the_team_itself(name: str) -> None:
+    learner = replace(
+        build(name), config=replace(build(name).config, genotypes=2000, start_noise=0.02)
+    )
+    active = np.zeros((2, 5), dtype=bool)
+    active[:, :3] = True
+    genes = np.where(active[..., None], np.float32(0.5), np.float32(0)) * np.ones(4, np.float32)
+    genes[1, 2, 3] = 1.0
+    state = breed_from(learner, LAYOUT, 3, genes, active)
+    n_kept = 2 if len(state.genes) == 1 else 1
+    for p in range(len(state.genes)):
+        for m in range(n_kept):
+            np.testing.assert_array_equal(state.genes[p, :, m], genes[max(p, m)])
+        spread = state.genes[p, :2, n_kept:] - 0.5
+        assert (spread != 0).mean() > 0.999
+        assert abs(spread.mean()) < 5 * 0.02 / spread.size**0.5
+        assert abs(spread.std() / 0.02 - 1) < 5 / (2 * spread.size) ** 0.5
+        assert not state.genes[p, 3:].any()
+    limited = state.genes[-1, 2, n_kept:, 3]
+    assert limited.max() == 1.0
+    every_other = limited[1::2] if n_kept == 2 else limited
+    assert abs((every_other == 1.0).mean() - 0.5) < 0.08  # half of the noise is cut off
+    assert state.genes.dtype == np.float32
+
+
 def test_a_team_of_other_sizes_is_refused() -> None:
     genes, active = np.zeros((2, 5, 3), dtype=np.float32), np.ones((2, 5), dtype=bool)
     with pytest.raises(UsageError, match="3 genes per neuron became 4"):

@@ -90,6 +90,29 @@ def test_a_run_may_be_bred_from_the_champion_of_another(tmp_path: Path) -> None:
     assert longer.status == "finished"
 
 
+@pytest.mark.parametrize("method", ["homcne", "hetcne", "ccga", "mesp", "cone"])
+def test_clones_may_be_followed_by_any_method_with_a_spread_of_its_own(
+    method: str, tmp_path: Path
+) -> None:
+    origin = evolve_tiny(tmp_path / "origin", "homcne")
+    settings = tiny_settings(method, method__start_noise=0.02)
+    config = resolve(TASK, method, "smoke", overrides=settings)
+    for from_champion, made_from in ((False, origin), (False, None)):
+        with pytest.raises(UsageError, match=r"start_noise = 0\.02 does nothing here: .*champion"):
+            start(config, tmp_path / "run", threads=1, origin=made_from, of_champion=from_champion)
+    assert not (tmp_path / "run").exists()
+    run = start(config, tmp_path / "run", threads=1, origin=origin, of_champion=True)
+    with np.load(run.path / "origin.npz") as first:
+        genes = first["field.genes"]
+    assert origin.champion is not None
+    away = genes[0] - origin.champion.genes[0][:, None]
+    used = away[origin.champion.active[0], 2:]  # hetcne has two robots' networks first
+    assert 0.01 < used.std() < 0.03
+    again = conevo.Run(run.path)
+    again.extend(generations=4, threads=1)  # before anything is done
+    assert again.resume(threads=1).status == "finished"
+
+
 @pytest.mark.parametrize("of_champion", [True, False])
 def test_controllers_of_other_sizes_are_refused(of_champion: bool, tmp_path: Path) -> None:
     origin = evolve_tiny(tmp_path / "origin")

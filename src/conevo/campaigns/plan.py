@@ -20,6 +20,7 @@ import tomli_w
 
 from conevo.campaigns.inputs import located, shown_as
 from conevo.errors import UsageError, unknown_name
+from conevo.evolution.inheritance import refuse_idle
 from conevo.evolution.methods.registry import MethodEntry
 from conevo.evolution.methods.registry import resolve as resolve_method
 from conevo.runs.config import IN_FILES, PRESETS, RunConfig, resolve
@@ -253,6 +254,7 @@ class Plan:
         configs = [
             resolve(t, method, self.preset, overrides=overrides, place=self.place) for t in tasks
         ]
+        refuse_idle(configs[-1].method_config, self.place)
         variant = ", ".join(f"{k.rpartition('.')[2]}={shown_as(v)}" for k, v in further.items())
         address = configs[-1].address
         return [

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from conevo.errors import UsageError
 from conevo.evolution.generation import Populations
 from conevo.evolution.protocol import BoolArray, FloatArray, Layout, Method, State
-from conevo.evolution.variation import VariationConfig, mutate
+from conevo.evolution.variation import VariationConfig, mutate, perturb
 from conevo.rng import stream
 from conevo.terms import counted
 
-__all__ = ["breed_from", "hand_on"]
+__all__ = ["breed_from", "hand_on", "refuse_idle"]
 
 AXES = {"slots": 1, "genotypes per slot": 2, "genes per neuron": 3}  # of Populations.genes
 
@@ -69,8 +70,8 @@ def breed_from(
     """Return generation 0 of a task, all its genotypes bred from one team.
 
     Choice: population p is of copies of the team's controller p mod R, all but the first of them
-    mutated as children are, so that there is something to select from and nothing is lost. A
-    method with one population takes the R controllers in turn.
+    mutated as children are, or with normal noise (``start_noise``), so that there is something to
+    select from and nothing is lost. A method with one population takes the R controllers in turn.
 
     Args:
         method: the method of the task.
@@ -111,14 +112,35 @@ def breed_from(
     if n_populations == 1:
         source, n_kept = np.arange(n_genotypes)[None], min(n_robots, n_genotypes)
     copies = genes[source % n_robots].swapaxes(1, 2)
-    probability, scale = (
+    probability, scale, noise = (
         getattr(method.config, name, getattr(VariationConfig, name))
-        for name in ("mutation_probability", "mutation_scale")
+        for name in ("mutation_probability", "mutation_scale", "start_noise")
     )
-    bred = mutate(copies, probability, scale, stream(root, "champion"))
+    generator = stream(root, "champion")
+    if noise:
+        bred = perturb(copies, noise, generator)
+    else:
+        bred = mutate(copies, probability, scale, generator)
     bred[:, :, :n_kept] = copies[:, :, :n_kept]
     kept = fresh.active if is_whole else active[source[:, 0] % n_robots]
     return _with(fresh, bred * kept[:, :, None, None], kept)
+
+
+def refuse_idle(config: Any, place: str = "here") -> None:
+    """Refuse parameters of a method that do nothing in a run without a team to breed from.
+
+    Args:
+        config: the method's parameters.
+        place: where they are, for the message.
+
+    Raises:
+        UsageError: there is one.
+    """
+    if noise := getattr(config, "start_noise", 0.0):
+        raise UsageError(
+            f"method.start_noise = {noise:g} does nothing {place}: it is for populations bred from "
+            f"a champion (conevo run --from-champion RUN)"
+        )
 
 
 def _with(fresh: Populations, genes: FloatArray, active: BoolArray) -> Populations:

@@ -14,7 +14,7 @@ from annotated_types import Ge, Gt, Le
 from conevo.evolution.protocol import FloatArray, IntArray
 from conevo.parameters import parameters
 
-__all__ = ["VariationConfig", "across", "breed", "crossover", "mutate", "within"]
+__all__ = ["VariationConfig", "across", "breed", "crossover", "mutate", "perturb", "within"]
 
 
 @parameters("method")
@@ -32,6 +32,9 @@ class VariationConfig:
     n_elitist: Annotated[int, Ge(0), Le(1_000_000)] = 0
     """fittest genotypes that survive unchanged, at most the elite portion. 0: children replace all
     genotypes (section 3.4.3)."""
+    start_noise: Annotated[float, Ge(0), Le(2)] = 0.0
+    """(gene units) standard deviation of the normal noise on each gene of populations that are bred
+    from a champion (``--from-champion``). 0: they are mutated as children are."""
 
 
 def crossover(
@@ -103,6 +106,19 @@ def mutate(
     mutated = genes.astype(np.float32, copy=True)
     mutated[hit] = np.clip(mutated[hit] + step, -1.0, 1.0)
     return mutated
+
+
+def perturb(genes: FloatArray, scale: float, generator: np.random.Generator) -> FloatArray:
+    """Return float32 genes with normal noise on each, limited to [-1, 1].
+
+    Args:
+        genes: of any shape.
+        scale: standard deviation of the noise.
+        generator: the source of it.
+    """
+    noise = generator.standard_normal(genes.shape, dtype=np.float32) * np.float32(scale)
+    perturbed: FloatArray = np.clip(genes + noise, -1.0, 1.0).astype(np.float32)
+    return perturbed
 
 
 def breed(

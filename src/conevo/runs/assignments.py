@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from typing import Any
 
@@ -12,7 +13,7 @@ __all__ = ["parse_assignment", "parse_assignments"]
 
 
 def parse_assignment(text: str) -> tuple[str, Any]:
-    """Return key and value of "key=value"; the value is TOML, or else plain text.
+    """Return key and value of "key=value"; the value is TOML, a number as .5, or else plain text.
 
     Raises:
         UsageError: there is no "=".
@@ -23,7 +24,8 @@ def parse_assignment(text: str) -> tuple[str, Any]:
     try:
         return key.strip(), parse_toml(f"value = {value}", "a value")["value"]
     except DamagedFile:
-        return key.strip(), value.strip()
+        value = value.strip()
+        return key.strip(), float(value) if re.fullmatch(r"[+-]?\.\d+", value) else value
 
 
 def parse_assignments(texts: Iterable[str]) -> dict[str, Any]:

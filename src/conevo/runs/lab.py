@@ -12,7 +12,7 @@ import numpy as np
 from conevo.controllers.protocol import Controller
 from conevo.controllers.registry import genome_of
 from conevo.errors import EnvironmentFailure, UsageError
-from conevo.evolution.inheritance import breed_from, hand_on
+from conevo.evolution.inheritance import breed_from, hand_on, refuse_idle
 from conevo.evolution.protocol import Layout, Method, Progress, State
 from conevo.outside import takes
 from conevo.reading import DamagedFile
@@ -78,10 +78,13 @@ def _first(method: Method, layout: Layout, seed: int, ancestor: State | Team | N
     """Return generation 0 of random populations, of an ancestor's, or bred from its team.
 
     Raises:
-        UsageError: it cannot be kept, its header is not of this run, or the ancestor does not fit.
+        UsageError: it cannot be kept, its header is not of this run, the ancestor does not fit, or
+            the method has parameters that are for another one.
     """
     from conevo.runs.checkpoint import refuse_unkept
 
+    if not isinstance(ancestor, Team):
+        refuse_idle(method.config)
     if ancestor is None:
         state = method.init(layout, seed)
     elif isinstance(ancestor, Team):

@@ -16,7 +16,7 @@ from conevo.errors import UsageError
 from conevo.runs.config import RunConfig
 from conevo.runs.directory import kind_of
 from conevo.runs.lab import Lab
-from conevo.runs.loop import has_reached
+from conevo.runs.loop import check_budget, has_reached
 from conevo.runs.outline import LENGTH
 from conevo.runs.provenance import now
 from conevo.runs.settings import RunSettings
@@ -70,7 +70,8 @@ def give_length(
         )
     lab = replace(equip(), config=config)
     if not records:
-        lab.first_state()  # whether the budget pays for it
+        first = store.load_origin(config.method, lab.blank_state()) or lab.first_state()
+        check_budget(lab.method, first, config.run.budget_evaluations)
     seal = store.read_seal() if store.is_finished else {}
     store.extend(config, _former_end(current, about, records, seal), now())
     return lab
