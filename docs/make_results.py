@@ -212,7 +212,7 @@ def compare(run: conevo.Run, sheet: Sheet, seeds: list[int]) -> tuple[list[Row],
             outcome = play(world, teams, keys)
             if kind == sheet.others[0][0]:
                 first[seed] = outcome.performance[sheet.main][0].astype(np.float64)
-            portraits = [describe(outcome, world.castes, team=n) for n in range(len(teams.kinds))]
+            portraits = [describe(outcome, world, team=n) for n in range(len(teams.kinds))]
             castes = sum((Counter(p.castes) for p in portraits), Counter())
             rows.append(
                 {

@@ -253,7 +253,8 @@ def test_a_parameter_is_one_field_and_one_of_the_kernels(tmp_path):
 def test_a_metric_is_one_entry(monkeypatch):
     share = Metric(lambda team: 0.25, "1 / R to 1", "share of the busiest robot", "made up")
     monkeypatch.setitem(METRICS, "largest_share", share)
-    nothing = Activity(np.zeros((2, 3)), np.zeros(2), ["non-specialized"] * 2)
+    labels = ["non-specialized"] * 2
+    nothing = Activity(np.zeros((2, 3)), np.zeros(2), labels, np.zeros(2), range(3))
     assert measure(nothing)["largest_share"] == 0.25
     (table,) = definitions().exhibits
     said = {"span": share.span, "what": share.what, "source": share.source}

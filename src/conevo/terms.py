@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import shlex
 
-__all__ = ["NON_SPECIALIZED", "S_MEANS", "S_SCALE", "counted", "quoted"]
+__all__ = ["NON_SPECIALIZED", "S_MEANS", "SHARE_SCALE", "S_SCALE", "counted", "quoted"]
 
 NON_SPECIALIZED = "non-specialized"
 """The caste of robots that are specialized to nothing."""
 
 S_SCALE = "0 = always the same action, 1 = switches all the time"
 """Which way S goes: the thesis calls it the degree of specialization, and 0 is a specialist."""
+
+SHARE_SCALE = "1 = always the same one"
+"""Which way the share of a favourite goes."""
 
 S_MEANS = f"degree of specialization S ({S_SCALE})"
 

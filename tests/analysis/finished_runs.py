@@ -241,6 +241,13 @@ def _run(
             "specialization": rng.uniform(0.1, 0.9, ROBOTS),
             "fitness": rng.uniform(0, 10, ROBOTS),
             "hidden": np.full(ROBOTS, 10),
+            "favourite_setting": rng.choice(task.castes[:3], ROBOTS),
+            "setting_share": rng.uniform(1 / 3, 1, ROBOTS),
+            "affinity": rng.uniform(0, 1, ROBOTS),
+            "favourite_action": rng.choice(task.castes, ROBOTS),
+            "action_share": rng.uniform(0.25, 1, ROBOTS),
+            "independent": rng.uniform(0, 0.75, ROBOTS),
+            "relative": rng.uniform(0, 2, ROBOTS),
         },
         "actions": {
             "run": [run] * (ROBOTS * len(task.castes)),

@@ -21,8 +21,10 @@ from conevo.runs.config import resolve
 from conevo.runs.lab import Lab
 from conevo.runs.run import start
 from conevo.specialization import degree
+from conevo.specialization.individual import independent_degree
 from conevo.specialization.team import METRICS, Activity, measure
 from conevo.worlds.measures import measures_of
+from conevo.worlds.protocol import setting_columns
 from conevo.worlds.pursuit.study import observation
 from conevo.worlds.pursuit.study.behaviours import BEHAVIOURS
 from conevo.worlds.pursuit.study.captures import COLLECTIVES, Capture, most_frequent
@@ -93,7 +95,7 @@ def test_actions_are_counted_over_all_scenarios(task, runs, found) -> None:
 
 
 @pytest.mark.parametrize("task", CHANGES)
-def test_metrics_are_those_of_the_robots(task, found) -> None:
+def test_metrics_are_those_of_the_robots(task, runs, found) -> None:
     robots = found[task]["robots"]
     s = np.array([row["specialization"] for row in robots])
     assert list(found[task]["metrics"]) == list(METRICS)
@@ -101,8 +103,41 @@ def test_metrics_are_those_of_the_robots(task, found) -> None:
     if task.startswith("pursuit"):
         return
     counts = np.array([row["count"] for row in found[task]["actions"]]).reshape(len(robots), -1)
-    labels = [row["caste"] for row in robots]
-    assert found[task]["metrics"] == pytest.approx(measure(Activity(counts, s, labels)))
+    labels, drawn = ([row[name] for row in robots] for name in ("caste", "independent"))
+    columns = setting_columns(runs[task].config.build_world())
+    expected = measure(Activity(counts, s, labels, np.array(drawn), columns))
+    assert found[task]["metrics"] == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("task", [task for task in CHANGES if not task.startswith("pursuit")])
+def test_favourites_are_those_of_the_counted_actions(task, runs, found) -> None:
+    world = runs[task].config.build_world()
+    chosen = getattr(world, "settings", world.castes)
+    for row in found[task]["robots"]:
+        lived = {one["action"]: one["count"] for one in found[task]["actions"]
+                 if one["robot"] == row["robot"]}  # fmt: skip
+        work = {name: lived[name] for name in chosen}
+        most = max(work, key=work.get)
+        first, second = sorted(work.values())[:-3:-1]
+        if not first:
+            assert row["favourite_setting"] is row["setting_share"] is row["affinity"] is None
+            continue
+        assert row["favourite_setting"] == most
+        assert row["setting_share"] == pytest.approx(first / sum(work.values()))
+        assert row["affinity"] == pytest.approx((first - second) / sum(work.values()))
+        assert row["favourite_action"] == max(lived, key=lived.get)
+        assert row["action_share"] == pytest.approx(max(lived.values()) / sum(lived.values()))
+        if row["specialization"]:
+            over = row["specialization"] / row["independent"]
+            assert row["relative"] == pytest.approx(over)
+        else:
+            assert row["relative"] == 0
+
+
+def test_rovers_choose_among_their_settings_and_others_among_all_they_do(found) -> None:
+    """Or the tests above would not have tested much."""
+    assert {row["favourite_setting"] for row in found["rover/complex-5"]["robots"]} > {"low", "hi"}
+    assert "move" in {row["favourite_action"] for row in found["rover/complex-5"]["robots"]}
 
 
 @pytest.mark.parametrize("task", CHANGES)
@@ -228,7 +263,8 @@ def test_metrics_of_predators_are_of_behaviours_not_of_motor_primitives(runs, fo
         [one.specialization for one in lives]
     )
     s, labels = np.array([one.specialization for one in lives]), [one.label for one in lives]
-    expected = measure(Activity(counts, s, labels))
+    behaviours = range(len(BEHAVIOURS))
+    expected = measure(Activity(counts, s, labels, independent_degree(counts), behaviours))
     assert found[PURSUIT]["metrics"] == pytest.approx(expected, abs=1e-9)
 
 

@@ -155,6 +155,25 @@ def test_studies_are_kept_whole(campaign, tables):
         assert rows == [(len(study["scores"]),)]
 
 
+def test_studies_of_earlier_versions_have_no_favourites_and_are_reported(campaign, tmp_path):
+    copy = Campaign(shutil.copytree(campaign.path, tmp_path / "copy"))
+    old, *new = copy.planned
+    study = read_json(copy.places.study(old))
+    first = ("robot", "caste", "specialization", "fitness", "hidden")
+    study["robots"] = [{name: row[name] for name in first} for row in study["robots"]]
+    copy.places.study(old).write_text(json.dumps(study))
+    shutil.rmtree(copy.places.tables)
+    copy.seal()
+    with Tables(copy.places.tables) as tables:
+        sql = "SELECT DISTINCT run FROM robots WHERE relative IS {} ORDER BY ALL"
+        assert tables.query(sql.format("NULL"))[1] == [(old,)]
+        assert tables.query(sql.format("NOT NULL"))[1] == [(label,) for label in sorted(new)]
+    assert (
+        "and the settings that robots prefer"
+        in write_report(copy.path, tmp_path / "report").read_text()
+    )
+
+
 def test_tables_are_made_again_only_when_more_is_finished(campaign):
     made = (campaign.places.tables / "runs.parquet").stat().st_mtime_ns
     campaign.seal()

@@ -11,6 +11,7 @@ from conevo.rng import fold
 from conevo.worlds.checks import mixed_teams, random_teams
 from conevo.worlds.contract import shapes_of
 from conevo.worlds.measures import measures_of
+from conevo.worlds.protocol import setting_columns
 from conevo.worlds.registry import WORLDS, resolve, world
 from conevo.worlds.rollout import Rollout
 from conevo.worlds.simulators import has_own_simulator, simulator
@@ -98,6 +99,8 @@ def test_a_world_is_what_its_entry_says(path, some_world):
         assert isinstance(names, tuple)
         assert len(set(names)) == len(names) > 0
     assert len(some_world.castes) >= len(some_world.actions)
+    chosen = [some_world.castes[column] for column in setting_columns(some_world)]
+    assert chosen == [name for name in some_world.castes if name in chosen] != []
     assert resolve(entry.address(environment)) == (entry, environment)
 
 

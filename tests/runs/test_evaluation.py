@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -74,11 +75,24 @@ def test_non_finite_fitness_is_passed_on() -> None:
 
 
 def test_a_portrait_names_castes_by_the_most_executed_action() -> None:
-    portrait = describe(OUTCOME, ACTIONS)
+    portrait = describe(OUTCOME, SimpleNamespace(castes=ACTIONS))
     assert portrait.performance == {"value": 15.0}
     assert portrait.labels == ["dig", "non-specialized", "move"]
     assert portrait.castes == {"dig": 1, "move": 1, "non-specialized": 1}
     np.testing.assert_allclose(portrait.specialization, [0, 1, 0.3])
+
+
+def test_a_portrait_has_favourites_and_the_null_of_s() -> None:
+    """Robot 2 moves 8 of 11 times in one epoch and 10 of 11 in the other."""
+    everything = describe(OUTCOME, SimpleNamespace(castes=ACTIONS))
+    assert everything.favourites == ["dig", "dig", "move"]
+    np.testing.assert_allclose(everything.favourite_shares, [1, 12 / 22, 18 / 22])
+    drawn = [0, 1 - 61 / 121, 1 - (73 + 101) / 242]
+    np.testing.assert_allclose(everything.independent, drawn)
+    moves = describe(OUTCOME, SimpleNamespace(castes=ACTIONS, settings=("move",)))
+    assert moves.favourites == [None, "move", "move"]
+    np.testing.assert_array_equal(moves.favourite_shares, [np.nan, 1, 1])
+    assert moves.independent == everything.independent
 
 
 def test_a_generation_shares_scenarios_and_fixed_ones_are_the_same_in_all() -> None:

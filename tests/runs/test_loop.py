@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import partial
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -10,7 +12,7 @@ import pytest
 
 from conevo.errors import UsageError
 from conevo.evolution.protocol import Layout, Progress, Scores, Trials
-from conevo.runs.evaluation import Evaluation
+from conevo.runs.evaluation import Evaluation, describe
 from conevo.runs.loop import evolve_generations, price
 from conevo.runs.settings import RunSettings
 from conevo.worlds.measures import Measure
@@ -74,7 +76,7 @@ def log_of(method: Still, generations: int = 2) -> list[dict[str, Any]]:
         play,
         settings=RunSettings(generations=generations, epochs=7, fittest_epochs=3),
         main=Measure("value"),
-        castes=("a", "b"),
+        portray=partial(describe, world=SimpleNamespace(castes=("a", "b"))),
         iterations=10,
         on_generation=lambda state, record: records.append(record),
     )

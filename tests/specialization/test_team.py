@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from conevo.specialization.individual import degree, label
+from conevo.specialization.individual import degree, independent_degree, label
 from conevo.specialization.switching import switching_index
 from conevo.specialization.team import METRICS, Activity, measure
 
@@ -23,7 +23,7 @@ def lived(lives: list[list[int]], n_actions: int) -> Activity:
     switches = [sum(a != b for a, b in pairwise(life)) for life in lives]
     s = degree(switches, counts)
     labels = [label(float(one), own, NAMES) for one, own in zip(s, counts, strict=True)]
-    return Activity(counts, s, labels)
+    return Activity(counts, s, labels, independent_degree(counts), range(n_actions))
 
 
 def test_switching_index_with_two_tasks_is_that_of_gautrais() -> None:
@@ -48,6 +48,12 @@ def test_a_team_of_perfect_specialists() -> None:
     assert measure(lived([[k] * 20 for k in range(4)], 4)) == {
         "specialization": 0.0,
         "specialized": 1.0,
+        "independent_specialization": 0.0,
+        "relative_specialization": 0.0,
+        "favourite_setting": 1.0,
+        "affinity": 1.0,
+        "devoted": 1.0,
+        "favourite_action": 1.0,
         "switching_index": 1.0,
         "activity_entropy": 0.0,
         "caste_entropy": 2.0,
@@ -66,6 +72,12 @@ def test_a_team_of_generalists() -> None:
         {
             "specialization": 1.0,
             "specialized": 0.0,
+            "independent_specialization": 0.75,
+            "relative_specialization": 4 / 3,
+            "favourite_setting": 0.25,
+            "affinity": 0.0,
+            "devoted": 0.0,
+            "favourite_action": 0.25,
             "switching_index": -1 / 3,
             "activity_entropy": 2.0,
             "caste_entropy": 0.0,
@@ -89,13 +101,30 @@ def test_a_team_of_one_caste_is_specialized_but_does_not_divide_labour() -> None
 def test_robots_that_did_nothing() -> None:
     found = measure(lived([[], []], 3))
     assert found["specialized"] == found["caste_entropy"] == 0.0
+    assert found["independent_specialization"] == found["relative_specialization"] == 0.0
+    assert found["favourite_setting"] is found["affinity"] is found["favourite_action"] is None
+    assert found["devoted"] == 0.0
     assert found["activity_entropy"] is found["mutual_information"] is None
     assert found["hierarchic_social_entropy"] == found["system_neural_diversity"] == 0.0
 
 
+def test_settings_are_counted_without_what_is_done_in_between() -> None:
+    """Two robots move (2) in turn with one setting each, a third with both; a fourth only moves."""
+    counts = np.array([[5, 0, 5], [0, 5, 5], [3, 2, 5], [0, 0, 9]])
+    s = np.array([1.0, 1.0, 1.0, 0.0])
+    labels = ["non-specialized"] * 3 + ["c"]
+    found = measure(Activity(counts, s, labels, independent_degree(counts), (0, 1)))
+    assert found["favourite_setting"] == pytest.approx((1 + 1 + 0.6) / 3)
+    assert found["affinity"] == pytest.approx((1 + 1 + 0.2) / 3)
+    assert found["devoted"] == 0.75
+    assert found["favourite_action"] == pytest.approx((0.5 + 0.5 + 0.5 + 1) / 4)
+    assert found["independent_specialization"] == pytest.approx((0.5 + 0.5 + 0.62 + 0) / 4)
+    assert found["relative_specialization"] == pytest.approx((2 + 2 + 1 / 0.62 + 0) / 4)
+
+
 def limit(text: str, n_robots: int, n_actions: int) -> float:
     """Return the number that an end of a metric's span says."""
-    known = {"log2": math.log2, "min": min, "R": n_robots, "A": n_actions}
+    known = {"log2": math.log2, "min": min, "R": n_robots, "A": n_actions, "K": n_actions}
     text = text.removesuffix(" bits")
     if text.startswith("log2 "):
         text = f"log2({text[5:]})"

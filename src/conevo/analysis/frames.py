@@ -102,6 +102,13 @@ SCHEMA: dict[str, dict[str, str]] = {
         "specialization": "DOUBLE",
         "fitness": "DOUBLE",
         "hidden": "INTEGER",
+        "favourite_setting": "VARCHAR",
+        "setting_share": "DOUBLE",
+        "affinity": "DOUBLE",
+        "favourite_action": "VARCHAR",
+        "action_share": "DOUBLE",
+        "independent": "DOUBLE",
+        "relative": "DOUBLE",
     },
     "actions": {"run": "VARCHAR", "robot": "INTEGER", "action": "VARCHAR", "count": "BIGINT"},
     "metrics": {"run": "VARCHAR", "metric": "VARCHAR", "value": "DOUBLE"},
@@ -118,7 +125,10 @@ SCHEMA: dict[str, dict[str, str]] = {
 evaluations that a run was given, NULL without one; evaluations is what it spent; exchanges is the
 number of pairs of sub-populations that recombined between populations, in the mean of the
 generations, exchange_share that of the pairs that could have; both are NULL for methods that never
-do. ``measures``: the world's, as it declares them; of one that is not listed larger is better.
+do. ``robots``: specialization is S, independent the S of independent draws from the robot's shares,
+relative S over that; a share is 1 if it is always the same; columns from favourite_setting on are
+NULL of studies that earlier versions made. ``measures``: the world's, as it declares them; of one
+that is not listed larger is better.
 """
 
 

@@ -20,7 +20,7 @@ from conevo.rng import fold
 from conevo.runs.champions import Team
 from conevo.runs.lab import Lab
 from conevo.runs.run import Run
-from conevo.specialization.individual import NON_SPECIALIZED
+from conevo.specialization.individual import NON_SPECIALIZED, independent_degree
 from conevo.specialization.team import Activity
 from conevo.worlds.registry import WORLDS, studies, study_of
 from conevo.worlds.study import Seen, WorldStudy
@@ -58,11 +58,21 @@ class Observed:
 
     @property
     def activity(self) -> Activity:
-        """Windows of each robot in each behaviour, with its S and caste."""
+        """Windows of each robot in each behaviour and in none, with its S and caste.
+
+        Choice: behaviours are the settings among which such a robot chooses; windows without one
+        are not work.
+        """
         lives = self.lifetimes
-        windows = [[share * life.windows for share in life.shares.values()] for life in lives]
+        windows = np.rint(
+            [[share * life.windows for share in life.shares.values()] for life in lives]
+        )
         return Activity(
-            np.rint(windows), np.array([life.specialization for life in lives]), self.labels
+            counts=windows,
+            specialization=np.array([life.specialization for life in lives]),
+            labels=self.labels,
+            independent=independent_degree(windows),
+            settings=range(len(self.study.BEHAVIOURS)),
         )
 
     @property

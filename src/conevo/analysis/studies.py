@@ -30,9 +30,10 @@ from conevo.runs.champions import Team
 from conevo.runs.evaluation import describe
 from conevo.runs.lab import Lab
 from conevo.runs.run import Run
-from conevo.specialization.individual import NON_SPECIALIZED
+from conevo.specialization.favourite import affinity, favourite, favourite_share
+from conevo.specialization.individual import NON_SPECIALIZED, relative_degree
 from conevo.specialization.team import Activity, measure
-from conevo.worlds.protocol import Outcome
+from conevo.worlds.protocol import Outcome, setting_columns
 
 __all__ = ["study"]
 
@@ -47,11 +48,13 @@ class _Portrait:
 
     Attributes:
         activity: what they did in all scenarios, with S and caste of each robot.
+        names: of the columns of its counts.
         fitness: [R] private fitness, mean over the scenarios.
         castes: those with robots, in the world's order.
     """
 
     activity: Activity
+    names: Sequence[str]
     fitness: npt.NDArray[np.float64]
     castes: list[str]
 
@@ -77,10 +80,13 @@ def study(
     Returns:
         Plain data. scores: rows {study, team, measure, scenario, value} of the studies "lesion" and
         "clones", teams "whole" and castes; the testing phase is the run's own (``test_result``).
-        robots: robot, caste, specialization (S), fitness, hidden. actions: robot, action (of
-        ``World.castes``), count. metrics: those of ``specialization.team``, by what castes are told
-        by. behaviours (if observed): kind, behaviour, count; for the kind "team" its most
-        frequent collective behaviour, and all its captures.
+        robots: robot, caste, specialization (S), fitness, hidden, and what S cannot see:
+        favourite_setting and setting_share (its share of the settings used, 1 = always the same),
+        affinity, favourite_action and action_share (of its time), independent (the S of
+        independent draws), relative (S over it); None where a robot did none. actions: robot,
+        action (of ``World.castes``), count. metrics: those of ``specialization.team``, by what
+        castes are told by. behaviours (if observed): kind, behaviour, count; for the kind "team"
+        its most frequent collective behaviour, and all its captures.
 
     Raises:
         UsageError: no generation has finished yet, or made with other kernels.
@@ -116,13 +122,22 @@ def study(
 
 def _portray(lab: Lab, outcome: Outcome, watched: Observed | None) -> _Portrait:
     if watched is None:
-        found, order = describe(outcome, lab.world.castes), lab.world.castes
-        activity = Activity(_counts(outcome), np.array(found.specialization), found.labels)
+        found, order = describe(outcome, lab.world), lab.world.castes
+        activity = Activity(
+            counts=_counts(outcome),
+            specialization=np.array(found.specialization),
+            labels=found.labels,
+            independent=np.array(found.independent),
+            settings=setting_columns(lab.world),
+        )
+        names = order
     else:
         activity, order = watched.activity, watched.study.BEHAVIOURS
+        names = (*order, "none")
     named = [name for name in order if name in activity.labels and name != NON_SPECIALIZED]
     return _Portrait(
         activity=activity,
+        names=names,
         fitness=outcome.fitness[0].astype(np.float64).mean(axis=0),
         castes=[*named, *([NON_SPECIALIZED] if NON_SPECIALIZED in activity.labels else [])],
     )
@@ -149,17 +164,24 @@ def _finite(value: Any) -> float | None:
 
 
 def _robots(team: Team, portrait: _Portrait) -> list[Row]:
-    of, hidden = portrait.activity, team.active.sum(axis=1)
-    columns = (of.labels, of.specialization, portrait.fitness, hidden)
+    of, names = portrait.activity, portrait.names
+    settings = [names[column] for column in of.settings]
+    columns = {
+        "caste": of.labels,
+        "specialization": [float(s) for s in of.specialization],
+        "fitness": [_finite(fitness) for fitness in portrait.fitness],
+        "hidden": [int(n_hidden) for n_hidden in team.active.sum(axis=1)],
+        "favourite_setting": [favourite(robot, settings) for robot in of.work],
+        "setting_share": [_finite(share) for share in favourite_share(of.work)],
+        "affinity": [_finite(value) for value in affinity(of.work)],
+        "favourite_action": [favourite(robot, names) for robot in of.counts],
+        "action_share": [_finite(share) for share in favourite_share(of.counts)],
+        "independent": [float(s) for s in of.independent],
+        "relative": [float(s) for s in relative_degree(of.specialization, of.independent)],
+    }
     return [
-        {
-            "robot": robot,
-            "caste": caste,
-            "specialization": float(s),
-            "fitness": _finite(fitness),
-            "hidden": int(n_hidden),
-        }
-        for robot, (caste, s, fitness, n_hidden) in enumerate(zip(*columns, strict=True))
+        {"robot": robot} | dict(zip(columns, values, strict=True))
+        for robot, values in enumerate(zip(*columns.values(), strict=True))
     ]
 
 

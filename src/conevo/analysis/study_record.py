@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, NotRequired
 
 from annotated_types import Ge
 from typing_extensions import TypedDict
@@ -23,13 +23,20 @@ class Score(TypedDict):
 
 
 class Robot(TypedDict):
-    """A robot of the fittest team."""
+    """A robot of the fittest team, see ``studies.study``; the first versions wrote five columns."""
 
     robot: Count
     caste: str
     specialization: float | None
     fitness: float | None
     hidden: Count
+    favourite_setting: NotRequired[str | None]
+    setting_share: NotRequired[float | None]
+    affinity: NotRequired[float | None]
+    favourite_action: NotRequired[str | None]
+    action_share: NotRequired[float | None]
+    independent: NotRequired[float | None]
+    relative: NotRequired[float | None]
 
 
 class Action(TypedDict):

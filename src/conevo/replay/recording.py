@@ -111,7 +111,7 @@ def record_epoch(
     world = simulator.world
     modes = np.full(world.n_robots, -1, np.int32) if heuristic is None else heuristic
     known, channels, outcome = recorded(simulator, genes, team, scenario, modes)
-    portrait = describe(outcome, world.castes)
+    portrait = describe(outcome, world)
     of_no_run = {"method": "", "label": "", "run_id": "", "seed": 0, "generation": 0, "epoch": 0}
     about = {
         "format": FORMAT,

@@ -11,7 +11,8 @@ import numpy.typing as npt
 from conevo.evolution.protocol import Scores, Trials
 from conevo.rng import fold
 from conevo.specialization import activity, individual
-from conevo.worlds.protocol import Outcome, Scenarios, Simulator, World
+from conevo.specialization.favourite import favourite, favourite_share
+from conevo.worlds.protocol import Outcome, Scenarios, Simulator, World, setting_columns
 
 __all__ = ["Evaluation", "Portrait", "describe", "make_evaluator", "score"]
 
@@ -25,12 +26,19 @@ class Portrait:
         specialization: degree of specialization S of each robot.
         labels: caste of each robot, what it did most or "non-specialized".
         castes: number of robots per caste, largest first.
+        independent: the S of each robot if it drew its actions independently, with the shares that
+            they have in each epoch.
+        favourites: the setting (``World.settings``) that each robot used most, None without any.
+        favourite_shares: its share in all settings that the robot used, NaN without any.
     """
 
     performance: dict[str, float]
     specialization: list[float]
     labels: list[str]
     castes: dict[str, int]
+    independent: list[float]
+    favourites: list[str | None]
+    favourite_shares: list[float]
 
 
 @dataclass(frozen=True)
@@ -113,12 +121,16 @@ def _mean_shares(counts: npt.NDArray[np.int32]) -> npt.NDArray[np.float64]:
     return total
 
 
-def describe(outcome: Outcome, castes: tuple[str, ...], team: int = 0) -> Portrait:
-    """Return what one team of an outcome did; ``castes`` are the world's."""
+def describe(outcome: Outcome, world: World, team: int = 0) -> Portrait:
+    """Return what one team of an outcome did."""
+    chosen = setting_columns(world)
+    settings = [world.castes[column] for column in chosen]
     counts: npt.NDArray[np.int64] = outcome.counts[team].astype(np.int64).sum(axis=0)
     specialization = individual.degree(outcome.switches[team], outcome.counts[team]).mean(axis=0)
+    independent = individual.independent_degree(outcome.counts[team]).mean(axis=0)
+    work = counts[:, chosen]
     labels = [
-        individual.label(float(s), robot, castes)
+        individual.label(float(s), robot, world.castes)
         for s, robot in zip(specialization, counts, strict=True)
     ]
     return Portrait(
@@ -129,4 +141,7 @@ def describe(outcome: Outcome, castes: tuple[str, ...], team: int = 0) -> Portra
         specialization=[float(value) for value in specialization],
         labels=labels,
         castes=individual.castes(labels),
+        independent=[float(value) for value in independent],
+        favourites=[favourite(robot, settings) for robot in work],
+        favourite_shares=[float(value) for value in favourite_share(work)],
     )

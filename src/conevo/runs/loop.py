@@ -12,10 +12,11 @@ import numpy as np
 from conevo.errors import UsageError
 from conevo.evolution.protocol import Method, Progress, Scores, State, Trials
 from conevo.rng import stream
-from conevo.runs.evaluation import Evaluate, Portrait, describe
+from conevo.runs.evaluation import Evaluate, Portrait
 from conevo.runs.settings import RunSettings
 from conevo.terms import counted
 from conevo.worlds.measures import Measure
+from conevo.worlds.protocol import Outcome
 
 __all__ = ["check_budget", "evolve_generations", "has_reached", "price", "rehearse"]
 
@@ -31,7 +32,7 @@ def evolve_generations(
     *,
     settings: RunSettings,
     main: Measure,
-    castes: tuple[str, ...],
+    portray: Callable[[Outcome], Portrait],
     iterations: int,
     last: Record | None = None,
     on_generation: Callable[[State, Record], None],
@@ -45,7 +46,7 @@ def evolve_generations(
         evaluate: plays trials.
         settings: the stop conditions.
         main: the world's main measure of task performance.
-        castes: names of the world's castes.
+        portray: says what the first team of an outcome did.
         iterations: of one epoch of the world.
         last: record of the generation before, if there was one.
         on_generation: called with the state after a generation and the generation's record.
@@ -62,7 +63,7 @@ def evolve_generations(
         if not has_time():
             return "time"
         started = time.perf_counter()
-        finished = _run_generation(method, state, evaluate, castes, settings)
+        finished = _run_generation(method, state, evaluate, portray, settings)
         if finished is None:
             return "budget"
         began, (state, portrait, epochs) = state.progress, finished
@@ -102,7 +103,7 @@ def rehearse(method: Method, first: State) -> State:
         _refuse_luck(method, trials, _asked(method, state))
         state = _told(method, state, trials, _scores(trials, made_up.random))
         has_portrait = has_portrait or trials.portrait
-    portrait = Portrait({}, [], [], {}) if has_portrait else None
+    portrait = Portrait({}, [], [], {}, [], [], []) if has_portrait else None
     _record(method, first.progress, state.progress, portrait, 0, 0.0)
     return state
 
@@ -196,7 +197,7 @@ def _run_generation(
     method: Method,
     state: State,
     evaluate: Evaluate,
-    castes: tuple[str, ...],
+    portray: Callable[[Outcome], Portrait],
     settings: RunSettings,
 ) -> tuple[State, Portrait | None, int] | None:
     """Return what one generation leaves, None if it cannot be paid.
@@ -218,7 +219,7 @@ def _run_generation(
         epochs += n_teams * (settings.fittest_epochs if is_fixed else settings.epochs)
         evaluation = evaluate(trials)
         if trials.portrait:
-            portrait = describe(evaluation.outcome, castes)
+            portrait = portray(evaluation.outcome)
         state = _told(method, state, trials, evaluation.scores)
     return state, portrait, epochs
 

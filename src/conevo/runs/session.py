@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from conevo.errors import UsageError
 from conevo.evolution.protocol import State
 from conevo.runs import provenance
 from conevo.runs.champions import Team, finalists, fittest_team, sampled_generations
+from conevo.runs.evaluation import describe
 from conevo.runs.lab import Lab, refuse_other_state
 from conevo.runs.loop import evolve_generations
 from conevo.runs.store import Store
@@ -96,7 +98,7 @@ def evolve_on(
             lab.evaluate,
             settings=settings,
             main=measures_of(lab.world)[0],
-            castes=lab.world.castes,
+            portray=partial(describe, world=lab.world),
             iterations=lab.world.params.iterations,
             last=records[-1] if records else None,
             on_generation=keep,
@@ -169,7 +171,7 @@ def evolve_again(
         lab.evaluate,
         settings=replace(lab.config.run, generations=generation + 1, target=None),
         main=measures_of(lab.world)[0],
-        castes=lab.world.castes,
+        portray=partial(describe, world=lab.world),
         iterations=lab.world.params.iterations,
         on_generation=keep,
     )

@@ -103,7 +103,7 @@ def test_team(
     """
     scenarios = world.scenarios([fold(seed, "test", k) for k in range(n_scenarios)])
     outcome = simulator.evaluate(*team.as_trial(), scenarios)
-    portrait = describe(outcome, world.castes)
+    portrait = describe(outcome, world)
     fitness = outcome.fitness[0].astype(np.float64).mean(axis=1)
     return {
         "generation": team.generation,

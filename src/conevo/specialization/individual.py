@@ -12,9 +12,17 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from conevo.specialization.activity import shares
 from conevo.terms import NON_SPECIALIZED
 
-__all__ = ["NON_SPECIALIZED", "castes", "degree", "label"]
+__all__ = [
+    "NON_SPECIALIZED",
+    "castes",
+    "degree",
+    "independent_degree",
+    "label",
+    "relative_degree",
+]
 
 
 def degree(switches: npt.ArrayLike, counts: npt.ArrayLike) -> npt.NDArray[np.floating[Any]]:
@@ -33,6 +41,41 @@ def degree(switches: npt.ArrayLike, counts: npt.ArrayLike) -> npt.NDArray[np.flo
     s: npt.NDArray[np.floating[Any]] = np.zeros_like(possible)
     np.divide(changed, possible, out=s, where=possible > 0)
     return s
+
+
+def independent_degree(counts: npt.ArrayLike) -> npt.NDArray[np.floating[Any]]:
+    """Return the S that independent draws from a robot's own shares would give, [...].
+
+    1 - sum of the squared shares: each of the N possible switches is made if two draws differ. From
+    0 (one action only) to 1 - 1 / A (all equally often). The null of S: in turn or in blocks, a
+    robot's S is above or below it with the same shares. 0 if no action was executed.
+
+    Args:
+        counts: [..., A] how often each action was executed.
+    """
+    share = shares(counts)
+    squared = (share**2).sum(axis=-1)
+    drawn: npt.NDArray[np.floating[Any]] = np.where(squared > 0, 1 - squared, 0.0)
+    return drawn
+
+
+def relative_degree(
+    specialization: npt.ArrayLike, independent: npt.ArrayLike
+) -> npt.NDArray[np.floating[Any]]:
+    """Return S over the S of independent draws, [...].
+
+    0 = always the same action, 1 = as often switched as by independent draws from the same shares,
+    up to 9/4 (a, b, a) = in turn. Choice: 0 where S is 0, also for one action only, where
+    independent draws would not switch either.
+
+    Args:
+        specialization: [...] S.
+        independent: [...] ``independent_degree`` of the same actions.
+    """
+    s, drawn = np.asarray(specialization, float), np.asarray(independent, float)
+    relative: npt.NDArray[np.floating[Any]] = np.zeros_like(s)
+    np.divide(s, drawn, out=relative, where=(s > 0) & (drawn > 0))
+    return relative
 
 
 def label(

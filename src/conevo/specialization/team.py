@@ -19,7 +19,13 @@ from conevo.specialization.diversity import (
     system_neural_diversity,
 )
 from conevo.specialization.entropy import activity_entropy, division_of_labour, mutual_information
-from conevo.specialization.individual import NON_SPECIALIZED
+from conevo.specialization.favourite import (
+    affinity,
+    favourite_share,
+    mean_where_defined,
+    portion_devoted,
+)
+from conevo.specialization.individual import NON_SPECIALIZED, relative_degree
 from conevo.specialization.switching import switching_index
 from conevo.terms import S_SCALE
 
@@ -34,11 +40,20 @@ class Activity:
         counts: [R, A] how often each robot executed each action.
         specialization: [R] degree of specialization S of each robot.
         labels: [R] caste of each robot.
+        independent: [R] the S that independent draws from its own shares would give.
+        settings: columns of the counts among which a robot chooses (``World.settings``).
     """
 
     counts: npt.NDArray[Any]
     specialization: npt.NDArray[np.floating[Any]]
     labels: Sequence[str]
+    independent: npt.NDArray[np.floating[Any]]
+    settings: Sequence[int]
+
+    @property
+    def work(self) -> npt.NDArray[Any]:
+        """How often each robot used each setting, [R, K]."""
+        return self.counts[:, list(self.settings)]
 
 
 @dataclass(frozen=True)
@@ -47,7 +62,7 @@ class Metric:
 
     Attributes:
         function: takes it; None where it is not defined.
-        span: from which value to which, R robots and A actions.
+        span: from which value to which, R robots, A actions and K settings.
         what: what it says, and what its extremes mean.
         source: where it is from.
     """
@@ -70,6 +85,44 @@ METRICS: dict[str, Metric] = {
         "0 to 1",
         "portion of the robots that are specialized",
         "Nitschke 2009, 3.2.3",
+    ),
+    "independent_specialization": Metric(
+        lambda team: float(np.mean(team.independent)),
+        "0 to 1 - 1 / A",
+        "mean S of independent draws from each robot's own shares; 0: one action each",
+        "1 - sum of p squared, the null of eq. 3.4",
+    ),
+    "relative_specialization": Metric(
+        lambda team: float(np.mean(relative_degree(team.specialization, team.independent))),
+        "0 to 9 / 4",
+        "S over that of independent draws, mean; 0: always the same action, 1: as if drawn, "
+        "above: in turn",
+        "eq. 3.4 over its null",
+    ),
+    "favourite_setting": Metric(
+        lambda team: mean_where_defined(favourite_share(team.work)),
+        "1 / K to 1",
+        "share of its favourite in the settings that a robot used, mean; 1: always the same one, "
+        "1 / K: all alike; S does not see it",
+        "after Nitschke 2009, 5.2: one of three settings",
+    ),
+    "affinity": Metric(
+        lambda team: mean_where_defined(affinity(team.work)),
+        "0 to 1",
+        "share of the favourite setting less that of the next, mean; 1: always the same one",
+        "Murciano et al. 1997, as section 2.3 has it",
+    ),
+    "devoted": Metric(
+        lambda team: portion_devoted(team.work),
+        "0 to 1",
+        "portion of the robots with more than half of their work in one setting",
+        "O'Donnell and Jeanne 1990",
+    ),
+    "favourite_action": Metric(
+        lambda team: mean_where_defined(favourite_share(team.counts)),
+        "1 / A to 1",
+        "share of time in a robot's favourite action, mean; 1: all its time on one",
+        "Solow and Szmerekovsky, section 2.3",
     ),
     "switching_index": Metric(
         lambda team: switching_index(team.specialization, team.counts.shape[1]),

@@ -132,8 +132,21 @@ def faults_of_names(world: World) -> Iterator[str]:
             yield f"{what} must be a tuple of names, as in ('rest',), not {names!r}"
         elif twice := next((name for name in names if names.count(name) > 1), ""):
             yield f"{what} has {twice!r} twice"
+    yield from _of_settings(world)
     if len(world.castes) < len(world.actions):
         yield f"castes has {len(world.castes)} names, fewer than the {len(world.actions)} actions"
+
+
+def _of_settings(world: World) -> Iterator[str]:
+    if not hasattr(world, "settings"):
+        return
+    names: Any = world.settings
+    if not (isinstance(names, tuple) and names and all(isinstance(n, str) for n in names)):
+        yield f"settings must be a tuple of castes, as in {world.castes[:1]!r}, not {names!r}"
+    elif twice := next((name for name in names if names.count(name) > 1), ""):
+        yield f"settings has {twice!r} twice"
+    elif other := next((name for name in names if name not in world.castes), ""):
+        yield str(unknown_name("caste", other, world.castes, "in settings"))
 
 
 def _of_phases(simulation: Simulation) -> Iterator[str]:

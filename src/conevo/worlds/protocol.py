@@ -21,6 +21,7 @@ __all__ = [
     "World",
     "kernel_params",
     "names_of",
+    "setting_columns",
 ]
 
 
@@ -221,6 +222,10 @@ class World(Protocol):
     A world may have a property ``optimum``: the largest possible value of its main task performance
     measure, of which reports then give the share. It has none if smaller is better.
 
+    Its class may have ``settings``, the castes among which a robot chooses when it works, in the
+    order of ``castes``: with which setting a rover detects. The rest, as moving, is what it does in
+    between. Without it all castes are settings.
+
     Its class may have ``drawn``, what replay and film draw next to its robots (``playback.drawn``).
 
     A world that is not written in Warp has, in place of ``simulation``, a method
@@ -256,3 +261,9 @@ class World(Protocol):
 
     def simulation(self) -> Simulation:
         """Return the Warp side of this world (imports Warp)."""
+
+
+def setting_columns(world: World) -> tuple[int, ...]:
+    """Return the columns of ``Outcome.counts`` among which a robot of a world chooses."""
+    chosen = getattr(world, "settings", world.castes)
+    return tuple(world.castes.index(name) for name in chosen)

@@ -12,14 +12,20 @@ from conevo.analysis.exhibits import Column, Section, Table, number, plain
 from conevo.analysis.sections.scope import Scope, span
 from conevo.specialization.diversity import task_specialization
 from conevo.specialization.team import METRICS
-from conevo.terms import S_SCALE
+from conevo.terms import S_SCALE, SHARE_SCALE
 
 __all__ = ["definitions", "metrics"]
 
 MOST_COLUMNS = 5  # of treatments next to each other; more are below each other
 DIVERSITY = "hierarchic_social_entropy"
 PAYS = "diversity that pays"
-TITLES = {"specialization": f"S ({S_SCALE})"}
+DIRECTIONS = {
+    "specialization": S_SCALE,
+    "relative_specialization": "0 = always the same action, 1 = as if drawn",
+    "favourite_setting": SHARE_SCALE,
+    "affinity": SHARE_SCALE,
+    "favourite_action": SHARE_SCALE,
+}
 
 
 def metrics(scope: Scope) -> Section:
@@ -51,7 +57,8 @@ def metrics(scope: Scope) -> Section:
         for metric in names:
             row: dict[str, str] = {
                 "environment": environment,
-                "metric": TITLES.get(metric, metric.replace("_", " ")),
+                "metric": _title(metric)
+                + (f" ({DIRECTIONS[metric]})" if metric in DIRECTIONS else ""),
             }
             for treatment in treatments:
                 values = found.get((metric, Cell(environment, treatment)))
@@ -98,6 +105,10 @@ def metrics(scope: Scope) -> Section:
     return Section(title, (), [table])
 
 
+def _title(metric: str) -> str:
+    return "S" if metric == "specialization" else metric.replace("_", " ")
+
+
 def _what_pays(
     scope: Scope,
     environment: str,
@@ -123,7 +134,7 @@ def definitions() -> Section:
     """Return what each measure is, its range, and where it is from."""
     rows = [
         {
-            "name": "S" if name == "specialization" else name.replace("_", " "),
+            "name": _title(name),
             "span": metric.span,
             "what": metric.what,
             "source": metric.source,
@@ -145,6 +156,6 @@ def definitions() -> Section:
         Column("what", "meaning", plain),
         Column("source", "source", plain),
     ]
-    note = "R: robots of the team, A: actions of the world."
+    note = "R: robots of the team, A: actions of the world, K: its settings."
     table = Table("measures", "Measures of specialization: definitions", note, columns, rows)
     return Section("Definitions of the measures of specialization", (), [table])

@@ -79,7 +79,8 @@ type has a region, and with ``starts = "by_robot"`` so has a robot: three sector
 **Castes** (6.1.1) go by how a robot spends its time: activating its detection sensors; gripping or
 moving with an object (gatherer); from its arrival in the home area on, or from its grip there, with
 an object that is then built in (constructor). Choice: a robot that mostly moves with empty hands
-has none of these, and is non-specialized.
+has none of these, and is non-specialized. Choice: the other nine are the settings among which a
+robot chooses, as both its sensors and its gripper have one for each type (6.2).
 
 Version history:
 
@@ -263,6 +264,7 @@ class GaccWorld:
         *(f"{kind}-gatherer" for kind in TYPES),
         *(f"{kind}-constructor" for kind in TYPES),
     )
+    settings: ClassVar[tuple[str, ...]] = tuple(c for c in castes if c != "non-specialized")
     performance: ClassVar[tuple[Measure, ...]] = (
         Measure("delivered", "objects", low=0.0),
         Measure("completed", "complex objects", low=0.0),

@@ -221,6 +221,7 @@ class RoverWorld:
     }
     actions: ClassVar[tuple[str, ...]] = ("low", "med", "hi", "move")
     castes: ClassVar[tuple[str, ...]] = actions
+    settings: ClassVar[tuple[str, ...]] = ("low", "med", "hi")
     performance: ClassVar[tuple[Measure, ...]] = (
         Measure("value", "points", low=0.0),
         Measure("area", "share of the square", low=0.0, high=1.0),
