@@ -33,6 +33,7 @@ VERBS = {
     "film": "Make a film of a run's fittest team (GIF, MP4).",
     "watch": "Follow runs live in the browser.",
     "behaviours": "Classify what robots do, each and together.",
+    "signal": "Measure how well trials tell genotypes apart.",
     "campaign": "Start, monitor, stop and retry campaigns of many runs.",
     "report": "Write a campaign's report: page, tables, figures, data.",
     "query": "Query a campaign's tables with SQL.",

@@ -18,11 +18,11 @@ if TYPE_CHECKING:
     from conevo.runs.config import RunConfig
     from conevo.runs.time_limit import TimeLimit
 
-__all__ = ["Order", "setting_options"]
+__all__ = ["Order", "setting_options", "settings_only"]
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 PLACE = "on the command line"
-OPTIONS = (
+SETTINGS = (
     click.option(
         "--method", metavar="NAME",
         help="cone (default), mesp, ccga, hetcne, homcne, cone-1..3, or FILE.py:NAME.",
@@ -39,6 +39,9 @@ OPTIONS = (
     click.option(
         "--config", metavar="FILE", help="TOML file with settings, such as a run's config.toml."
     ),
+)  # fmt: skip
+OPTIONS = (
+    *SETTINGS,
     click.option(
         "--budget-evaluations", type=int,
         help="Spend at most this many team evaluations."
@@ -59,6 +62,13 @@ OPTIONS = (
 def setting_options(function: Function) -> Function:
     """Add the options that say what to start, and where."""
     for option in reversed(OPTIONS):
+        function = option(function)
+    return function
+
+
+def settings_only(function: Function) -> Function:
+    """Add the options that say what a run would be, for a command that starts none."""
+    for option in reversed(SETTINGS):
         function = option(function)
     return function
 

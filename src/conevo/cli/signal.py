@@ -1,0 +1,173 @@
+"""``conevo signal``: how well a method's trials tell the genotypes apart that it selects from."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from conevo.cli.carry import device_option
+from conevo.cli.options import Order, settings_only
+from conevo.errors import UsageError
+
+if TYPE_CHECKING:
+    from conevo.runs.run import Run
+
+__all__ = ["signal"]
+
+
+@click.command(short_help="Measure how well trials tell genotypes apart.")
+@click.argument("what", metavar="RUN|WORLD/ENVIRONMENT", required=False)
+@settings_only
+@click.option(
+    "--units", type=click.IntRange(2, 1_000_000), metavar="N",
+    help="Genotypes tried of each population, or of neurons each sub-population (default: 20; of a "
+    "single population 3 for every robot, at least 20).",
+)  # fmt: skip
+@click.option(
+    "--trials", type=click.IntRange(2, 1_000_000), metavar="N", default=50, show_default=True,
+    help="Trials of each genotype.",
+)  # fmt: skip
+@click.option(
+    "--threads", type=click.IntRange(1, 4096),
+    help="CPU threads (default: all); does not change results.",
+)  # fmt: skip
+@device_option
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+def signal(
+    what: str | None,
+    units: int | None,
+    trials: int,
+    threads: int | None,
+    device: str | None,
+    as_json: bool,
+    **settings: Any,
+) -> None:
+    """Measure the signal of a method: the share of a fitness that is the genotype's own.
+
+    Of WORLD/ENVIRONMENT, it measures the populations that a run with these settings would begin
+    with; of RUN (finished or not), those that it began with and its last ones. Nothing is written.
+
+    The same genotypes (neurons of MESP and CONE, networks of CCGA and HetCNE, clone teams of
+    HomCNE) are tried again and again, with other partners and in other scenarios. Printed is the
+    intra-class correlation with its standard error: 0 if trials say nothing about genotypes, 1 if
+    one trial says all. The reliability is that of the mean of the trials that the method gives each
+    genotype, by Spearman-Brown.
+
+    Each trial of all genotypes takes N team evaluations (--units), with a single population as
+    with many: usually 1,000 to 3,000 in all, and twice that of a RUN. The number is printed first.
+
+    Try: conevo signal rover/complex-5 --method ccga
+    """
+    from conevo.analysis.signal import measure_signal, signal_of_run
+
+    def announce(price: str) -> None:
+        click.echo(price, err=as_json)
+
+    if what is not None and _is_run(what):
+        run = _found(what, settings)
+        how: dict[str, Any] = {"threads": threads, "device": device, "announce": announce}
+        found = {"run": str(run.path)} | signal_of_run(run, units, trials, **how)
+    else:
+        order = _order(settings, threads, device, as_json)
+        found = measure_signal(
+            order.resolve(what), units, trials, threads=threads, device=order.device,
+            announce=announce,
+        )  # fmt: skip
+    click.echo(json.dumps(found) if as_json else _text(found))
+
+
+def _is_run(what: str) -> bool:
+    """Whether a run is meant: a directory, or a name without a slash that is not a world's."""
+    from conevo.runs.run import RUNS
+    from conevo.worlds.registry import WORLDS
+
+    if Path(what).is_dir() or what.startswith(f"{RUNS}/"):
+        return True
+    worlds = {name for entry in WORLDS.values() for name in (entry.name, entry.short_name)}
+    return not ("/" in what or ".py" in what or what in worlds)
+
+
+def _found(what: str, settings: dict[str, Any]) -> Run:
+    """Return a run, for which there are no settings."""
+    from conevo.cli.find import find_run
+    from conevo.cli.test import note_other_code
+
+    names = {"settings": "--set"}
+    for name, value in settings.items():
+        if value not in (None, ()):
+            raise UsageError(
+                f"{names.get(name, f'--{name}')} belongs to WORLD/ENVIRONMENT; the run {what} has "
+                f"its own settings"
+            )
+    run = find_run(what)
+    note_other_code(run)
+    return run
+
+
+def _order(
+    settings: dict[str, Any], threads: int | None, device: str | None, as_json: bool
+) -> Order:
+    """Return what the options ask for of a run that is not started."""
+    from conevo.runs.time_limit import TimeLimit
+
+    return Order(
+        **settings,
+        budget_evaluations=None,
+        threads=threads,
+        device=device or "cpu",
+        out=None,
+        limit=TimeLimit(None),
+        as_json=as_json,
+        quiet=False,
+        verbose=False,
+    )
+
+
+def _text(found: dict[str, Any]) -> str:
+    from conevo.analysis.repeatability import has_signal
+    from conevo.cli.text import number, table
+    from conevo.evolution.methods.registry import title_of
+    from conevo.terms import counted
+
+    rows = found["signal"]
+    head = ["generation", "ICC of a trial", "trials", "reliability", "95 % interval"]
+    cells = [
+        [
+            str(row["number"]),
+            _plus_minus(row["icc"], row["standard_error"]),
+            str(row["scheme"]),
+            _decimals(row["icc_of_scheme"]),
+            "-"
+            if row["low_of_scheme"] is None
+            else f"{_decimals(row['low_of_scheme'])} to {_decimals(row['high_of_scheme'])}",
+            number(row["rounds_for_half"]),
+        ]
+        for row in rows
+    ]
+    lines = [
+        "",
+        f"{found['task']}, {title_of(found['method'])}: fitness of a {rows[0]['unit']}",
+        table([*head, "rounds for .5"], cells),
+    ]
+    if not has_signal(rows[0]["icc_of_scheme"]):
+        lines.append("\nNo signal: selection among these genotypes is nearly blind.")
+    for row in rows:
+        if row["left_out"]:
+            left = counted(row["left_out"], "genotype")
+            lines.append(f"Generation {row['number']}: {left} left out, with no finite fitness.")
+    return "\n".join(lines)
+
+
+def _decimals(value: float | None) -> str:
+    return "-" if value is None else f"{value:.3f}"
+
+
+def _plus_minus(value: float | None, error: float | None) -> str:
+    """Return "0.055 +- 0.006", with as many decimals as the error has digits that matter."""
+    if value is None or error is None:
+        return "-" if value is None else f"{value:.4f}"
+    digits = 3 if error >= 0.0095 else 4 if error >= 0.00095 else 5
+    return f"{value:.{digits}f} +- {error:.{digits}f}"
