@@ -168,3 +168,21 @@ def test_watch_refuses_a_device_that_is_not_here(say, monkeypatch) -> None:
     assert said.code == 3
     assert said.err.startswith("conevo: error: device 'cuda:7': no CUDA device on this machine")
     assert say("watch", "here", "--device", "cpu", "--no-browser").code == 0
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("rover/complex-1 --method cone-2 --set sd=label", "method.sd = 'label' on the command"),
+        ("rover/complex-1 --method cone-3 --set exchange_share=0.5", "method.exchange_share = 0.5"),
+        ("prey/shaping-1 --method mesp --set migration_every=2", "method.migration_every = 2"),
+    ],
+)  # fmt: skip
+def test_a_setting_without_effect_is_one_line_and_nothing_is_written(
+    words: str, said: str, say, tmp_path: Path
+) -> None:
+    for dry in ((), ("--dry-run",)):
+        told = say("run", *words.split(), "--preset", "smoke", *dry)
+        assert (told.code, told.out, told.err.count("\n")) == (2, "", 1)
+        assert said in told.err
+    assert list(tmp_path.iterdir()) == []

@@ -163,6 +163,7 @@ def test_without_a_share_of_the_pairs_nothing_is_exchanged(name: str) -> None:
         ("cone-3", {"pairing": "all"}, "method.pairing = 'all': has no effect without the spec"),
         ("cone-3", {"exchange_slots": "same"}, "method.exchange_slots = 'same': has no effect wi"),
         ("cone-3", {"exchange_share": 0.5}, "method.exchange_share = 0.5: has no effect without"),
+        ("cone-3", {"thresholds_from": "ancestor"}, "method.thresholds_from = 'ancestor': has no"),
         ("cone", {"type_c": "off", "type_c_rounds": 3}, "method.type_c_rounds = 3: has no effect"),
         ("cone", {"exchange_share": 1.5}, "method.exchange_share = 1.5: must be less than or eq"),
         ("cone", {"sd": "caste"}, "method.sd = 'caste': must be 'switching', 'shares' or 'label'"),

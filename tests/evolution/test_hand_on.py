@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields, is_dataclass, replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from conevo.evolution import METHODS, Layout, Progress, Scores, State, method
 from conevo.evolution.inheritance import breed_from, hand_on
 
 LAYOUT = Layout(n_robots=2, n_hidden=3, max_hidden=5, n_genes=4)
+CONE = method("cone").config
 TAKEN = {"genes", "active", "progress.n_hidden"}
 every_method = pytest.mark.parametrize("name", METHODS)
 
@@ -62,6 +64,31 @@ def test_genes_and_slots_are_taken_over_and_all_else_begins_anew(name: str) -> N
     new, fresh = hand_on(learner, LAYOUT, 7, old), learner.init(LAYOUT, 7)
     same(new, old, TAKEN)
     same(new, fresh, contents(fresh).keys() - TAKEN)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "taken"),
+    [("cone", "cone", {"sst", "gst"}), ("cone", "cone-1", {"sst"}), ("cone-2", "cone-2", {"gst"})],
+)
+def test_thresholds_may_go_on_where_they_were(old: str, new: str, taken: set[str]) -> None:
+    before: Any = evolve(build(old), build(old).init(LAYOUT, 3), 2)
+    before = replace(before, **dict.fromkeys(sorted(taken), 0.375))
+    learner = method(new, genotypes=6, elite_portion=0.5, thresholds_from="ancestor")
+    after, fresh = hand_on(learner, LAYOUT, 7, before), learner.init(LAYOUT, 7)
+    same(after, before, TAKEN | taken)
+    same(after, fresh, contents(fresh).keys() - TAKEN - taken)
+    for name in taken:
+        assert (getattr(after, name), getattr(fresh, name)) == (0.375, getattr(CONE, name))
+
+
+def test_thresholds_that_an_ancestor_does_not_have_are_refused() -> None:
+    learner = method("cone", genotypes=6, thresholds_from="ancestor")
+    for name, missing in (("mesp", "sst"), ("cone-1", "gst"), ("cone-2", "sst")):
+        with pytest.raises(UsageError, match=f"what this run begins with has no {missing}"):
+            hand_on(learner, LAYOUT, 3, build(name).init(LAYOUT, 3))
+    genes, active = np.zeros((2, 5, 4), dtype=np.float32), np.ones((2, 5), dtype=bool)
+    with pytest.raises(UsageError, match="what this run begins with has no sst"):
+        breed_from(learner, LAYOUT, 3, genes, active)
 
 
 @every_method

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Any
 
@@ -9,6 +10,7 @@ import numpy as np
 
 from conevo.errors import UsageError
 from conevo.evolution.generation import Populations
+from conevo.evolution.methods.cone import ConeState
 from conevo.evolution.protocol import BoolArray, FloatArray, Layout, Method, State
 from conevo.evolution.variation import VariationConfig, mutate, perturb
 from conevo.rng import stream
@@ -25,8 +27,9 @@ def hand_on(method: Method, layout: Layout, root: int, state: State) -> State:
     Nitschke 2009, sections 4.3 and 6.4.2: each experiment starts from the last. Genes and slots in
     use are taken over; of a state between two generations these are the children of the last one.
 
-    Choice: fitness of different tasks does not compare, so thresholds, windows, histories, partners
-    and counters begin anew. Choice: in a team with more robots than before population p begins as
+    Choice: fitness of different tasks does not compare, so windows, histories, partners and
+    counters begin anew, and thresholds unless ``thresholds_from`` of CONE's parameters says where
+    they were. Choice: in a team with more robots than before population p begins as
     a copy of population p mod P; in a smaller one the last populations are left behind.
 
     Args:
@@ -37,7 +40,8 @@ def hand_on(method: Method, layout: Layout, root: int, state: State) -> State:
 
     Raises:
         UsageError: slots, genotypes or genes are not as many as before, genotypes are whole
-            networks in one of the two only, or one of the two has no populations.
+            networks in one of the two only, one of the two has no populations, or ``state`` does
+            not have the thresholds that are asked for.
     """
     fresh = method.init(layout, root)
     if not (isinstance(fresh, Populations) and isinstance(state, Populations)):
@@ -61,6 +65,7 @@ def hand_on(method: Method, layout: Layout, root: int, state: State) -> State:
         )
     source = np.arange(new[0]) % old[0]
     active = state.active[source]
+    fresh = _with_thresholds(fresh, method, state)
     return _with(fresh, state.genes[source], active)
 
 
@@ -82,7 +87,7 @@ def breed_from(
 
     Raises:
         UsageError: slots or genes are not as many as in the task, or the method's networks, which
-            keep their size, have another one, or it has no populations.
+            keep their size, have another one, or it has no populations, or asks for thresholds.
     """
     fresh = method.init(layout, root)
     if not isinstance(fresh, Populations):
@@ -90,6 +95,7 @@ def breed_from(
             f"no population can be bred from this team: {method.title} has none that a run could "
             f"begin with (its state is not a {Populations.__module__}.{Populations.__name__})"
         )
+    fresh = _with_thresholds(fresh, method, None)
     n_populations, n_slots, n_genotypes, n_genes = fresh.genes.shape
     n_robots = len(genes)
     different = [
@@ -141,6 +147,27 @@ def refuse_idle(config: Any, place: str = "here") -> None:
             f"method.start_noise = {noise:g} does nothing {place}: it is for populations bred from "
             f"a champion (conevo run --from-champion RUN)"
         )
+
+
+def _with_thresholds(fresh: Populations, method: Method, state: State | None) -> Populations:
+    """Return generation 0 with the thresholds of a state, if CONE's parameters ask for these.
+
+    Raises:
+        UsageError: it has none.
+    """
+    if not isinstance(fresh, ConeState) or method.config.thresholds_from == "settings":
+        return fresh
+    found: dict[str, Any] = {
+        name: getattr(state, name, math.nan)
+        for name in ("sst", "gst")
+        if not math.isnan(getattr(fresh, name))
+    }
+    if missing := [name for name, value in found.items() if math.isnan(value)]:
+        raise UsageError(
+            f"method.thresholds_from = 'ancestor': what this run begins with has no {missing[0]} "
+            f"(populations of a method with that threshold have one, a champion has none)"
+        )
+    return replace(fresh, **found)
 
 
 def _with(fresh: Populations, genes: FloatArray, active: BoolArray) -> Populations:

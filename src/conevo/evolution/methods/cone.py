@@ -61,6 +61,10 @@ class ConeConfig(MespConfig):
     """the "mean" or "sum" of the distances of rank-paired elites. Choice: the mean."""
     threshold_step: Annotated[float, Ge(0), Le(1)] = 0.01
     """change of a threshold (section 3.5: 1 %). Choice: absolute."""
+    thresholds_from: Literal["settings", "ancestor"] = "settings"
+    """where SST and GST begin in a run that begins with another one's populations (``--from``, a
+    stage of shaping): at the "settings" ``sst`` and ``gst``, or where they ended in that run, its
+    "ancestor". Choice: the settings; section 3.5 is silent."""
     type_c: Literal["own", "team", "off"] = "own"
     """whose fitness ranks the elite (type C): "own" is that of the robot on trial, as for type A;
     "team" is the mean of all robots; "off" leaves the order of type A and saves the evaluations.
@@ -94,9 +98,8 @@ class ConeConfig(MespConfig):
         if not self.use_sdm:
             self._refuse("pairing", "sd", unless="the specialization difference metric (use_sdm)")
         if not (self.use_sdm or self.use_gdm):
-            self._refuse(
-                "exchange_slots", "exchange_share", unless="a difference metric (use_sdm, use_gdm)"
-            )
+            keys = ("exchange_slots", "exchange_share", "thresholds_from")
+            self._refuse(*keys, unless="a difference metric (use_sdm, use_gdm)")
         if self.type_c == "off":
             self._refuse("type_c_rounds", unless="type C fitness (type_c)")
 
