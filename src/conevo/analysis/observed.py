@@ -77,13 +77,14 @@ class Observed:
 
     @property
     def behaviours(self) -> list[dict[str, Any]]:
-        """Rows {kind, behaviour, count}: individual, collective and the team's usual one."""
+        """Rows {kind, behaviour, count}: individual, collective, its members, the usual one."""
         labels = Counter(self.labels)
         usual, together = self.seen.collectives
         counts = [
             *(("individual", name, labels[name]) for name in self.study.BEHAVIOURS),
             ("individual", NON_SPECIALIZED, labels[NON_SPECIALIZED]),
             *(("collective", name, n) for name, n in together.items()),
+            *(("member", name, n or 0) for name, n in self.seen.composition(self.labels).items()),
             ("team", usual, sum(together.values())),
         ]
         return [{"kind": kind, "behaviour": name, "count": n} for kind, name, n in counts]

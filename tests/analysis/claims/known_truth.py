@@ -23,11 +23,13 @@ MEASURES = {
     "rover-v2": ("value", "area"),
     "pursuit-v2": ("capture_time",),
     "gacc-v2": ("delivered",),
+    "prey-v2": ("path",),
 }
 CASTES = {
     "rover-v2": ("low", "hi", "non-specialized"),
     "pursuit-v2": ("pursuer", "blocker", "non-specialized"),
     "gacc-v2": ("A-detector", "B-gatherer", "non-specialized"),
+    "prey-v2": ("move-1",),
 }
 
 
@@ -45,6 +47,8 @@ class Cell:
         several: share of the runs with all of these; the others have the first alone.
         seen: collective behaviour -> share of the runs that show it.
         idle: share of the runs with an idle predator.
+        members: collective behaviours with specialized predators; others are non-specialized.
+        hidden: hidden neurons of the champion.
         evaluations: team evaluations of every run.
         stage: of a shaping.
         exchanges, exchange_share: pairs that recombine between populations in a generation, and
@@ -60,6 +64,8 @@ class Cell:
     several: float = 1.0
     seen: dict[str, float] = field(default_factory=dict)
     idle: float = 0.0
+    members: tuple[str, ...] = ()
+    hidden: float = 10.0
     evaluations: int = 50_000
     stage: int = 0
     exchanges: float = 5.0
@@ -106,16 +112,33 @@ def rover() -> Truth:
     return truth
 
 
+# Share of the runs that show a behaviour, by team type: most where it works best (4.5.1 to 4.5.4).
+ENTRAPMENT = (0.4, 1, 1, 0.4, 0.4, *[0.95] * 4, 1)
+SEEN: dict[str, dict[str, tuple[float, ...]]] = {
+    "homcne": {"entrapment": ENTRAPMENT},
+    "hetcne": {"entrapment": ENTRAPMENT},
+    "ccga": {
+        "pursuer-blocker": (0, 1, 1, 0.3, 0.3, *[0.8] * 4, 0.7),
+        "spiders-fly": (1, 1, 1, 0, 0, *[0.2] * 5),
+    },
+    "mesp": {
+        "pursuer-blocker": (0, 1, 1, 0.3, 0.3, *[0.9] * 4, 0.8),
+        "spiders-fly": (1, 1, 1, 0, 0, *[0.1] * 5),
+    },
+    "cone": {
+        "spiders-fly": (1, 1, 1, 0, 0, *[0.4] * 5),
+        "role-switcher": (0, 1, 1, 1, 1, *[0.8] * 5),
+    },
+}
+
+
 def pursuit() -> Truth:
     """Return what the thesis says of predators."""
     truth: Truth = {}
-    seen: dict[str, dict[str, float]] = {
-        "homcne": {"entrapment": 0.8},
-        "hetcne": {"entrapment": 0.8},
-        "ccga": {"pursuer-blocker": 0.65, "spiders-fly": 0.4},
-        "mesp": {"pursuer-blocker": 0.7, "spiders-fly": 0.35},
-        "cone": {"spiders-fly": 0.5, "role-switcher": 0.8},
-    }
+    loss = dict(zip(METHODS, (0.2, 0.2, 0.35, 0.35, 0.5), strict=True))
+    members = {2: dict.fromkeys(("homcne", "hetcne"), ()), 3: {}, 4: {}}
+    members[3] = dict.fromkeys(("ccga", "mesp"), ("pursuer-blocker", "spiders-fly"))
+    members[4] = {"cone": ("role-switcher", "spiders-fly")}
     for n in range(1, 11):
         level = 400 if n <= 5 else 200
         is_better = n in (4, 5, 8, 9, 10)
@@ -126,8 +149,9 @@ def pursuit() -> Truth:
             value = level * (1.5 if is_best and is_better else 0.6 if is_low else 1)
             truth[f"team-{n}", method] = Cell(
                 value,
-                loss=0.5 if method == "cone" else 0.35,
-                seen=seen.get(method, {}),
+                loss=loss.get(method, 0.35),
+                seen={name: share[n - 1] for name, share in SEEN.get(method, {}).items()},
+                members=members.get(n, {}).get(method, ("entrapment",)),
                 idle=0.8 if method == "cone" and is_better else 0.0,
             )
     return truth
@@ -154,7 +178,21 @@ def gacc() -> Truth:
     return truth
 
 
-TRUTHS = {"R": ("rover-v2", rover), "P": ("pursuit-v2", pursuit), "G": ("gacc-v2", gacc)}
+def prey() -> Truth:
+    """Return what the thesis says of prey."""
+    return {
+        (f"shaping-{n}", method): Cell(600 if method == "cone" else 400, hidden=3.0)
+        for n in range(1, 7)
+        for method in METHODS
+    }
+
+
+TRUTHS = {
+    "rover": ("rover-v2", rover),
+    "pursuit": ("pursuit-v2", pursuit),
+    "prey": ("prey-v2", prey),
+    "gacc": ("gacc-v2", gacc),
+}
 
 
 def write_tables(
@@ -190,7 +228,7 @@ def write_tables(
             )
             for table, row in _results(run, world, environment, cell, seed, n, noise, studies):
                 rows[table].append(row)
-    for name in ("runs", "scores", "robots", "behaviours"):
+    for name in ("runs", "scores", "champions", "generations", "robots", "behaviours"):
         text = folder / f"{name}.jsonl"
         text.write_text("".join(json.dumps(row) + "\n" for row in rows[name]) or "")
         if rows[name]:
@@ -271,6 +309,9 @@ def _results(
 
     yield from played("test", "champion")
     yield from played("test", "generation 0", 0.1)
+    for generation, hidden in ((8, cell.hidden), (9, 10.0)):
+        yield "generations", {"run": run, "generation": generation, "hidden": hidden}
+    yield "champions", {"run": run, "generation": 8, "measure": MEASURES[world][0]}
     if not studies:
         return
     several = seed <= round(cell.several * n)
@@ -306,10 +347,13 @@ def _behaviours(
 ) -> Iterator[tuple[str, dict[str, Any]]]:
     labels = dict.fromkeys(specialists, 1) | {"idle": int(seed <= round(cell.idle * n))}
     captures = {
-        name: 2 * int(seed <= round(cell.seen.get(name, 0.0) * n))
+        name: (2 + seed % 3) * int(seed <= round(cell.seen.get(name, 0.0) * n))
         for name in ("entrapment", "pursuer-blocker", "spiders-fly", "role-switcher", "none")
     }
-    for kind, counts in (("individual", labels), ("collective", captures)):
+    members = dict.fromkeys((*captures, "non-specialized"), 0) | {"non-specialized": 1}
+    members |= dict.fromkeys(cell.members, 1)
+    of_kinds = {"individual": labels, "collective": captures, "member": members}
+    for kind, counts in of_kinds.items():
         for name, count in counts.items():
             yield "behaviours", {"run": run, "kind": kind, "behaviour": name, "count": count}
     usual = max(captures, key=lambda name: captures[name])

@@ -213,6 +213,34 @@ def test_behaviours_that_a_run_shows(tmp_path: Path) -> None:
     assert read(tmp_path, "idle predators") == 0
 
 
+def test_captures_and_members_of_collective_behaviours(tmp_path: Path) -> None:
+    rows = behaviours("collective", entrapment=0, pursuer_blocker=3, spiders_fly=1)
+    rows += behaviours("member", entrapment=0, pursuer_blocker=2, spiders_fly=1, non_specialized=1)
+    write(tmp_path, runs=[RUN], behaviours=rows)
+    assert read(tmp_path, "captures by pursuer-blocker") == 3
+    assert read(tmp_path, "captures by entrapment") == 0
+    assert read(tmp_path, "members of pursuer-blocker and spiders-fly") == 1
+    assert read(tmp_path, "members of spiders-fly and role-switcher") == 0
+    assert read(tmp_path, "members of nothing") == 0
+    write(tmp_path, behaviours=behaviours("member", entrapment=0, non_specialized=3))
+    assert read(tmp_path, "members of nothing") == 1
+    write(tmp_path, behaviours=behaviours("collective", entrapment=2))  # of an earlier version
+    assert read(tmp_path, "members of nothing") is None
+
+
+@pytest.mark.parametrize(("hidden", "is_three"), [(3.0, 1), (3.4, 1), (5.0, 0)])
+def test_hidden_neurons_are_those_of_the_champions_generation(
+    hidden: float, is_three: int, tmp_path: Path
+) -> None:
+    generations = [
+        {"run": "a", "generation": 4, "hidden": hidden},
+        {"run": "a", "generation": 5, "hidden": 3.0 if not is_three else 9.0},
+    ]
+    champions = [{"run": "a", "generation": 4, "measure": name} for name in ("path", "collided")]
+    write(tmp_path, runs=[RUN], generations=generations, champions=champions)
+    assert read(tmp_path, "three hidden neurons") == is_three
+
+
 @pytest.mark.parametrize(
     ("labels", "is_complementary"),
     [

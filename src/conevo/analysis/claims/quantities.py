@@ -39,6 +39,19 @@ SEEN = """
     SELECT run, bool_or(kind = '{kind}' AND behaviour = '{behaviour}' AND count > 0)::INTEGER
     FROM behaviours GROUP BY run
 """
+CAPTURES = """
+    SELECT run, sum(count) FILTER (WHERE behaviour = '{behaviour}') FROM behaviours
+    WHERE kind = 'collective' GROUP BY run
+"""
+MEMBERS = """
+    SELECT run, (coalesce(string_agg(behaviour, ' and ' ORDER BY behaviour)
+        FILTER (WHERE count > 0), '') = '{behaviours}')::INTEGER
+    FROM behaviours WHERE kind = 'member' GROUP BY run
+"""
+HIDDEN = """
+    SELECT run, bool_or(round(g.hidden) = {n})::INTEGER
+    FROM generations g JOIN champions c USING (run, generation) GROUP BY run
+"""
 CASTES = "SELECT run, ({condition})::INTEGER FROM robots GROUP BY run"
 HAS_ANY = "bool_or(caste = 'non-specialized')"
 SPECIALIZED = "count(DISTINCT caste) FILTER (WHERE caste NOT IN ('non-specialized', 'move'))"
@@ -107,6 +120,18 @@ def _collective(behaviour: str) -> Quantity:
     return Quantity(read, "no behaviours recorded", is_share=True)
 
 
+def _captures(behaviour: str) -> Quantity:
+    return Quantity(_query(CAPTURES.format(behaviour=behaviour)), "no behaviours recorded")
+
+
+def _members(*behaviours: str) -> Quantity:
+    """Return whether robots are specialized to these collective behaviours, and others to none."""
+    names = " and ".join(sorted(("non-specialized", *behaviours)))
+    read = _query(MEMBERS.format(behaviours=names))
+    return Quantity(read, "no members of behaviours recorded", is_share=True)
+
+
+COLLECTIVES = ("entrapment", "pursuer-blocker", "spiders-fly", "role-switcher")
 QUANTITIES: dict[str, Quantity] = {
     "value": _tested("value"),
     "area": _tested("area"),
@@ -142,10 +167,15 @@ QUANTITIES: dict[str, Quantity] = {
         "no behaviours recorded",
         is_share=True,
     ),
-    **{
-        behaviour: _collective(behaviour)
-        for behaviour in ("entrapment", "pursuer-blocker", "spiders-fly", "role-switcher")
-    },
+    **{behaviour: _collective(behaviour) for behaviour in COLLECTIVES},
+    **{f"captures by {behaviour}": _captures(behaviour) for behaviour in COLLECTIVES},
+    "members of nothing": _members(),
+    "members of pursuer-blocker and spiders-fly": _members("pursuer-blocker", "spiders-fly"),
+    "members of spiders-fly and role-switcher": _members("spiders-fly", "role-switcher"),
+    "path": _tested("path"),
+    "three hidden neurons": Quantity(
+        _query(HIDDEN.format(n=3)), "no champion recorded", is_share=True
+    ),
 }
 """Name -> what it is; ``rover``, ``pursuit`` and ``gacc`` say what claims make of them.
 
