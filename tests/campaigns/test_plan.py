@@ -70,6 +70,63 @@ def test_a_factor_may_belong_to_some_runs_only(tmp_path):
     assert read_plan(again) == plan
 
 
+NAMED = """
+[levels.ranges]
+small = { "world.low_range" = 0.05, "world.hi_range" = 0.01 }
+large = { "world.low_range" = 0.2 }
+"""
+
+
+def test_a_level_may_be_several_settings(tmp_path):
+    path = write_plan(tmp_path, factors='ranges = ["small", "large"]', more=NAMED)
+    plan = read_plan(path)
+    runs = plan.write_out()[:4]
+    assert [(run.method, run.variant) for run in runs] == [
+        ("homcne", "ranges=small"),
+        ("homcne", "ranges=large"),
+        ("cone", "ranges=small"),
+        ("cone", "ranges=large"),
+    ]
+    worlds = [run.configs()[0].world_params for run in runs]
+    assert [(one.low_range, one.hi_range) for one in worlds] == [(0.05, 0.01), (0.2, 0.03)] * 2
+    assert 0.05 in plan.values
+    again = tmp_path / "again.toml"
+    again.write_text(plan.to_toml())
+    assert read_plan(again) == plan
+    assert read_plan(again).write_out() == plan.write_out()
+
+
+def test_named_levels_may_be_of_some_runs_only(tmp_path):
+    some = '[[where]]\nmethod = "cone"\nfactors = { exchange = ["none", "all"] }\n'
+    named = '[levels.exchange]\nnone = { "method.gst" = 0.0 }\nall = { "method.gst" = 1.0 }\n'
+    runs = read_plan(write_plan(tmp_path, more=some + named)).write_out()[:3]
+    assert [run.variant for run in runs] == ["", "exchange=none", "exchange=all"]
+    assert [run.configs()[0].method_config.gst for run in runs[1:]] == [0.0, 1.0]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ('["small", "large"]', '["small", "lage"]', "level of ranges 'lage'.*mean 'large'"),
+        ("[levels.ranges]", "[levels.range]", "levels.range in .*: there is no factor 'range'"),
+        ("[levels.ranges]", "[levels.method]", "levels.method .* name of its own"),
+        ("[levels.ranges]", '[levels."a.b"]', "levels.a.b .* name of its own"),
+        ("large =", '"so, large" =', "levels.ranges.so, large .*letters, digits"),
+        ('large = { "world.low_range" = 0.2 }', "large = 2", "levels.ranges.large .* be a table"),
+        ('"world.hi_range" =', '"world.high_range" =', "'world.high_range'.*'world.hi_range'"),
+        ('"world.hi_range" = 0.01', '"run.seed" = 1', "seeds are campaign.seeds"),
+        ("[levels.ranges]", "[[levels]]", "levels in .* must be a table"),
+    ],
+)
+def test_a_wrong_level_is_one_clear_line(tmp_path, old, new, says):
+    path = write_plan(tmp_path, factors='ranges = ["small", "large"]', more=NAMED)
+    assert old in path.read_text()
+    path.write_text(path.read_text().replace(old, new, 1))
+    with pytest.raises(UsageError, match=says) as caught:
+        read_plan(path).write_out()
+    assert "\n" not in str(caught.value)
+
+
 def test_two_worlds_of_one_name_are_refused(tmp_path):
     text = (Path(__file__).parents[2] / "examples" / "light.py").read_text()
     for name in ("one.py", "two.py"):

@@ -144,6 +144,7 @@ class Plan:
         shape: whether runs are shapings, unless ``where`` says otherwise.
         studies: what is made of finished runs.
         factors: name -> levels; "world" and "method" are among them.
+        levels: name of a factor -> name of a level -> its settings, where a level is several.
         settings: of all runs.
         where: of some runs.
         place: where the plan was read, for error messages.
@@ -159,6 +160,7 @@ class Plan:
     factors: dict[str, tuple[Any, ...]]
     settings: dict[str, Any]
     where: tuple[Where, ...] = ()
+    levels: dict[str, dict[str, dict[str, Any]]] = field(default_factory=dict)
     place: str = field(default="in the plan", compare=False)
 
     def at(
@@ -247,7 +249,8 @@ class Plan:
             if one.holds(names):
                 overrides |= one.settings
                 shape = shape if one.shape is None else one.shape
-        overrides |= further
+        for factor, level in further.items():
+            overrides |= self.levels[factor][level] if factor in self.levels else {factor: level}
         if seed := {"seed", "run.seed"} & set(overrides):
             raise UsageError(f"{seed.pop()} {self.place}: a campaign's seeds are campaign.seeds")
         tasks = tasks_up_to(world) if shape else [world]
@@ -280,7 +283,8 @@ class Plan:
         found = [level for table in tables for levels in table.values() for level in levels]
         conditions = [one.conditions.get(key, ()) for one in self.where for key in IN_FILES]
         found += [name for names in conditions for name in names]
-        for table in (self.settings, *(one.settings for one in self.where)):
+        named = [settings for some in self.levels.values() for settings in some.values()]
+        for table in (self.settings, *named, *(one.settings for one in self.where)):
             found += table.values()
         return found
 
@@ -302,8 +306,14 @@ class Plan:
             )
             for one in self.where
         )
+        levels = {
+            factor: {name: of(settings) for name, settings in some.items()}
+            for factor, some in self.levels.items()
+        }
         factors, settings = each(self.factors), of(self.settings)
-        return dataclasses.replace(self, factors=factors, settings=settings, where=where)
+        return dataclasses.replace(
+            self, factors=factors, levels=levels, settings=settings, where=where
+        )
 
     def to_toml(self) -> str:
         """Return the text that ``read_plan`` turns back into this plan."""
@@ -328,7 +338,8 @@ class Plan:
             "factors": {name: list(levels) for name, levels in self.factors.items()},
             "settings": self.settings,
         }
-        return tomli_w.dumps(tables | ({"where": where} if where else {}))
+        levels = {"levels": self.levels} if self.levels else {}
+        return tomli_w.dumps(tables | levels | ({"where": where} if where else {}))
 
 
 def _levels(cells: Iterable[Mapping[str, Any]], factor: str) -> list[str]:

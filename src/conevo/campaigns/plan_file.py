@@ -27,7 +27,11 @@ run with every seed::
 
     [[where]]                      # a factor of some runs only
     method = ["cone"]
-    factors = { "method.gst" = [0.1, 0.2] }
+    factors = { "method.gst" = [0.1, 0.2], ranges = ["small", "large"] }
+
+    [levels.ranges]                # a factor whose levels are several settings
+    small = { "world.low_range" = 0.07, "world.hi_range" = 0.03 }
+    large = { "world.low_range" = 0.2, "world.hi_range" = 0.1 }
 """
 
 from __future__ import annotations
@@ -49,10 +53,11 @@ from conevo.worlds.registry import resolve as resolve_world
 __all__ = ["STUDIES", "preset_names", "read_plan", "read_preset"]
 
 STUDIES = ("teams",)
-TABLES = ("campaign", "factors", "settings", "where")
+TABLES = ("campaign", "factors", "levels", "settings", "where")
 HEAD = ("name", "title", "produces", "seeds", "preset", "shape", "studies")
 CONDITIONS = ("world", "method", "preset")
 EFFECTS = ("settings", "shape", "factors")
+NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
 RANGE = re.compile(r"(.*-)(\d+)\.\.(\d+)")
 
 
@@ -111,6 +116,7 @@ def _parse(tables: Mapping[str, Any], place: str, name: str) -> Plan:
         raise UsageError(f"where {place} must be written [[where]]")
     every_run = {"world": [], "method": []} | _table(tables, "factors", place)
     factors = _factors(every_run, "factors", place)
+    where = tuple(_where(one, factors, place) for one in wheres)
     return Plan(
         name=_name(head.get("name", name), place),
         title=_text(head.get("title", ""), "campaign.title", place),
@@ -120,22 +126,23 @@ def _parse(tables: Mapping[str, Any], place: str, name: str) -> Plan:
         shape=shape,
         studies=studies,
         factors=factors,
+        levels=_levels(tables, [factors, *(one.factors for one in where)], place),
         settings=_table(tables, "settings", place),
-        where=tuple(_where(one, factors, place) for one in wheres),
+        where=where,
         place=place,
     )
 
 
-def _table(tables: Mapping[str, Any], key: str, place: str) -> dict[str, Any]:
+def _table(tables: Mapping[str, Any], key: str, place: str, named: str = "") -> dict[str, Any]:
     found = tables.get(key, {})
     if not isinstance(found, dict):
-        raise UsageError(f"{key} {place} must be a table")
+        raise UsageError(f"{named or key} {place} must be a table")
     return found
 
 
 def _name(value: Any, place: str) -> str:
     name = _text(value, "campaign.name", place)
-    if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._-]*", name):
+    if not NAME.fullmatch(name):
         raise UsageError(
             f"campaign.name = {shown(name)} {place}: "
             f"letters, digits and . _ - only, it names a folder"
@@ -184,6 +191,32 @@ def _factors(table: Mapping[str, Any], key: str, place: str) -> dict[str, tuple[
             raise UsageError(f"{key}.{name} {place}: levels are numbers, texts, true or false")
         factors[name] = tuple(levels)
     return factors
+
+
+def _levels(
+    tables: Mapping[str, Any], factors: Iterable[Mapping[str, tuple[Any, ...]]], place: str
+) -> dict[str, dict[str, dict[str, Any]]]:
+    """Return the settings of named levels, of factors that there are."""
+    used = [(name, level) for table in factors for name in table for level in table[name]]
+    found: dict[str, dict[str, dict[str, Any]]] = {}
+    for factor in _table(tables, "levels", place):
+        key = f"levels.{factor}"
+        if factor in ("world", "method") or not NAME.fullmatch(factor) or "." in factor:
+            raise UsageError(
+                f"{key} {place}: a factor with named levels has a name of its own, of letters, "
+                f"digits, _ and -"
+            )
+        if factor not in [name for name, _ in used]:
+            raise UsageError(f"{key} {place}: there is no factor {factor!r}")
+        named = found[factor] = {}
+        for level in _table(tables["levels"], factor, place, key):
+            if not NAME.fullmatch(level):
+                raise UsageError(f"{key}.{level} {place}: letters, digits and . _ - only")
+            named[level] = _table(tables["levels"][factor], level, place, f"{key}.{level}")
+        for name, level in used:
+            if name == factor and level not in named:
+                raise unknown_name(f"level of {factor}", str(level), named, place)
+    return found
 
 
 def _expand(names: Iterable[str]) -> list[str]:
