@@ -1,14 +1,17 @@
-"""The thesis' experiments: team types have their numbers, and the page leads to all of them."""
+"""Plans that come with conevo: the page leads to all of them; what they cost is what they say."""
 
+import itertools
 import re
 from pathlib import Path
 
 import pytest
 
+import conevo.campaigns.plan_file
 from conevo.campaigns.plan_file import preset_names, read_preset
 from conevo.worlds.pursuit.world import PursuitWorld
 
 PAGE = Path(__file__).resolve().parent.parent.parent / "docs" / "campaigns.md"
+PRESETS = Path(conevo.campaigns.plan_file.__file__).parent / "presets"
 N_NEURONS = 6
 # What the thesis shows of its experiments; all else are settings, environments and drawings.
 SHOWN = {
@@ -36,11 +39,36 @@ def items(text):
     return found
 
 
+def table(first):
+    """Return the rows of the page's table whose first column has this title."""
+    lines = PAGE.read_text().splitlines()
+    begin = next(k for k, line in enumerate(lines) if line.startswith(f"| {first} |")) + 2
+    rows = itertools.takewhile(lambda line: line[:2] == "| ", lines[begin:])
+    return [[cell.strip() for cell in line.split("|")[1:-1]] for line in rows]
+
+
 def rows():
     """Return what each row of the page's table shows, and its presets."""
-    lines = [line.split("|")[1:-1] for line in PAGE.read_text().splitlines() if line[:2] == "| "]
-    head = next(k for k, cells in enumerate(lines) if cells[0].strip() == "of the thesis")
-    return [(items(cells[0]), re.findall(r"`([a-z-]+)`", cells[2])) for cells in lines[head + 1 :]]
+    return [
+        (items(cells[0]), re.findall(r"`([a-z-]+)`", cells[2])) for cells in table("of the thesis")
+    ]
+
+
+def questions():
+    """Return the presets of open questions, and what the page says that each costs."""
+    return {cells[0].strip("`"): cells[2] for cells in table("preset")}
+
+
+def team_steps(plan):
+    """Return the team-steps of a plan's evolution, without studies and tests."""
+    total = 0
+    for planned in plan.write_out():
+        for config in planned.configs():
+            teams = config.run.budget_evaluations
+            if not teams:  # the thesis' sizes: every genotype once, 10,000 in all
+                teams = 10_000 * config.run.generations
+            total += teams * config.run.epochs * config.world_params.iterations
+    return total
 
 
 @pytest.mark.parametrize("scale", ["night", "thesis"])
@@ -70,6 +98,28 @@ def test_a_preset_produces_what_the_page_says_it_does():
     for found, presets in rows():
         for name in presets:
             by_preset.setdefault(name, set()).update(found)
-    assert by_preset.keys() == set(preset_names()) - {"evening"}
+    assert by_preset.keys() == set(preset_names()) - {"evening"} - questions().keys()
     for name, found in by_preset.items():
         assert set().union(*map(items, read_preset(name).produces)) == found, name
+
+
+@pytest.mark.parametrize("name", questions())
+def test_an_open_question_costs_what_its_plan_and_the_page_say(name):
+    plan = read_preset(name)
+    lines = (PRESETS / f"{name}.toml").read_text().partition("\n\n[")[0].splitlines()
+    comment = " ".join(line.strip("# ") for line in lines)
+    assert comment.startswith("Decides ")
+    (price,) = re.findall(r"Price: (\d\.\d x 10\^\d+) team-steps", comment)
+    assert price == questions()[name]
+    factor, _, power = price.partition(" x 10^")
+    assert team_steps(plan) == pytest.approx(float(factor) * 10 ** int(power), rel=0.03)
+    assert plan.produces == ()
+
+
+@pytest.mark.parametrize("name", questions())
+def test_an_open_question_can_be_asked_at_any_scale(name):
+    for scale in ("smoke", "desk", "night", "thesis"):
+        runs = read_preset(name).at(scale, seeds=1).write_out()
+        assert len({run.run_ids for run in runs}) == len(runs)  # no two cells are the same
+        if scale == "smoke":
+            assert {run.configs()[0].run.budget_evaluations for run in runs} == {430}
