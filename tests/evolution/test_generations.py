@@ -222,10 +222,16 @@ TWO_ROUNDS = [[2, 0], [1, 5], [0, 3], [1, 2], [2, 1], [4, 0], [0, 3], [6, 6]]
         ("team", [[3, 1], [2.5, 1.25]], [[2, 0], [3.75, 1.5]]),  # of 3, 2 and 1, 1.5; 1.5, 6; ...
     ],
 )
-def test_type_c_is_a_mean_over_as_many_trials_as_type_a(type_c, p0, p1):
-    learner = method(
-        "cone", genotypes=4, elite_portion=0.5, evaluation="shared", rounds=2, type_c=type_c
-    )
+@pytest.mark.parametrize(
+    "scheme",
+    [
+        {"evaluation": "shared", "rounds": 2},  # as many as type A has
+        {"evaluation": "shared", "rounds": 2, "type_c_rounds": 2},
+        {"evaluation": "systematic", "type_c_rounds": 2},
+    ],
+)
+def test_type_c_is_a_mean_over_its_rounds(scheme, type_c, p0, p1):
+    learner = method("cone", genotypes=4, elite_portion=0.5, type_c=type_c, **scheme)
     state = learner.init(replace(SMALL, n_hidden=1, max_hidden=1), root=3)
     trials = learner.ask(state)
     wanted = np.array([[1, 4, 2, 3], [9, 7, 8, 6]], float)
