@@ -178,7 +178,7 @@ BAD = [
     ({"overrides": {"run.generations": "many"}}, ["run.generations = 'many'", "valid integer"]),
     ({"overrides": {"run.generations": 2.5}}, ["run.generations = 2.5", "valid integer"]),
     ({"overrides": {"run.generations": True}}, ["run.generations = True", "valid integer"]),
-    ({"overrides": {"run.credit": "me"}}, ["run.credit = 'me'", "'robot' or 'team'"]),
+    ({"overrides": {"run.credit": "me"}}, ["run.credit = 'me'", "'robot', 'team' or 'difference'"]),
     ({"overrides": {"run.target": float("nan")}}, ["run.target = nan", "must be a finite number"]),
     ({"overrides": {"world.energy": 1e308}}, ["world.energy = 1e+308", "1e-18 and 1e+18"]),
     ({"overrides": {"world.min_distance": 1e-320}}, ["world.min_distance", "1e-18 and 1e+18"]),

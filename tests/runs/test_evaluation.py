@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -50,6 +50,82 @@ def test_each_robot_is_credited_with_its_own_mean_over_epochs() -> None:
 def test_team_credit_is_the_sum_for_every_robot() -> None:
     """Nitschke 2009, eq. 5.5."""
     np.testing.assert_array_equal(score(OUTCOME, "team").fitness, [[9, 9, 9]])
+
+
+class Rocks:
+    """Plays three robots and two rocks; a scenario multiplies what rocks are worth.
+
+    Robot 0 alone finds a rock of 4; robot 1 finds one of 6, and if it does not, robot 2 does.
+    """
+
+    def evaluate(self, genes: Any, teams: Any, scenarios: Any, rounds: int = 1) -> Outcome:
+        there = (teams >= 0).any(axis=2)
+        found = np.stack([4 * there[:, 0], 6 * there[:, 1], 6 * (there[:, 2] & ~there[:, 1])], 1)
+        n, part = len(teams), np.repeat(np.arange(rounds), len(teams) // rounds)
+        worth = np.asarray(scenarios, np.float32).reshape(rounds, -1)[part]
+        return Outcome(
+            fitness=(worth[:, :, None] * found[:, None]).astype(np.float32),
+            switches=np.zeros((n, worth.shape[1], 3), np.int32),
+            counts=np.ones((n, worth.shape[1], 3, 2), np.int32),
+            performance={"value": worth},
+        )
+
+
+class Worths:
+    """Draws the worths 1, 2, 3, ... as scenarios."""
+
+    def scenarios(self, keys: Sequence[int]) -> Any:
+        return np.arange(1, len(keys) + 1)
+
+
+def test_a_difference_is_what_the_team_lacks_without_the_robot() -> None:
+    """Robot 1 is paid for a rock that robot 2 would have found: it makes no difference."""
+    sizes: dict[str, Any] = {"seed": 1, "epochs": 2, "fittest_epochs": 3}
+    played = {
+        credit: make_evaluator(Rocks(), Worths(), **sizes, credit=credit)  # type: ignore[arg-type]
+        for credit in ("robot", "team", "difference")
+    }
+    genes = np.zeros((1, 4), np.float32)
+    whole = np.zeros((1, 3, 2), np.int32)
+    halves = whole.copy()
+    halves[0, 1] = -1  # robot 1 is without a network anyhow
+    trials = Trials(0, genes, np.concatenate([whole, halves]))
+
+    def fitness(credit: str, trials: Trials) -> list[list[float]]:
+        scores = played[credit](trials).scores
+        assert scores.plays == (4 if credit == "difference" else 1)
+        return [list(map(float, row)) for row in scores.fitness]
+
+    # The mean worth of the two epochs is 1.5.
+    assert fitness("robot", trials) == [[6, 9, 0], [6, 0, 9]]
+    assert fitness("team", trials) == [[15, 15, 15], [15, 15, 15]]
+    assert fitness("difference", trials) == [[6, 0, 0], [6, 0, 9]]
+    # In two rounds the second team meets worths of 3 and 4.
+    assert fitness("difference", replace(trials, rounds=2)) == [[6, 0, 0], [14, 0, 21]]
+    first = replace(trials, teams=whole, scenarios="fixed")  # three epochs: 2 on average
+    assert fitness("difference", first) == [[8, 0, 0]]
+
+
+def test_a_difference_in_a_world_is_played_in_the_same_scenarios() -> None:
+    task = world("rover/complex-1", n_robots=3, iterations=200, low_range=0.3)
+    small = controller(world=task, n_hidden=2, max_hidden=2)
+    rollout = Rollout(task, small, 1)
+    sizes: dict[str, Any] = {"seed": 1, "epochs": 2, "fittest_epochs": 3}
+    private, difference = (
+        make_evaluator(rollout, task, **sizes, credit=credit) for credit in ("robot", "difference")
+    )
+    genes = stream(1, "genes").uniform(-1, 1, (24, 23)).astype(np.float32)
+    teams = np.arange(24, dtype=np.int32).reshape(4, 3, 2)
+    asked = Trials(4, genes, teams, rounds=2)
+    seen = difference(asked)
+    np.testing.assert_array_equal(seen.outcome.fitness, private(asked).outcome.fitness)
+    values = private(asked).scores.fitness.sum(axis=1)
+    for robot in range(3):
+        rest = teams.copy()
+        rest[:, robot] = -1
+        less = private(replace(asked, teams=rest)).scores.fitness.sum(axis=1)
+        np.testing.assert_allclose(seen.scores.fitness[:, robot], values - less, rtol=1e-12)
+    assert np.abs(seen.scores.fitness).max() > 0
 
 
 def test_specialization_is_the_mean_of_switches_over_possible_switches() -> None:

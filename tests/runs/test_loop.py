@@ -13,7 +13,7 @@ import pytest
 from conevo.errors import UsageError
 from conevo.evolution.protocol import Layout, Progress, Scores, Trials
 from conevo.runs.evaluation import Evaluation, describe
-from conevo.runs.loop import evolve_generations, price
+from conevo.runs.loop import check_budget, evolve_generations, price
 from conevo.runs.settings import RunSettings
 from conevo.worlds.measures import Measure
 from conevo.worlds.protocol import Outcome
@@ -92,7 +92,31 @@ def test_a_header_is_enough_and_the_methods_numbers_are_in_the_log() -> None:
     assert type(first["restarts"]) is int
     assert (second["generation"], second["team_evaluations"]) == (1, 4)
     assert [one["team_steps"] for one in (first, second)] == [2 * 3 * 10, 2 * 2 * 3 * 10]
-    assert price(Still(), Still().init(LAYOUT, 1)) == 2
+    assert price(Still(), Still().init(LAYOUT, 1), RunSettings()) == 2
+
+
+def test_what_a_difference_takes_is_counted_and_paid() -> None:
+    """Teams of two robots play three times: six evaluations a generation, in three epochs each."""
+    records: list[dict[str, Any]] = []
+    settings = RunSettings(epochs=7, fittest_epochs=3, credit="difference", budget_evaluations=13)
+    method, first = Still(), Still().init(LAYOUT, 1)
+    stopped_by = evolve_generations(
+        method,
+        first,
+        lambda trials: replace(play(trials), scores=replace(play(trials).scores, plays=3)),
+        settings=settings,
+        main=Measure("value"),
+        portray=partial(describe, world=SimpleNamespace(castes=("a", "b"))),
+        iterations=10,
+        on_generation=lambda state, record: records.append(record),
+    )
+    assert stopped_by == "budget"
+    assert [one["team_evaluations"] for one in records] == [6, 12]
+    assert [one["team_steps"] for one in records] == [6 * 3 * 10, 12 * 3 * 10]
+    assert price(method, first, settings) == 6
+    check_budget(method, first, replace(settings, budget_evaluations=6))
+    with pytest.raises(UsageError, match=r"budget_evaluations = 5 .* takes 6 team evaluations"):
+        check_budget(method, first, replace(settings, budget_evaluations=5))
 
 
 def test_a_generation_without_a_portrait_is_refused() -> None:
@@ -144,7 +168,7 @@ def test_a_header_that_does_not_follow_is_refused(told: dict[str, Any], words: s
         def tell(self, state: Note, trials: Trials, scores: Scores) -> Note:
             return Note(replace(super().tell(state, trials, scores).progress, **told))
 
-    for use in (log_of, lambda method: price(method, method.init(LAYOUT, 1))):
+    for use in (log_of, lambda method: price(method, method.init(LAYOUT, 1), RunSettings())):
         with pytest.raises(UsageError, match=words) as caught:
             use(Wrong())
         assert "\n" not in str(caught.value)

@@ -103,6 +103,26 @@ def test_a_mistake_in_a_simulator_is_one_line_before_the_run(name: str, tmp_path
 @pytest.mark.parametrize(
     ("fault", "words"),
     [
+        ("if (teams < 0).all(axis=2).any(): raise ValueError('no brain')", "no brain"),
+        ("genes = genes if (teams >= 0).any(axis=2).all() else np.nan * genes", "not finite"),
+    ],
+)
+def test_a_simulator_that_cannot_play_empty_networks_has_no_difference_credit(
+    fault: str, words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    line = "        n, r = teams.shape[:2]\n        e = len(scenarios) // rounds\n"
+    world = changed(tmp_path / "mine.py", WORLD, line, f"        {fault}\n{line}")
+    monkeypatch.setitem(FEW, "run.generations", 1)
+    conevo.evolve(f"{world}:open-1", "homcne", "smoke", out=tmp_path / "plain", overrides=FEW)
+    monkeypatch.setitem(FEW, "run.credit", "difference")
+    said = refused(tmp_path, world, "homcne")
+    assert 'run.credit = "difference" needs robots with an empty network' in said
+    assert words in said
+
+
+@pytest.mark.parametrize(
+    ("fault", "words"),
+    [
         ("raise SystemExit(3)", "in ask: SystemExit: 3"),
         ("return 1 / 0", "in ask: ZeroDivisionError: division by zero"),
     ],

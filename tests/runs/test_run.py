@@ -17,6 +17,7 @@ from conevo.evolution.methods.registry import METHODS
 from conevo.rng import fold
 from conevo.runs.champions import Team, finalists, sampled_generations
 from conevo.runs.config import resolve
+from conevo.runs.lab import price_of
 from conevo.runs.run import start
 from conevo.runs.shrinkage import shrinkage
 from conevo.runs.testing import spread
@@ -46,6 +47,49 @@ def test_a_budget_is_never_passed_and_nearly_spent(method: str, tmp_path: Path) 
     run = evolve_tiny(tmp_path / "bound", method, run__budget_evaluations=budget)
     assert [record["team_evaluations"] for record in run.generations()] == spent[:3]
     assert run.provenance["stopped_by"] == "budget"
+
+
+@pytest.mark.parametrize("method", ["homcne", "cone"])
+def test_a_run_on_differences_counts_every_team_that_was_played(
+    method: str, tmp_path: Path
+) -> None:
+    """Three robots: four times the evaluations and the team-steps of a plain run."""
+    settings: dict[str, Any] = {"run__generations": 1}
+    if method == "cone":
+        settings["method__type_c"] = "own"
+    plain = evolve_tiny(tmp_path / "plain", method, **settings)
+    run = evolve_tiny(tmp_path / "run", method, **settings, run__credit="difference")
+    (without,), (record,) = plain.generations(), run.generations()
+    for name in ("team_evaluations", "team_steps", "type_c_evaluations"):
+        assert record[name] == 4 * without[name]
+    price = price_of(run.config)
+    assert (price.evaluations, price.team_steps) == (
+        record["team_evaluations"],
+        record["team_steps"],
+    )
+    assert run.test_result is not None
+    finalist = run.test_result["validation"]["finalists"][0]
+    assert finalist["selection"]["fitness"] is None  # a difference is not a fitness
+    assert finalist["selection"]["performance"]["value"] is not None
+
+
+@pytest.mark.parametrize(
+    ("task", "settings", "words"),
+    [
+        (TASK, {"run.credit": "team", "method.clone_credit": "one"}, "credits all clones alike"),
+        ("prey/shaping-1", {"run.credit": "difference"}, "a team of one robot has none"),
+    ],
+)
+def test_settings_that_contradict_each_other_are_one_line(
+    task: str, settings: dict[str, Any], words: str, tmp_path: Path
+) -> None:
+    with pytest.raises(UsageError, match=words) as caught:
+        conevo.evolve(task, "homcne", "smoke", out=tmp_path / "run", overrides=settings)
+    assert "\n" not in str(caught.value)
+    assert list(tmp_path.iterdir()) == []
+    for key in settings:
+        others = {k: v for k, v in settings.items() if k != key}
+        assert resolve(task, "homcne", "smoke", overrides=others).changed == tuple(others)
 
 
 @pytest.mark.parametrize("task", ["rover/complex-1", "gacc/complex-1"])

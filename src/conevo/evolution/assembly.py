@@ -12,9 +12,8 @@ from typing import Annotated, Literal
 import numpy as np
 from annotated_types import Ge, Le
 
-from conevo.errors import UsageError
 from conevo.evolution.protocol import BoolArray, IntArray
-from conevo.parameters import parameters
+from conevo.parameters import WrongValue, parameters
 from conevo.rng import stream
 
 __all__ = [
@@ -57,9 +56,10 @@ class SchemeConfig:
     def __post_init__(self) -> None:
         """Refuse partners that a scheme does not have."""
         if self.evaluation == "shared" and self.partners == "elite":
-            raise UsageError(
-                'method.partners = "elite" needs method.evaluation = "systematic": under "shared" '
-                "all members of a team are on trial"
+            raise WrongValue(
+                "partners",
+                "method.partners = 'elite'",
+                'has no effect with evaluation = "shared", in which all of a team are on trial',
             )
 
     @property

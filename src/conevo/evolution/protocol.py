@@ -127,11 +127,13 @@ class Scores:
         shares: [N, R, A] float64 share of each of A actions in all that a robot executed, mean over
             epochs; what is missing to 1 is the share of epochs in which it did nothing. None where
             there is no such thing.
+        plays: team evaluations that each team took.
     """
 
     fitness: FloatArray
     specialization: FloatArray
     shares: FloatArray | None = None
+    plays: int = 1
 
 
 @dataclass(frozen=True)
@@ -212,7 +214,7 @@ class Progress:
                 )
         return replace(
             self,
-            team_evaluations=self.team_evaluations + expected[0],
+            team_evaluations=self.team_evaluations + expected[0] * scores.plays,
             n_nonfinite=int(np.count_nonzero(~np.isfinite(scores.fitness)))
             + (0 if is_first else self.n_nonfinite),
             numbers={} if is_first else self.numbers,

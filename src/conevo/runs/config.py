@@ -53,7 +53,7 @@ from conevo.errors import UsageError, placed, shown, unknown_name
 from conevo.parameters import WrongValue, refuse_unknown
 from conevo.reading import parse_toml, read_toml
 from conevo.runs.outline import LENGTH, Outline, identify, outline_of
-from conevo.runs.settings import RunSettings
+from conevo.runs.settings import RunSettings, refuse_contradiction
 
 if TYPE_CHECKING:
     from conevo.controllers.protocol import Controller
@@ -333,7 +333,9 @@ def resolve(
         method_config=built["method"],
         changed=tuple(_changed(parts, built, base)),
     )
-    refuse_misfit(config.controller, config.build_world())  # and what this world cannot have
+    built_world = config.build_world()  # refuses what this world cannot have
+    refuse_misfit(config.controller, built_world)
+    refuse_contradiction(config.run, config.method_config, built_world.n_robots)
     return config
 
 

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
-from conevo.evolution.protocol import Scores, Trials
+from conevo.evolution.protocol import FloatArray, Scores, Trials
 from conevo.rng import fold
 from conevo.specialization import activity, individual
 from conevo.specialization.favourite import favourite, favourite_share
 from conevo.worlds.protocol import Outcome, Scenarios, Simulator, World, setting_columns
 
-__all__ = ["Evaluation", "Portrait", "describe", "make_evaluator", "score"]
+__all__ = ["Evaluation", "Portrait", "describe", "make_evaluator", "score", "without"]
 
 
 @dataclass(frozen=True)
@@ -69,6 +69,10 @@ def make_evaluator(
     have rounds, so many further ones in each. With ``scenarios`` "fixed" those of generation 0 are
     met in all. Trials that ask for fixed scenarios meet the same ``fittest_epochs`` of them in all
     generations. What all generations meet is drawn once.
+
+    With ``credit`` "difference" every team plays in the same scenarios once more for each robot,
+    which then has an empty network. Choice: an empty network, not a robot that is not there, which
+    a world need not know; it stands in the way and acts as any whose outputs are all equal.
     """
 
     def keys(trials: Trials) -> list[int]:
@@ -90,10 +94,32 @@ def make_evaluator(
     def evaluate(trials: Trials) -> Evaluation:
         genes = np.asarray(trials.genes, dtype=np.float32)
         teams = np.asarray(trials.teams, dtype=np.int32)
-        outcome = simulator.evaluate(genes, teams, met(trials), rounds=trials.rounds)
-        return Evaluation(score(outcome, credit), outcome)
+        scenarios, rounds = met(trials), trials.rounds
+        outcome = simulator.evaluate(genes, teams, scenarios, rounds=rounds)
+        if credit != "difference":
+            return Evaluation(score(outcome, credit), outcome)
+        rest = [
+            _value(simulator.evaluate(genes, without(teams, robot), scenarios, rounds=rounds))
+            for robot in range(teams.shape[1])
+        ]
+        fitness = _value(outcome)[:, None] - np.stack(rest, axis=1)
+        scores = replace(score(outcome), fitness=fitness, plays=1 + len(rest))
+        return Evaluation(scores, outcome)
 
     return evaluate
+
+
+def without(teams: npt.NDArray[np.int32], robot: int) -> npt.NDArray[np.int32]:
+    """Return teams [N, R, U] in which one robot has an empty network."""
+    rest = teams.copy()
+    rest[:, robot] = -1
+    return rest
+
+
+def _value(outcome: Outcome) -> FloatArray:
+    """Return the value [N] of teams: the sum of their robots' mean fitness (eq. 5.5)."""
+    value: FloatArray = outcome.fitness.astype(np.float64).mean(axis=1).sum(axis=1)
+    return value
 
 
 def score(outcome: Outcome, credit: str = "robot") -> Scores:

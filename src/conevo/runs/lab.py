@@ -8,21 +8,22 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from conevo.controllers.protocol import Controller
 from conevo.controllers.registry import genome_of
 from conevo.errors import EnvironmentFailure, UsageError
 from conevo.evolution.inheritance import breed_from, hand_on, refuse_idle
-from conevo.evolution.protocol import Layout, Method, Progress, State
+from conevo.evolution.protocol import FloatArray, Layout, Method, Progress, State
 from conevo.outside import takes
 from conevo.reading import DamagedFile
 from conevo.rng import fold
 from conevo.runs.champions import Team
 from conevo.runs.config import RunConfig
-from conevo.runs.evaluation import Evaluate, make_evaluator
+from conevo.runs.evaluation import Evaluate, make_evaluator, without
 from conevo.runs.loop import check_budget, price, rehearse
 from conevo.worlds.own_simulator import OwnSimulator
-from conevo.worlds.protocol import Simulator, World
+from conevo.worlds.protocol import Scenarios, Simulator, World
 from conevo.worlds.simulators import device_for, simulator
 
 __all__ = ["Lab", "Price", "check_memory", "layout_of", "price_of", "refuse_other_state"]
@@ -65,12 +66,13 @@ def price_of(config: RunConfig, ancestor: State | Team | None = None) -> Price:
     method, layout = config.build_method(), layout_of(world, config.controller)
     check_memory(config, layout)
     state = _first(method, layout, run.seed, ancestor)
-    check_budget(method, state, run.budget_evaluations)
-    first = price(method, state)
+    check_budget(method, state, run)
+    first = price(method, state, run)
     generations = run.generations
     if run.budget_evaluations:
         generations = min(generations, run.budget_evaluations // first)
-    epochs = (first - 1) * run.epochs + run.fittest_epochs
+    of_fittest = run.plays(layout.n_robots)
+    epochs = (first - of_fittest) * run.epochs + of_fittest * run.fittest_epochs
     return Price(first, generations, generations * epochs * world.params.iterations)
 
 
@@ -203,7 +205,7 @@ class Lab:
         layout, seed = self.layout, self.config.run.seed
         check_memory(self.config, layout)
         state = _first(self.method, layout, seed, ancestor)
-        check_budget(self.method, state, self.config.run.budget_evaluations)
+        check_budget(self.method, state, self.config.run)
         self.world.scenarios([seed])  # says so now if there is no room for what belongs in it
         return state
 
@@ -225,8 +227,23 @@ class Lab:
             trials = self.method.ask(first)
             keys = [fold(self.config.run.seed, "rehearsal", k) for k in range(2)]
             twice = np.repeat(trials.teams[:1], 2, axis=0).astype(np.int32)
-            self.simulator.evaluate(trials.genes, twice, self.world.scenarios(keys), rounds=2)
+            scenarios = self.world.scenarios(keys)
+            self.simulator.evaluate(trials.genes, twice, scenarios, rounds=2)
+            if self.config.run.credit == "difference":
+                self._play_without(trials.genes, twice, scenarios)
         return first
+
+    def _play_without(
+        self, genes: FloatArray, teams: npt.NDArray[np.int32], scenarios: Scenarios
+    ) -> None:
+        """Refuse a simulator that cannot play a robot with an empty network."""
+        needs = 'run.credit = "difference" needs robots with an empty network, which the simulator'
+        try:
+            seen = self.simulator.evaluate(genes, without(teams, 0), scenarios, rounds=2)
+        except Exception as error:
+            raise UsageError(f"{needs} of {self.world.name} cannot play: {error!r:.200}") from error
+        if not np.isfinite(seen.fitness).all():
+            raise UsageError(f"{needs} of {self.world.name} gives a fitness that is not finite")
 
 
 def _refuse_unlike(state: State, first: State, title: str) -> None:

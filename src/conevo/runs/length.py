@@ -71,7 +71,7 @@ def give_length(
     lab = replace(equip(), config=config)
     if not records:
         first = store.load_origin(config.method, lab.blank_state()) or lab.first_state()
-        check_budget(lab.method, first, config.run.budget_evaluations)
+        check_budget(lab.method, first, config.run)
     seal = store.read_seal() if store.is_finished else {}
     store.extend(config, _former_end(current, about, records, seal), now())
     return lab

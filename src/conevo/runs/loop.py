@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -73,7 +74,7 @@ def evolve_generations(
         on_generation(state, last)
 
 
-def price(method: Method, state: State) -> int:
+def price(method: Method, state: State, settings: RunSettings) -> int:
     """Return the team evaluations of the first generation.
 
     ask and tell are pure, so it can be priced with empty scores.
@@ -82,7 +83,8 @@ def price(method: Method, state: State) -> int:
     while state.progress.generation == 0:
         requests = _counted(requests, method)
         trials = _asked(method, state)
-        state = _told(method, state, trials, _scores(trials, np.zeros))
+        empty = replace(_scores(trials, np.zeros), plays=settings.plays(trials.teams.shape[1]))
+        state = _told(method, state, trials, empty)
     return int(state.progress.team_evaluations)
 
 
@@ -158,7 +160,10 @@ def _told(method: Method, state: State, trials: Trials, scores: Scores) -> State
     before, after = state.progress, getattr(told, "progress", None)
     if not isinstance(after, Progress):
         raise UsageError(f"{method.title}: tell must return a state, not {type(told).__name__}")
-    made, counted = len(trials.teams), after.team_evaluations - before.team_evaluations
+    made, counted = (
+        len(trials.teams) * scores.plays,
+        after.team_evaluations - before.team_evaluations,
+    )
     if counted != made:
         raise UsageError(
             f"{method.title}: tell counts {counted} team evaluations, {made} were made "
@@ -180,13 +185,14 @@ def _told(method: Method, state: State, trials: Trials, scores: Scores) -> State
     return told
 
 
-def check_budget(method: Method, state: State, budget: int) -> None:
+def check_budget(method: Method, state: State, settings: RunSettings) -> None:
     """Refuse a budget that does not pay for the first generation.
 
     Raises:
         UsageError: no generation could be finished.
     """
-    if budget and (first := price(method, state)) > budget:
+    budget = settings.budget_evaluations
+    if budget and (first := price(method, state, settings)) > budget:
         raise UsageError(
             f"run.budget_evaluations = {budget} does not pay for one generation: "
             f"the first takes {counted(first, 'team evaluation')}"
@@ -212,7 +218,7 @@ def _run_generation(
     epochs = 0
     while state.progress.generation == generation:
         trials = _asked(method, state)
-        n_teams = len(trials.teams)
+        n_teams = len(trials.teams) * settings.plays(trials.teams.shape[1])
         if budget and state.progress.team_evaluations + n_teams > budget:
             return None
         is_fixed = trials.scenarios == "fixed"

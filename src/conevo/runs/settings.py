@@ -30,12 +30,20 @@ from typing import (
 from annotated_types import Ge, Le
 
 from conevo.controllers.registry import CONTROLLERS, DEFAULT, suggested
+from conevo.errors import UsageError
 from conevo.parameters import parameters
 
 if TYPE_CHECKING:
     from conevo.runs.config import RunConfig
 
-__all__ = ["RunSettings", "Setting", "declared", "preset_purpose", "settings_of"]
+__all__ = [
+    "RunSettings",
+    "Setting",
+    "declared",
+    "preset_purpose",
+    "refuse_contradiction",
+    "settings_of",
+]
 
 BOUNDS = {"ge": ">=", "gt": ">", "le": "<=", "lt": "<"}
 LARGEST = 2**63 - 1  # what a whole number can be in a configuration file
@@ -64,11 +72,14 @@ class RunSettings:
     """simulated trials in which each generation's fittest team is evaluated once more. Choice: as
     many as the thesis' q, and the same in all generations, so that progress and the champion of a
     run are not a matter of lucky scenarios."""
-    credit: Literal["robot", "team"] = "robot"
+    credit: Literal["robot", "team", "difference"] = "robot"
     """what a robot is credited with: "robot" gives each robot its own fitness as the world reports
-    it (eq. 5.4, 6.8); "team" gives every robot the sum over the team (eq. 5.5)."""
+    it (eq. 5.4, 6.8); "team" gives every robot the sum over the team (eq. 5.5); "difference" gives
+    it that sum less the one in the same scenarios when its network is empty, which costs a further
+    team evaluation for each robot."""
     budget_evaluations: Annotated[int, Ge(0), Le(2**63 - 1)] = 0
-    """the run never spends more team evaluations than this; 0 is no limit."""
+    """the run never spends more team evaluations than this; 0 is no limit. Choice: those that a
+    difference takes count, too."""
     target: float | None = None
     """the run ends when the fittest team's main task performance is as good as this: at least, or,
     of a measure of which smaller is better, at most."""
@@ -82,6 +93,10 @@ class RunSettings:
     """scenarios in which finalists are validated. Choice: 20, as many as tests."""
     n_tests: Annotated[int, Ge(1), Le(10_000)] = 20
     """fresh scenarios of the testing phase (5.4: 20)."""
+
+    def plays(self, n_robots: int) -> int:
+        """Return the team evaluations that each team of so many robots takes."""
+        return 1 + n_robots if self.credit == "difference" else 1
 
 
 @dataclass(frozen=True)
@@ -101,6 +116,29 @@ class Setting:
     unit: str
     allowed: str
     meaning: str
+
+
+def refuse_contradiction(run: RunSettings, method: Any, n_robots: int) -> None:
+    """Refuse settings of a run and its method of which one makes the other meaningless.
+
+    Args:
+        run: the run's.
+        method: the method's parameters.
+        n_robots: robots in a team.
+
+    Raises:
+        UsageError: there are such.
+    """
+    if run.credit == "team" and getattr(method, "clone_credit", "mean") == "one":
+        raise UsageError(
+            'method.clone_credit = "one" does nothing with run.credit = "team", which credits all '
+            'clones alike: use "mean", or run.credit = "robot" or "difference"'
+        )
+    if run.credit == "difference" and n_robots == 1:
+        raise UsageError(
+            'run.credit = "difference" compares a team with the rest of it, and a team of one '
+            'robot has none: use "robot"'
+        )
 
 
 def declared(part: type[Any]) -> list[Setting]:

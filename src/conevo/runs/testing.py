@@ -65,18 +65,20 @@ def validate(
 
     Returns:
         The champion, and plain data: the scenarios, the generation chosen, and of each finalist
-        its generation, its robots' mean fitness and its performance: at "selection", and in
-        "validation" as ``spread`` gives them.
+        its generation, its robots' mean fitness and its performance: at "selection" (no fitness if
+        the credit is a difference, which is another thing), and in "validation" as ``spread`` gives
+        them.
     """
     scenarios = world.scenarios([fold(seed, "validation", k) for k in range(n_scenarios)])
     outcome = simulator.evaluate(*Finalists.of(finalists).as_trials(), scenarios)
     fitness = outcome.fitness.astype(np.float64).mean(axis=2)
     robots = len(finalists[0].fitness) if credit == "team" else 1  # whose sum each is credited with
+    is_fitness = credit != "difference"
     rows = [
         {
             "generation": team.generation,
             "selection": {
-                "fitness": _finite(team.mean_fitness / robots),
+                "fitness": _finite(team.mean_fitness / robots) if is_fitness else None,
                 "performance": dict(selected[team.generation]),
             },
             "validation": {

@@ -200,7 +200,7 @@ class Cone(Mesp[ConeState]):
         """Return the state after these scores."""
         if state.phase == "elites":
             told = self.type_c(count(state, trials, scores), scores)
-            return note(told, type_c_evaluations=len(trials.teams))
+            return note(told, type_c_evaluations=len(trials.teams) * scores.plays)
         told = super().tell(state, trials, scores)
         has_elites = state.phase == "genotypes" and self.config.type_c != "off"
         return replace(told, phase="elites") if has_elites else told
