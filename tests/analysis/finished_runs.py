@@ -63,6 +63,7 @@ class Cell(NamedTuple):
     budget: int = 1000
     stage: int = 0
     planned: int | None = None  # budget; that above is what a run spends
+    reliability: float | None = None  # of fitness in generation 0; without a study of it None
 
 
 def cells(
@@ -255,6 +256,7 @@ def _run(
             "action": list(task.castes) * ROBOTS,
             "count": rng.integers(0, 5000, ROBOTS * len(task.castes)),
         },
+        "signal": {} if cell.reliability is None else _signal(run, cell.reliability),
         "metrics": {"run": [run] * len(METRICS), "metric": list(METRICS), "value": metrics},
         "behaviours": {
             "run": [run] * len(behaviours),
@@ -286,6 +288,27 @@ def _scores(
         "measure": np.repeat([part[2] for part in parts], SCENARIOS),
         "scenario": np.tile(np.arange(SCENARIOS), len(parts)),
         "value": np.maximum(np.concatenate([part[3] for part in parts]), 0),
+    }
+
+
+def _signal(run: str, reliability: float) -> dict[str, Any]:
+    """Return the signal of a run's first populations, and of its last: half as reliable."""
+    of = np.array([reliability, reliability / 2])
+    return {
+        "run": [run] * 2,
+        "unit": ["network"] * 2,
+        "generation": ["first", "last"],
+        "genotypes": [20] * 2,
+        "trials": [50] * 2,
+        "icc": of / 10,
+        "standard_error": of / 100,
+        "low": of / 12,
+        "high": of / 8,
+        "scheme": [10] * 2,
+        "icc_of_scheme": of,
+        "low_of_scheme": of / 2,
+        "high_of_scheme": of * 1.1,
+        "rounds_for_half": 10 / of,
     }
 
 

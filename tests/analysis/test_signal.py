@@ -15,6 +15,7 @@ from conevo.analysis.repeatability import repeatability, spearman_brown
 from conevo.analysis.signal import measure_signal, signal_of_run
 from conevo.cli.main import main
 from conevo.errors import UsageError
+from conevo.evolution.assembly import place_on_trial
 from conevo.rng import fold
 from conevo.runs.config import RunConfig, resolve
 from conevo.runs.evaluation import score
@@ -70,7 +71,10 @@ def alone(config: RunConfig) -> np.ndarray:
         )
         table = np.full(state.fitness.shape, np.nan)
         for team, credit in zip(trials.teams, fitness, strict=True):
-            for robot in range(1 if config.method == "hetcne" else len(team)):
+            robots = range(len(team))
+            if config.method == "hetcne":
+                robots = [place_on_trial(state.root, 0, len(team))]
+            for robot in robots:
                 for row in team[robot][team[robot] >= 0]:
                     p, u, m = np.unravel_index(row, state.genes.shape[:3])
                     of_clones = credit.mean() if config.method == "homcne" else credit[robot]
@@ -110,7 +114,8 @@ def test_the_scheme_has_rounds_times_epochs_trials() -> None:
     assert row["high_of_scheme"] == pytest.approx(spearman_brown(min(row["high"], 1), 12))
     if row["icc"] > 0:
         assert row["rounds_for_half"] == pytest.approx((1 - row["icc"]) / row["icc"] / 3)
-    systematic = tiny("ccga", run__epochs=3, method__evaluation="systematic")
+    elite = {"method__evaluation": "systematic", "method__partners": "elite"}
+    systematic = tiny("ccga", run__epochs=3, **elite)
     (other,) = measure_signal(systematic, trials=TRIALS, threads=1)["signal"]
     assert (other["scheme"], other["icc"]) == (3, row["icc"])  # tried alike, at a third of the cost
 
@@ -130,7 +135,7 @@ def test_a_sample_of_genotypes_keeps_their_genes_whatever_the_method() -> None:
 @pytest.mark.parametrize(
     ("method", "teams"),
     [("hetcne", 3 * 6 + 3 * 6), ("cone", 3 * 6 + 3 * 6),
-     ("ccga", 3 * 6 + 3 * 24)],  # its partners are an elite at last, and a team tries one genotype
+     ("ccga", 3 * 6 + 3 * 4 * 5)],  # its partners are an elite at last: a team tries one genotype
 )  # fmt: skip
 def test_a_run_has_the_signal_of_its_first_and_last_populations(method, teams, tmp_path) -> None:
     sizes = {"method__genotypes": 6, **NEAR}

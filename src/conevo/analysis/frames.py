@@ -112,6 +112,22 @@ SCHEMA: dict[str, dict[str, str]] = {
     },
     "actions": {"run": "VARCHAR", "robot": "INTEGER", "action": "VARCHAR", "count": "BIGINT"},
     "metrics": {"run": "VARCHAR", "metric": "VARCHAR", "value": "DOUBLE"},
+    "signal": {
+        "run": "VARCHAR",
+        "unit": "VARCHAR",
+        "generation": "VARCHAR",
+        "genotypes": "INTEGER",
+        "trials": "INTEGER",
+        "icc": "DOUBLE",
+        "standard_error": "DOUBLE",
+        "low": "DOUBLE",
+        "high": "DOUBLE",
+        "scheme": "INTEGER",
+        "icc_of_scheme": "DOUBLE",
+        "low_of_scheme": "DOUBLE",
+        "high_of_scheme": "DOUBLE",
+        "rounds_for_half": "DOUBLE",
+    },
     "behaviours": {
         "run": "VARCHAR",
         "kind": "VARCHAR",
@@ -127,8 +143,10 @@ number of pairs of sub-populations that recombined between populations, in the m
 generations, exchange_share that of the pairs that could have; both are NULL for methods that never
 do. ``robots``: specialization is S, independent the S of independent draws from the robot's shares,
 relative S over that; a share is 1 if it is always the same; columns from favourite_setting on are
-NULL of studies that earlier versions made. ``measures``: the world's, as it declares them; of one
-that is not listed larger is better.
+NULL of studies that earlier versions made. ``signal``: as ``analysis.signal.signal_of_run`` has it;
+icc is of one trial, scheme is the number of trials that the method gives each genotype; NULL where
+all fitness was the same. ``measures``: the world's, as it declares them; of one that is not listed
+larger is better.
 """
 
 

@@ -44,6 +44,7 @@ from conevo.analysis.sections.metrics import definitions, metrics
 from conevo.analysis.sections.overview import Campaign, overview, read_campaign, repetition
 from conevo.analysis.sections.performance import performance
 from conevo.analysis.sections.scope import Scope, scopes
+from conevo.analysis.sections.signal import signal
 from conevo.errors import UsageError
 from conevo.reading import DamagedFile, read_bytes, read_json
 from conevo.runs.drafts import draft_of
@@ -120,6 +121,7 @@ def _about(scope: Scope, title: str, spent: Spent) -> Section:
         champions(scope),
         comparisons(scope),
         learning(scope, histories),
+        signal(scope),
         castes(scope, histories),
         lesions(scope),
         clones(scope),

@@ -9,7 +9,8 @@ business: its ``ask`` and ``tell`` are used. ``repeatability`` makes the numbers
   Elite trials (type C) are left out: they rank a few genotypes again.
 - Choice: a sample of genotypes is tried, which are each other's partners: twenty of each slot, of
   a single population three for every robot. Under "systematic" they are tried as under "shared",
-  R or R x U at once, unless partners come from an elite: they are drawn alike.
+  R or R x U at once, since partners are drawn alike; but one by one, and five of each slot, where
+  partners come from an elite.
 - Choice: scenarios are fresh even where those of a run are fixed.
 """
 
@@ -36,12 +37,16 @@ from conevo.runs.run import Run
 from conevo.runs.store import Store
 from conevo.terms import counted
 
-__all__ = ["GENOTYPES", "PER_ROBOT", "TRIALS", "measure_signal", "signal_of_run"]
+__all__ = ["TRIALS", "Unmeasured", "measure_signal", "signal_of_run", "signal_study"]
 
-GENOTYPES, PER_ROBOT, TRIALS = 20, 3, 50
+GENOTYPES, PER_ROBOT, ALONE, TRIALS = 20, 3, 5, 50
 BATCH = 1000  # teams that are played at once
 Announce = Callable[[str], None]
 Row = dict[str, Any]
+
+
+class Unmeasured(UsageError):
+    """A method has no signal that could be measured, whatever the numbers asked for."""
 
 
 @dataclass(frozen=True)
@@ -95,7 +100,8 @@ def measure_signal(
         As ``signal_of_run``, with the generation "first" only.
 
     Raises:
-        UsageError: the method has no populations, or these numbers are not allowed.
+        Unmeasured: the method has no populations.
+        UsageError: these numbers are not allowed.
     """
     lab = Lab.equip(config, threads, device)
     return _measure(lab, {"first": lab.first_state()}, units, trials, announce)
@@ -130,8 +136,8 @@ def signal_of_run(
         left_out: genotypes with a fitness that was not finite.
 
     Raises:
-        UsageError: the method has no populations, these numbers are not allowed, or the run was
-            made with other kernels.
+        Unmeasured: the method has no populations.
+        UsageError: these numbers are not allowed, or the run was made with other kernels.
     """
     lab, store = lab_of(run, threads, device), Store(run.path)
     name, blank = lab.config.method, lab.blank_state()
@@ -140,6 +146,20 @@ def signal_of_run(
     if last is not None and last.progress.generation:
         states["last"] = last
     return _measure(lab, states, units, trials, announce)
+
+
+def signal_study(run: Run, *, threads: int | None = None) -> Row:
+    """Return what ``signal_of_run`` does, as a campaign keeps it.
+
+    Returns:
+        Of a method without a signal that could be measured: no rows, and why as not_measured.
+    """
+    config = run.config
+    about = {"task": config.task, "method": config.method, "credit": config.run.credit}
+    try:
+        return signal_of_run(run, threads=threads) | {"not_measured": ""}
+    except Unmeasured as error:
+        return about | {"signal": [], "not_measured": str(error)}
 
 
 def _measure(
@@ -169,22 +189,22 @@ def _subject(lab: Lab, generation: str, state: State, units: int | None) -> _Sub
     """Return a sample of the genotypes of a state, and the method that tries each of them once."""
     config, title = lab.config.method_config, lab.method.title
     if not isinstance(state, Populations):
-        raise UsageError(
+        raise Unmeasured(
             f"{title} has no populations whose genotypes could be tried one by one (its state is "
             f"not a {Populations.__module__}.{Populations.__name__}), so it has no signal to "
             f"measure"
         )
-    of = state.genes.shape[2]
-    wanted = units or (
-        max(GENOTYPES, PER_ROBOT * lab.world.n_robots) if len(state.genes) == 1 else GENOTYPES
-    )
-    n = min(wanted, of)
+    of, there = state.genes.shape[2], {field.name for field in dataclasses.fields(config)}
+    is_alone = "evaluation" in there and getattr(state, "partners", np.empty(0)).size > 0
+    usual = GENOTYPES
+    if is_alone:
+        usual = ALONE
+    elif len(state.genes) == 1:
+        usual = max(GENOTYPES, PER_ROBOT * lab.world.n_robots)
+    n = min(units or usual, of) if "genotypes" in there else of
     changes: dict[str, Any] = {"genotypes": n, "rounds": 1}
-    if not getattr(state, "partners", np.empty(0)).size:
-        changes["evaluation"] = "shared"
-    there = {field.name for field in dataclasses.fields(config)}
-    if "genotypes" not in there:
-        changes, n = {}, of
+    if "evaluation" in there and not is_alone:
+        changes |= {"evaluation": "shared", "partners": "any"}
     known = {name: value for name, value in changes.items() if name in there}
     method = lab.config.method_entry.build(dataclasses.replace(config, **known))
     blank: Any = method.init(lab.layout, state.root)
@@ -193,7 +213,7 @@ def _subject(lab: Lab, generation: str, state: State, units: int | None) -> _Sub
         state, genes=state.genes[:, :, chosen], fitness=blank.fitness, elite=blank.elite
     )
     if problem := sample.problem(blank):
-        raise UsageError(
+        raise Unmeasured(
             f"{title}: {problem} of its state belongs to all {of} genotypes, so no sample of them "
             f"can be tried: ask for {of}"
         )
@@ -272,7 +292,7 @@ def _try(lab: Lab, subject: _Subject, trials: int) -> tuple[npt.NDArray[np.float
             told: Any = subject.method.tell(state, trial, score_of)
             graded: Any = getattr(told, "fitness", 0.0)
             if np.shape(graded) != state.fitness.shape:
-                raise UsageError(
+                raise Unmeasured(
                     f"{subject.method.title}: tell leaves no fitness {list(state.fitness.shape)} "
                     f"after one request, so its signal cannot be measured"
                 )
@@ -299,7 +319,11 @@ def _play(lab: Lab, asked: list[Trials], numbers: range) -> list[Scores]:
         rounds=len(asked),
     )
     scores, n = score(outcome, lab.config.run.credit), len(asked[0].teams)
-    return [
-        Scores(scores.fitness[k * n : (k + 1) * n], scores.specialization[k * n : (k + 1) * n])
-        for k in range(len(asked))
-    ]
+    return [_rows_of(scores, slice(k * n, (k + 1) * n)) for k in range(len(asked))]
+
+
+def _rows_of(scores: Scores, teams: slice) -> Scores:
+    """Return the scores of some of the teams."""
+    values = {field.name: getattr(scores, field.name) for field in dataclasses.fields(scores)}
+    some: dict[str, Any] = {n: None if v is None else v[teams] for n, v in values.items()}
+    return Scores(**some)

@@ -1,13 +1,13 @@
-"""What ``studies/NAME.json`` holds, as a model that it is checked against when it is read."""
+"""What files in ``studies/`` hold, as models that they are checked against when they are read."""
 
 from __future__ import annotations
 
-from typing import Annotated, NotRequired
+from typing import Annotated, Literal, NotRequired
 
 from annotated_types import Ge
 from typing_extensions import TypedDict
 
-__all__ = ["Study"]
+__all__ = ["SignalStudy", "Study"]
 
 Count = Annotated[int, Ge(0)]
 
@@ -63,3 +63,36 @@ class Study(TypedDict):
     actions: list[Action]
     metrics: dict[str, float | None]
     behaviours: list[Behaviour]
+
+
+class Signal(TypedDict):
+    """The signal of populations, at first or at last."""
+
+    unit: str
+    generation: Literal["first", "last"]
+    number: Count
+    populations: Count
+    slots: Count
+    genotypes: Count
+    of: Count
+    trials: Count
+    icc: float | None
+    standard_error: float | None
+    low: float | None
+    high: float | None
+    scheme: Count
+    icc_of_scheme: float | None
+    low_of_scheme: float | None
+    high_of_scheme: float | None
+    rounds_for_half: float | None
+    left_out: Count
+
+
+class SignalStudy(TypedDict):
+    """See ``signal.signal_study``."""
+
+    task: str
+    method: str
+    credit: str
+    signal: list[Signal]
+    not_measured: str

@@ -9,6 +9,7 @@
     ledger.sqlite         how every run stands; written by the coordinator only
     runs/LABEL/           the runs, each as any other; or shapings
     studies/LABEL.json    what the fittest team of a finished run does
+    studies/signal/       the signal of its populations, as LABEL.json
     ended/LABEL.json      how the last worker of a run ended
     logs/LABEL.txt        what its workers said
     tables/*.parquet      what analysis reads, made of all that is finished
@@ -183,7 +184,11 @@ class Campaign:
 
     def _is_studied(self, label: str) -> bool:
         planned = self.planned[label]
-        return not planned.studies or all(self.places.study(n).is_file() for n in planned.names)
+        return all(
+            self.places.study(name, kind).is_file()
+            for name in planned.names
+            for kind in planned.studies
+        )
 
     def standings(self) -> dict[str, Entry]:
         """Return the state of every run, in the order of the plan; writes nothing.

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from conevo.campaigns.places import Places
+from conevo.campaigns.plan_file import STUDIES
 from conevo.campaigns.work import planned_runs
 from conevo.errors import EnvironmentFailure, UsageError
 from conevo.runs.directory import appearing, kind_of
@@ -84,7 +85,7 @@ class ObjectStore:
         for path in _beside(root, label):
             if path.is_file():
                 self._put(root, path, path.read_bytes())
-            elif path.parent.name == "studies" and path.name in self._names("studies"):
+            elif "studies" in path.relative_to(root).parts and self._has(root, path):
                 self._files.delete_file(f"{self._base}/{path.relative_to(root).as_posix()}")
 
     def get_run(self, root: Path, label: str) -> None:
@@ -98,7 +99,7 @@ class ObjectStore:
                     path.parent.mkdir(parents=True, exist_ok=True)
                     path.write_bytes(self._read(f"runs/{label}/{name}"))
         for path in _beside(root, label):
-            if path.name in self._names(path.parent.name):
+            if self._has(root, path):
                 self._get(root, path)
 
     def has_run(self, label: str) -> bool:
@@ -108,8 +109,12 @@ class ObjectStore:
     def forget_ending(self, root: Path, label: str) -> None:
         """Remove how a run ended last, since it is tried again."""
         path = Places(root).ended(label)
-        if path.name in self._names(path.parent.name):
+        if self._has(root, path):
             self._files.delete_file(f"{self._base}/{path.relative_to(root).as_posix()}")
+
+    def _has(self, root: Path, path: Path) -> bool:
+        """Whether a file of a campaign's directory is stored."""
+        return path.name in self._names(path.parent.relative_to(root).as_posix())
 
     def _names(self, folder: str) -> list[str]:
         """Return the names of all files in a folder, relative to it."""
@@ -164,5 +169,6 @@ def _rank(path: Path) -> int:
 def _beside(root: Path, label: str) -> list[Path]:
     """Return where a run's studies, its log and how it ended may be, in this order."""
     places = Places(root)
-    studies = [places.study(name) for name in planned_runs(root)[label].names]
+    names = planned_runs(root)[label].names
+    studies = [places.study(name, kind) for name in names for kind in STUDIES]
     return [*studies, places.log(label), places.ended(label)]

@@ -60,9 +60,10 @@ class Places:
         """The directory of a run, a shaping or, "LABEL/stage-1", a stage of one."""
         return self.root / "runs" / name
 
-    def study(self, name: str) -> Path:
-        """What the fittest team of a run or stage does."""
-        return self.root / "studies" / f"{name.replace('/', '-')}.json"
+    def study(self, name: str, kind: str = "teams") -> Path:
+        """A study of a run or stage: "teams" is what its fittest team does."""
+        folder = self.root / "studies" if kind == "teams" else self.root / "studies" / kind
+        return folder / f"{name.replace('/', '-')}.json"
 
     def ended(self, label: str) -> Path:
         """How the last worker of a run ended."""

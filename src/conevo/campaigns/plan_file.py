@@ -9,7 +9,7 @@ run with every seed::
     seeds = 20                     # 1 to 20; or a list of seeds
     preset = "desk"                # scale; the command line wins
     shape = false                  # true: every run learns the environments 1 to N in stages
-    studies = ["teams"]            # made of every finished run; [] for none
+    studies = ["teams"]            # made of every finished run; "signal" is another, [] for none
 
     [factors]
     world = ["rover/complex-1..10"]
@@ -52,7 +52,7 @@ from conevo.worlds.registry import resolve as resolve_world
 
 __all__ = ["STUDIES", "preset_names", "read_plan", "read_preset"]
 
-STUDIES = ("teams",)
+STUDIES = ("teams", "signal")
 TABLES = ("campaign", "factors", "levels", "settings", "where")
 HEAD = ("name", "title", "produces", "seeds", "preset", "shape", "studies")
 CONDITIONS = ("world", "method", "preset")
@@ -107,7 +107,7 @@ def _parse(tables: Mapping[str, Any], place: str, name: str) -> Plan:
     if preset not in PRESETS:
         raise unknown_name("preset", preset, PRESETS, place)
     shape = _truth(head.get("shape", False), "campaign.shape", place)
-    studies = _texts(head.get("studies", list(STUDIES)), "campaign.studies", place)
+    studies = _texts(head.get("studies", ["teams"]), "campaign.studies", place)
     for study in studies:
         if study not in STUDIES:
             raise unknown_name("study", study, STUDIES, place)

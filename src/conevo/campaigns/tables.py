@@ -14,7 +14,7 @@ from typing import Any
 
 from conevo.analysis.exchange import exchanged
 from conevo.analysis.frames import SCHEMA
-from conevo.analysis.study_record import Study
+from conevo.analysis.study_record import SignalStudy, Study
 from conevo.campaigns.ended import read_ended
 from conevo.campaigns.places import Places
 from conevo.campaigns.plan import PlannedRun
@@ -106,7 +106,11 @@ def seal_tables(
 
 
 def _manifest(finished: Sequence[PlannedRun]) -> Row:
-    return {"columns": SCHEMA, "runs": {run.label: list(run.run_ids) for run in finished}}
+    return {
+        "columns": SCHEMA,
+        "runs": {run.label: list(run.run_ids) for run in finished},
+        "studies": {run.label: list(run.studies) for run in finished},
+    }
 
 
 def _quoted(path: Path) -> str:
@@ -159,6 +163,9 @@ def _rows(places: Places, planned: PlannedRun, cost: float) -> Iterator[tuple[st
             yield from _generation_rows(name, record)
         if places.study(name).is_file():
             yield from _study_rows(name, read_json(places.study(name), Study))
+        if places.study(name, "signal").is_file():
+            for row in read_json(places.study(name, "signal"), SignalStudy)["signal"]:
+                yield "signal", {"run": name} | {k: row[k] for k in SCHEMA["signal"] if k in row}
 
 
 def _run_row(

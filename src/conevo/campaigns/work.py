@@ -16,6 +16,7 @@ import sys
 import threading
 import time
 import traceback
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,7 @@ from conevo.campaigns.devices import CPU
 from conevo.campaigns.inputs import located
 from conevo.campaigns.places import Places
 from conevo.campaigns.plan import PlannedRun
+from conevo.campaigns.plan_file import STUDIES
 from conevo.campaigns.records import PlannedLine
 from conevo.errors import ConevoError, EnvironmentFailure, UsageError
 from conevo.outside import line_of
@@ -94,8 +96,7 @@ def carry_out(
         found = _evolve(places, planned[label], threads, device, limit or TimeLimit(None))
         if found.status != "finished":
             return False  # its time was over
-        if planned[label].studies:
-            _study(places, planned[label], found, threads)
+        _study(places, planned[label], found, threads)
     except _InUse:
         sys.stderr.write(f"{label} is in use by another worker, which will finish it\n")
         return False  # whoever has it writes how it ended
@@ -168,7 +169,8 @@ def _evolve(
         raise _InUse
     how: dict[str, Any] = {"threads": threads, "device": device, "accept_other_code": True}
     if longer and isinstance(found, Run):
-        places.study(planned.label).unlink(missing_ok=True)  # of a team that may not stay
+        for kind in STUDIES:  # of a team, and of populations, that may not stay
+            places.study(planned.label, kind).unlink(missing_ok=True)
         found.extend_as(longer, **how)
     if found.status != "finished":
         found.resume(time_limit=limit, **how)
@@ -176,15 +178,18 @@ def _evolve(
 
 
 def _study(places: Places, planned: PlannedRun, found: Run | Shaping, threads: int) -> None:
-    """Study the fittest team of a run, or of every stage, unless that was done."""
+    """Make the studies of a run, or of every stage, that were not made yet."""
+    from conevo.analysis.signal import signal_study
     from conevo.analysis.studies import study
 
+    make: dict[str, Callable[..., Any]] = {"teams": study, "signal": signal_study}
     runs = [found] if isinstance(found, Run) else found.stages
     for name, run in zip(planned.names, runs, strict=True):
-        path = places.study(name)
-        if not path.is_file():
-            path.parent.mkdir(exist_ok=True)
-            replace_file(path, as_json(study(run, threads=threads)))
+        for kind in planned.studies:
+            path = places.study(name, kind)
+            if not path.is_file():
+                path.parent.mkdir(parents=True, exist_ok=True)
+                replace_file(path, as_json(make[kind](run, threads=threads)))
 
 
 def _frozen(value: Any) -> Any:

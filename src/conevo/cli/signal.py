@@ -24,7 +24,7 @@ __all__ = ["signal"]
 @click.option(
     "--units", type=click.IntRange(2, 1_000_000), metavar="N",
     help="Genotypes tried of each population, or of neurons each sub-population (default: 20; of a "
-    "single population 3 for every robot, at least 20).",
+    "single population 3 for every robot, at least 20; with elite partners 5).",
 )  # fmt: skip
 @click.option(
     "--trials", type=click.IntRange(2, 1_000_000), metavar="N", default=50, show_default=True,
@@ -57,7 +57,9 @@ def signal(
     genotype, by Spearman-Brown.
 
     Each trial of all genotypes takes N team evaluations (--units), with a single population as
-    with many: usually 1,000 to 3,000 in all, and twice that of a RUN. The number is printed first.
+    with many: usually 1,000 to 3,000 in all, and twice that of a RUN. Where partners come from an
+    elite (method.partners), it takes N for each population or sub-population: up to 50,000. The
+    number is printed first.
 
     Try: conevo signal rover/complex-5 --method ccga
     """

@@ -8,6 +8,8 @@ thesis, and by Mann-Whitney with Holm's correction over all comparisons of the c
   the range that the claim comes to, is contradicted if it lies outside, and else stays open.
 - Choice: a statement about CONE is not tested by runs in which it hardly exchanged anything between
   its populations: there it is Multi-Agent ESP with type C fitness.
+- Choice: nor is a statement about a method whose fitness told next to nothing about genotypes, so
+  that it selected by luck; where runs have a study of it (``repeatability.has_signal``).
 - Choice: a statement about several environments together says nothing until all have runs.
 """
 
@@ -42,7 +44,8 @@ class Outcome(Enum):
     OPEN = 1
     HOLDS = 2
     UNTESTED = 3
-    MISSING = 4
+    BLIND = 4
+    MISSING = 5
 
 
 @dataclass(frozen=True)
@@ -128,6 +131,8 @@ def _cell(
     estimate = _estimate(statement, runs)
     if runs.present != set(statement.environments):
         by_t = by_rank = Outcome.MISSING
+    elif runs.is_blind:
+        by_t = by_rank = Outcome.BLIND
     elif runs.is_idle:
         by_t = by_rank = Outcome.UNTESTED
     elif isinstance(statement, Compare):

@@ -13,6 +13,7 @@ from conevo.analysis.claims.statements import Compare, Sample, Within
 from conevo.analysis.comparison import levels_of
 from conevo.analysis.exchange import is_idle
 from conevo.analysis.frames import Tables
+from conevo.analysis.repeatability import has_signal
 
 __all__ = ["Evidence", "Gathered", "RunOf", "read_evidence"]
 
@@ -23,6 +24,8 @@ class RunOf(NamedTuple):
     """A run of some method in some environment.
 
     exchanges, exchange_share: as in the table of runs; None of methods that never exchange.
+    reliability: of a genotype's fitness in generation 0, by the method's scheme, 0 if all had the
+    same fitness; None without a study of signal.
     """
 
     run: str
@@ -30,6 +33,7 @@ class RunOf(NamedTuple):
     budget: str
     exchanges: float | None = None
     exchange_share: float | None = None
+    reliability: float | None = None
 
 
 @dataclass(frozen=True)
@@ -42,12 +46,19 @@ class Gathered:
         budgets: of these runs.
         exchange: pairs of sub-populations that recombined between populations in a generation, and
             of those that could have; of the sample with the least, None if no sample's runs could.
+        reliability: mean of the sample with the least signal, None if no sample has studies of it.
     """
 
     samples: tuple[list[float], ...]
     present: frozenset[str]
     budgets: frozenset[str]
     exchange: Exchange = (None, None)
+    reliability: float | None = None
+
+    @property
+    def is_blind(self) -> bool:
+        """Whether fitness told a sample's methods next to nothing about their genotypes."""
+        return self.reliability is not None and not has_signal(self.reliability)
 
     @property
     def is_idle(self) -> bool:
@@ -112,7 +123,14 @@ class Evidence:
         asked = zip((a, b), runs, strict=True)
         made = [_exchange(one, of) for one, of in asked]
         least = min((one for one in made if one[0] is not None), default=(None, None))
-        return Gathered((first, second), frozenset(present), frozenset(budgets), least)
+        known = [one for one in map(_reliability, runs) if one is not None]
+        return Gathered(
+            (first, second),
+            frozenset(present),
+            frozenset(budgets),
+            least,
+            min(known, default=None),
+        )
 
     def _gather_one(self, sample: Sample) -> Gathered:
         """Return the runs of a sample.
@@ -140,7 +158,8 @@ class Evidence:
         runs = [
             run for place, budget in chosen.items() for run in self._runs(sample, place, budget)
         ]
-        return Gathered((flat,), present, frozenset(chosen.values()), _exchange(sample, runs))
+        budgets, made = frozenset(chosen.values()), _exchange(sample, runs)
+        return Gathered((flat,), present, budgets, made, _reliability(runs))
 
     def _runs(self, sample: Sample, environment: str, budget: str) -> list[RunOf]:
         """Return the runs of a sample in one environment at one budget."""
@@ -177,8 +196,9 @@ def read_evidence(tables: Tables) -> list[Evidence]:
 
     _, rows = tables.query(
         "SELECT world, preset, variant, environment, method, run, seed, budget, exchanges,"
-        " exchange_share"
-        " FROM runs JOIN budgets USING (run) ORDER BY ALL"
+        " exchange_share, reliability FROM runs JOIN budgets USING (run) LEFT JOIN"
+        " (SELECT run, coalesce(icc_of_scheme, 0) AS reliability FROM signal"
+        " WHERE generation = 'first') USING (run) ORDER BY ALL"
     )
     variants: dict[tuple[str, str], dict[str, set[str]]] = defaultdict(lambda: defaultdict(set))
     for world, preset, variant, _, method, *_ in rows:
@@ -217,6 +237,12 @@ def _exchange(sample: Sample, runs: Sequence[RunOf]) -> Exchange:
     if not runs or len(made) < len(runs) or len(shares) < len(runs):
         return None, None
     return math.fsum(made) / len(runs), math.fsum(shares) / len(runs)
+
+
+def _reliability(runs: Sequence[RunOf]) -> float | None:
+    """Return the mean reliability of fitness in runs; None unless all have a study of it."""
+    known = [one.reliability for one in runs if one.reliability is not None]
+    return math.fsum(known) / len(runs) if runs and len(known) == len(runs) else None
 
 
 def _usual(of: Mapping[str, list[tuple[int, float]]]) -> str:

@@ -2,7 +2,8 @@
 
 A claim is reproduced if its statements hold in all the environments that it needs, not reproduced
 if they are contradicted in too many for that, and undecided otherwise; not tested if all that is
-open depends on an exchange between populations that hardly ran, not judged if the thesis says the
+open depends on an exchange between populations that hardly ran, or on methods whose fitness told
+nothing about genotypes, not judged if the thesis says the
 opposite elsewhere, and decided by the world if teams that nothing evolved differ in the same way.
 
 - Choice: where the two tests lead to different verdicts the claim is undecided, and both are told.
@@ -33,7 +34,10 @@ __all__ = ["Verdict", "judge", "verdicts"]
 REPRODUCED = "reproduced"
 NOT_REPRODUCED = "not reproduced"
 UNDECIDED = "undecided: "
-UNTESTED = "not tested: no exchange"
+UNTESTED = {
+    Outcome.BLIND: "not tested: no signal",
+    Outcome.UNTESTED: "not tested: no exchange",
+}
 NOT_JUDGED = "not judged: the thesis contradicts itself"
 BY_WORLD = "decided by the world"
 
@@ -50,8 +54,9 @@ class Verdict:
         n: runs per sample, "20" or "3 to 20".
         budget: preset and team evaluations.
         variant: the levels of the campaign's further factors, "gst=0.1, rounds=2"; empty without.
-        verdict: "reproduced", "not reproduced", "not tested: no exchange", "not judged: the thesis
-            contradicts itself", "decided by the world", or "undecided: " and why.
+        verdict: "reproduced", "not reproduced", "not tested: no exchange" or "no signal", "not
+            judged: the thesis contradicts itself", "decided by the world", or "undecided: " and
+            why.
         alone: the verdict if nothing else in the thesis counted.
         caution: what the thesis says elsewhere, what the verdict does not cover, what decides it.
         power: how likely the claim's methods would be found alike if they were exactly so; None of
@@ -175,8 +180,9 @@ def _verdict(
         return NOT_REPRODUCED
     if all(outcome is Outcome.HOLDS for outcome in parts):
         return REPRODUCED
-    if Outcome.UNTESTED in parts:
-        return UNTESTED
+    for outcome, verdict in UNTESTED.items():
+        if outcome in parts:
+            return verdict
     if Outcome.OPEN in parts:
         still = [c for c, o in zip(cells, outcomes, strict=True) if o is Outcome.OPEN]
         is_zero = all(cell.is_zero for cell in still)
@@ -193,6 +199,7 @@ def _part(part: Part, outcomes: Sequence[Outcome]) -> Outcome:
         by_place[statement.environments].add(outcome)
     order = (
         Outcome.CONTRADICTED,
+        Outcome.BLIND,
         Outcome.UNTESTED,
         Outcome.OPEN,
         Outcome.MISSING,

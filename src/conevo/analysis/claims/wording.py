@@ -99,6 +99,8 @@ def counts(cells: Sequence[Cell]) -> list[str]:
     if worst := sorted(of[Outcome.CONTRADICTED], key=lambda cell: cell.weight):
         names = [f"{place_of(cell.statement)} {what_of(cell.statement)}" for cell in worst]
         told.append(f"{len(worst)} contradicted ({'; '.join(_few(names))})")
+    if blind := of[Outcome.BLIND]:
+        told.append(f"{len(blind)} not tested: no signal, fitness tells nothing about genotypes")
     if untested := of[Outcome.UNTESTED]:
         told.append(f"{len(untested)} not tested: no exchange between populations")
     if of[Outcome.OPEN]:

@@ -10,6 +10,7 @@ from conevo.analysis.claims.wording import place_of, what_of
 from conevo.analysis.exchange import per_generation
 from conevo.analysis.exhibits import Column, Section, Table, interval, number, p_value, plain
 from conevo.analysis.frames import Tables
+from conevo.analysis.repeatability import LEAST_RELIABILITY
 
 __all__ = ["claims"]
 
@@ -54,7 +55,9 @@ def claims(tables: Tables) -> Section:
         f"{levels}n: runs per sample. Exchange: pairs of sub-populations of CONE that recombined "
         "between populations in a generation, and of those that could have; where that is next to "
         "nothing (fewer than one pair, and fewer than a tenth) statements about CONE are not "
-        "tested. Significant: p < 0.05, by the t-test uncorrected as in the thesis and "
+        "tested. Nor are statements about methods without signal, where runs have a study of it: "
+        f"reliability of fitness in generation 0 below {LEAST_RELIABILITY}. "
+        "Significant: p < 0.05, by the t-test uncorrected as in the thesis and "
         "by Mann-Whitney with Holm's correction over the claim; alike: no significant difference, "
         "and the interval of the difference inside ±15 % of the larger mean. Power: how often "
         "methods that are exactly alike would be found so, with as many runs that scatter as much."

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from conevo.analysis import tiles
@@ -24,12 +24,20 @@ from conevo.analysis.exhibits import (
 )
 from conevo.analysis.power import power_of_pair
 from conevo.analysis.ranks import EXACT_RUNS
+from conevo.analysis.repeatability import LEAST_RELIABILITY
 from conevo.analysis.sections.scope import Scope, place_names, sizes
+from conevo.analysis.sections.signal import blind_cells
 from conevo.analysis.statistics import ALPHA
+from conevo.terms import counted
 from conevo.worlds.measures import Measure
 
 __all__ = ["comparisons"]
 
+NO_EXCHANGE, NO_SIGNAL = "no exchange", "no signal"
+NOTES = {
+    NO_EXCHANGE: "No exchange: CONE hardly recombined between populations there.",
+    NO_SIGNAL: "No signal: fitness told a method next to nothing about genotypes there.",
+}
 MOST_ROWS = 28  # of a drawing: eight methods
 
 TESTS = (
@@ -65,13 +73,22 @@ def comparisons(scope: Scope) -> Section | None:
             "type C fitness where that is on. Comparisons of these cells do not test the benefit "
             "of exchange."
         )
+    untested = dict.fromkeys(idle, NO_EXCHANGE)
+    if blind := blind_cells(scope):
+        names = " and ".join(sorted({cell.treatment.title for cell in blind}))
+        text.append(
+            f"Fitness told {names} next to nothing about genotypes in {counted(len(blind), 'cell')}"
+            f" (reliability below {LEAST_RELIABILITY} at first, section Signal). Comparisons of "
+            "these cells do not test the methods."
+        )
+        untested |= dict.fromkeys(blind, NO_SIGNAL)
     exhibits: list[Exhibit] = [
         *_map(scope, pairs),
-        _pair_table(scope, pairs, scope.stem, scope.main, idle, is_open=len(pairs) <= 12),
+        _pair_table(scope, pairs, scope.stem, scope.main, untested, is_open=len(pairs) <= 12),
     ]
     for measure, others in scope.others.items():
         stem, of = f"{scope.stem}-{measure.name}", compare_all(others)
-        exhibits.append(_pair_table(scope, of, stem, measure, idle, is_open=False))
+        exhibits.append(_pair_table(scope, of, stem, measure, untested, is_open=False))
     return Section("Comparisons", text, exhibits)
 
 
@@ -135,11 +152,12 @@ def _pair_row(scope: Scope, pair: Pair) -> dict[str, Any]:
     }
 
 
-def _judged(pair: Pair, idle: Collection[Cell]) -> dict[str, Any]:
+def _judged(pair: Pair, untested: Mapping[Cell, str]) -> dict[str, Any]:
     """Return a pair's verdict, with what it does not test, and the power of "alike"."""
-    is_untested = any(Cell(pair.environment, one) in idle for one in (pair.a, pair.b))
+    both = (Cell(pair.environment, one) for one in (pair.a, pair.b))
+    why = sorted({untested[cell] for cell in both if cell in untested})
     return {
-        "verdict": f"{pair.verdict}, no exchange" if is_untested else pair.verdict,
+        "verdict": ", ".join([pair.verdict, *why]),
         "power": power_of_pair(pair.samples[0], pair.samples[1]),
     }
 
@@ -149,7 +167,7 @@ def _pair_table(
     pairs: Sequence[Pair],
     stem: str,
     measure: Measure,
-    idle: Collection[Cell],
+    untested: Mapping[Cell, str],
     *,
     is_open: bool,
 ) -> Table:
@@ -174,10 +192,9 @@ def _pair_table(
         f"95 % interval: Welch; {tests} "
         "Alike: no test below 0.05 and the interval inside ±15 % of the larger mean; power: "
         "probability that two exactly alike methods, with this number and spread of runs, are "
-        "found alike."
-        + (" No exchange: CONE hardly recombined between populations there." if idle else "")
+        "found alike." + "".join(f" {NOTES[why]}" for why in sorted(set(untested.values())))
     )
-    rows = [_pair_row(scope, pair) | _judged(pair, idle) for pair in pairs]
+    rows = [_pair_row(scope, pair) | _judged(pair, untested) for pair in pairs]
     return Table(
         f"{stem}-comparisons",
         f"Every two methods compared: {measure.axis}",

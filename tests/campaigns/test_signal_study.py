@@ -1,0 +1,76 @@
+"""The signal as a study of a campaign: measured once per run, a table, and part of what is done."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from campaigns.plans import tiny_campaign, write_plan
+from conevo.analysis.frames import SCHEMA, Tables
+from conevo.analysis.report import sections_of
+from conevo.analysis.sections.overview import read_campaign
+from conevo.analysis.signal import signal_of_run
+from conevo.campaigns.campaign import Campaign, create
+from conevo.campaigns.executors.local import Serial
+from conevo.campaigns.plan_file import read_plan
+from conevo.reading import read_json
+from conevo.runs.run import Run
+
+OWN = Path(__file__).resolve().parents[2] / "examples" / "own_method.py"
+
+
+@pytest.fixture(scope="module")
+def campaign(tmp_path_factory: pytest.TempPathFactory) -> Campaign:
+    """A finished campaign of two tiny runs, to which the study was added afterwards."""
+    folder = tmp_path_factory.mktemp("signal")
+    tiny_campaign(folder, "studies = []")
+    made = Campaign(folder / "tiny")
+    made.carry_on(Serial(1))
+    plan = write_plan(folder, 'studies = ["signal"]')
+    return create(read_plan(plan), made.path)
+
+
+def test_a_study_that_a_plan_gets_later_is_all_that_is_missing(campaign) -> None:
+    before = {name: campaign.places.run(name) / "DONE" for name in campaign.planned}
+    sealed = {name: path.stat().st_mtime_ns for name, path in before.items()}
+    assert not any(campaign.is_finished(label) for label in campaign.planned)
+    campaign.carry_on(Serial(1))
+    assert all(campaign.is_finished(label) for label in campaign.planned)
+    assert {name: path.stat().st_mtime_ns for name, path in before.items()} == sealed
+    for label in campaign.planned:
+        study = read_json(campaign.places.study(label, "signal"))
+        run = Run(campaign.places.run(label))
+        assert study == signal_of_run(run, threads=1) | {"not_measured": ""}
+        assert not campaign.places.study(label).exists()
+    with Tables(campaign.places.tables) as tables:
+        for label in campaign.planned:
+            columns = [name for name in SCHEMA["signal"] if name != "run"]
+            sql = f"SELECT {', '.join(columns)} FROM signal WHERE run = '{label}' ORDER BY ALL"
+            study = read_json(campaign.places.study(label, "signal"))["signal"]
+            rows = [tuple(row[name] for name in columns) for row in study]
+            assert tables.query(sql)[1] == rows
+        about = read_campaign(campaign.path, campaign.places.tables)
+        titles = [part.title for section in sections_of(tables, about) for part in section.sections]
+    assert "Signal" in titles
+
+
+def test_of_a_method_without_populations_the_study_says_why_there_is_none(tmp_path) -> None:
+    where = f"""
+[[where]]
+method = ["{OWN}:team-es"]
+settings = {{ "method.genotypes" = 6 }}
+"""
+    plan = write_plan(tmp_path, 'studies = ["signal"]', more=where)
+    text = plan.read_text().replace('["homcne", "cone"]', f'["{OWN}:team-es"]')
+    plan.write_text(text.replace("seeds = 2", "seeds = 1"))
+    campaign = create(read_plan(plan), tmp_path / "tiny")
+    campaign.carry_on(Serial(1))
+    (label,) = campaign.planned
+    assert campaign.is_finished(label)
+    study = json.loads(campaign.places.study(label, "signal").read_text())
+    assert study["signal"] == []
+    assert study["not_measured"].startswith("Team ES has no populations")
+    with Tables(campaign.places.tables) as tables:
+        assert tables.query("SELECT count(*) FROM signal")[1] == [(0,)]
