@@ -104,6 +104,16 @@ def test_a_run_of_an_older_conevo_is_shown_without_validation() -> None:
     assert lines[2].split() == ["fittest", "team", "3", "2", "(1", "of", "2)", "0.5"]
     assert sum(line.startswith("warning: value is not finite") for line in lines) == 1
     assert not any("finalists" in line for line in lines)
+    assert not any("favourite" in line for line in lines)  # of a run that has none
+    likes = {"favourites": ["hi", None, "low", "hi"], "favourite_shares": [1.0, None, 0.5, 0.75]}
+    lines = text_of_test({"champion": tested | likes, "generation_0": tested}).splitlines()
+    told = (
+        "favourite settings of the fittest team: hi 2, low 1 (share 0.75); 1 = always the same one"
+    )
+    assert told in lines
+    likes = {"favourites": [None], "favourite_shares": [None]}
+    lines = text_of_test({"champion": tested | likes, "generation_0": tested}).splitlines()
+    assert "favourite settings of the fittest team: none; 1 = always the same one" in lines
 
 
 def test_bars_show_the_shape_of_a_series() -> None:
@@ -153,8 +163,9 @@ def test_the_live_view_names_all_that_is_asked_of_it(tmp_path: Path) -> None:
     shown = console.file.getvalue()
     for words in (
         "rover-v2/complex-1, CONE, preset smoke, seed 1", "generation 5/5", "left", "value",
-        "area", "best", "mean", "castes", "SST", "GST", "recombinations between populations",
-        "neurons", "team evaluations/s", "(points, larger is better)",
+        "area", "best", "mean", "castes", "settings", "1 = always the same one", "SST", "GST",
+        "recombinations between populations", "neurons", "team evaluations/s",
+        "(points, larger is better)",
         "degree of specialization S (0 = always the same action, 1 = switches all the time)",
     ):  # fmt: skip
         assert words in shown

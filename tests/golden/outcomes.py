@@ -41,6 +41,7 @@ RUNS = {
 }
 RESTLESS = {"stagnation_v": 1, "stagnation_w": 1, "stagnation_y": 1, "gst": 1.0, "sst": 1.0}
 ITERATIONS = 120
+LIKES = ("favourites", "favourite_share", "favourite_shares")  # a digest of their own
 
 
 def digest(*arrays: Any) -> str:
@@ -49,6 +50,11 @@ def digest(*arrays: Any) -> str:
     for array in map(np.ascontiguousarray, arrays):
         found.update(f"{array.dtype.str} {array.shape}".encode() + array.tobytes())
     return found.hexdigest()
+
+
+def written(table: Any) -> Any:
+    """Return a table of a run as the bytes of its text."""
+    return np.frombuffer(json.dumps(table, sort_keys=True).encode(), np.uint8)
 
 
 def teams_of(sizes: tuple[int, int, int], robots: int, n: int) -> tuple[Any, Any]:
@@ -94,10 +100,14 @@ def of_methods() -> Iterator[tuple[str, str]]:
             with tempfile.TemporaryDirectory() as folder:
                 run = conevo.evolve(task, method, "smoke", 7, f"{folder}/run", overrides=settings)
                 lines = [line | {"seconds": 0} for line in run.generations()]
-                team, text = run.champion, json.dumps([lines, run.test_result], sort_keys=True)
+                team, tested = run.champion, run.test_result
             assert team is not None
-            told = np.frombuffer(text.encode(), np.uint8)
+            assert tested is not None
+            tables = [*lines, tested["champion"], tested["generation_0"]]
+            likes = [{key: table.pop(key) for key in LIKES if key in table} for table in tables]
+            told = written([lines, tested])
             yield f"{task} {method}", digest(team.genes, team.active, team.fitness, told)
+            yield f"{task} {method} favourites", digest(written(likes))
 
 
 def outcomes() -> dict[str, str]:

@@ -40,6 +40,8 @@ def record(generation, **changes):
         "team_fitness": 10.0 + generation,
         "performance": {"value": 1.0 + generation, "area": 0.5},
         "castes": {"low": 2, "non-specialized": 1},
+        "favourites": {"low": 2, "hi": 1},
+        "favourite_share": 0.75,
         "specialization": 0.25,
         "sst": 0.5,
         "gst": 0.2,

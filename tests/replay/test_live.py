@@ -44,7 +44,21 @@ def test_a_run_stands_as_its_files_say(tmp_path):
     assert run["performance"] == {"value": 3.0, "area": 0.5}
     assert (run["fitness"], run["best"], run["specialization"]) == (12.0, 22.0, 0.25)
     assert (run["sst"], run["gst"], run["castes"]) == (0.5, 0.2, {"low": 2, "non-specialized": 1})
+    assert (run["favourites"], run["favourite_share"]) == ({"low": 2, "hi": 1}, 0.75)
     assert run["champion"] == 2
+
+
+def test_a_log_of_an_earlier_version_has_no_favourites(tmp_path):
+    path = write_run(tmp_path / "run", 0)
+    later = record(1, favourites={"med": 1}, favourite_share=0.5)
+    old = {key: value for key, value in record(0).items() if "favourite" not in key}
+    append(path, old)
+    run = one(watched := Watched([path]))
+    assert (run["status"], run["favourites"], run["favourite_share"]) == ("interrupted", {}, None)
+    append(path, later)
+    run = one(watched)
+    assert (run["favourites"], run["favourite_share"]) == ({"med": 1}, 0.5)
+    assert watched.details("run")["columns"]["favourite_share"] == [None, 0.5]
 
 
 def test_details_have_every_generation(tmp_path):
@@ -144,6 +158,8 @@ def damaged(**changes):
         (damaged(seconds=1e300), "seconds must be a number from 0 on"),
         (damaged(team_evaluations=-1), "team_evaluations must be a number from 0 on"),
         (damaged(castes={"low": "two"}), "a number expected, not 'two'"),
+        (damaged(favourites={"low": "two"}), "a number expected, not 'two'"),
+        (damaged(favourite_share="1"), "a number expected, not '1'"),
         (damaged(performance=[1]), "has no attribute"),
         (damaged(castes={f"{k}": 1 for k in range(63)}), "more than 64 names"),
         (damaged(n_hidden=3), "not iterable"),

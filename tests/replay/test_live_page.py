@@ -198,6 +198,11 @@ def test_a_click_on_a_run_shows_its_details(live, runs, label):
     )
     for name, n in last["castes"].items():
         assert f"{name} {n}" in details(live, "castes")
+    liked = details(live, "favourites")
+    for name, n in last["favourites"].items():
+        assert f"{name} {n}" in liked
+    share = number(re.search(r"mean share ([\d.]+), 1 = always the same one", liked)[1])
+    assert share == pytest.approx(last["favourite_share"], rel=5e-4)
     numbers = [number(one) for one in details(live, "thresholds").split(", ")]
     assert numbers == pytest.approx([last["sst"], last["gst"]], rel=5e-4)
     assert number(details(live, "evaluations").split(" ")[0]) == last["team_evaluations"]

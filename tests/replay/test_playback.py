@@ -57,6 +57,8 @@ def test_a_playback_shows_what_was_recorded(task, is_heuristic):
     assert {kind.name for kind in playback.castes} == {*about["castes"], "non-specialized"}
     for name in ("specialization", "fitness", "heuristic"):
         assert [getattr(robot, name) for robot in playback.robots] == about[name]
+    assert [robot.favourite for robot in playback.robots] == about["favourites"]
+    assert [robot.share for robot in playback.robots] == about["favourite_shares"]
     assert [list(robot.neurons) for robot in playback.robots] == about["neurons"]
     assert (playback.iterations, len(playback.robots)) == (t, r)
     assert sorted(playback.events, key=lambda event: event.t) == list(playback.events)
@@ -102,15 +104,22 @@ def test_words():
     assert dict(playback_of(hunt).facts)["collisions"] == (
         f"{number(collisions)} refused moves (smaller is better)"
     )
-    about = {k: v for k, v in epoch(TASKS[0]).about.items() if k != "units"}  # conevo 0.1.0
-    old = dataclasses.replace(epoch(TASKS[0]), about=about)
-    assert dict(playback_of(old).facts)["value"] == f"{performance['value']:.0f}"
+    new = ("units", "favourites", "favourite_shares")  # conevo 0.1.0 had none
+    about = {k: v for k, v in epoch(TASKS[0]).about.items() if k not in new}
+    old = playback_of(dataclasses.replace(epoch(TASKS[0]), about=about))
+    assert dict(old.facts)["value"] == f"{performance['value']:.0f}"
+    assert "favourite settings" not in dict(old.facts)
+    assert {(robot.favourite, robot.share) for robot in old.robots} == {("", 0.0)}
     assert (facts["run"], facts["method"], facts["seed"]) == ("here", "Multi-Agent ESP", "4")
     assert facts["hidden neurons"] == "10 to 11"  # one has a hole among its neurons
     mean = np.mean(epoch(TASKS[0]).about["fitness"])
     assert facts["team fitness (mean)"] == number(mean)
     caste, n = Counter(epoch(TASKS[0]).about["labels"]).most_common(1)[0]
     assert facts["castes"].startswith(f"{n} {caste}")
+    liked = Counter(name for name in epoch(TASKS[0]).about["favourites"] if name)
+    share = sum(epoch(TASKS[0]).about["favourite_shares"]) / liked.total()
+    assert facts["favourite settings"].endswith(f"; mean share {number(share)}")
+    assert all(f"{n} {name}" in facts["favourite settings"] for name, n in liked.items())
     assert playback_of(epoch(TASKS[0])).subtitle == "a team of no run"
     unknown = playback_of(renamed(epoch(TASKS[0]), **(of_a_run | {"method": "mine"})))
     assert unknown.subtitle.startswith("mine, seed 4, ")

@@ -13,6 +13,7 @@ from conevo.errors import EnvironmentFailure, UsageError
 from conevo.playback.channel import Channel
 from conevo.replay.trajectory import Trajectory
 from conevo.rng import fold
+from conevo.worlds.protocol import setting_columns
 from conevo.worlds.registry import world
 from conevo.worlds.rollout import Rollout
 from replay.epochs import TASKS, epoch, random_team, renamed
@@ -83,6 +84,14 @@ def test_a_trajectory_is_what_the_kernels_did(task):
         assert abs(curve.values[-1] - value) <= curve.step / 2 + 1e-9 * abs(value)
     assert about["scenario"] == key
     assert len(about["labels"]) == len(about["specialization"]) == a_world.n_robots
+    counts = out.counts[0, 0][:, setting_columns(a_world)]
+    shares = counts.max(axis=1) / np.maximum(counts.sum(axis=1), 1)
+    assert about["favourite_shares"] == pytest.approx(shares.tolist())
+    for robot, name in enumerate(about["favourites"]):
+        assert (name == "") == (counts[robot].sum() == 0)
+        if name:
+            chosen = getattr(a_world, "settings", a_world.castes)
+            assert counts[robot, chosen.index(name)] == counts[robot].max()
 
 
 @pytest.mark.parametrize("task", TASKS)
@@ -214,6 +223,10 @@ HOSTILE = {
     "no robots": {"about": {"n_robots": 0}},
     "more labels than robots": {"about": {"labels": ["low"] * 30}},
     "a caste of its own": {"about": {"labels": ["<script>"] * 20}},
+    "more favourites than robots": {"about": {"favourites": ["low"] * 30}},
+    "a favourite of its own": {"about": {"favourites": ["<script>"] * 20}},
+    "favourites without shares": {"about": {"favourites": []}},
+    "a share above 1": {"about": {"favourite_shares": [1.5] * 20}},
     "something more": {"about": {"script": "alert(1)"}},
     "nested params": {"about": {"params": {"a": {"b": []}}}},
     "not a number": {"about": {"fitness": [float("nan")] * 20}},

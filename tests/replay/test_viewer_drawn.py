@@ -74,6 +74,13 @@ def check_panel(epoch, t, robot, said):
     if action >= 0:
         assert about["actions"][action] in field["action"]
     assert about["labels"][robot] in field["caste"]
+    if liked := about["favourites"][robot]:
+        name, _, share = field["favourite"].rpartition(", ")
+        assert name == liked
+        number, tolerance = number_in(share)
+        assert number == pytest.approx(100 * about["favourite_shares"][robot], abs=tolerance)
+    else:
+        assert field["favourite"] == "–"
     expected = {
         "x": epoch.at("x", t, robot),
         "y": epoch.at("y", t, robot),

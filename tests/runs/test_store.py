@@ -7,6 +7,7 @@ import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -167,6 +168,22 @@ def test_the_seal_names_files_that_were_changed(tmp_path: Path) -> None:
     (run.path / "test.json").write_text("{}")
     (run.path / "champion.npz").unlink()
     assert run.changed_files == ["champion.npz", "test.json"]
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [("favourites", ["low"]), ("favourite_shares", [0.5] * 21), ("favourite_shares", None)],
+)
+def test_every_tested_robot_has_a_favourite_and_its_share(
+    key: str, value: Any, tmp_path: Path
+) -> None:
+    run = evolve_tiny(tmp_path / "run")
+    found = json.loads((run.path / "test.json").read_text())
+    found["champion"].pop(key)
+    found["champion"] |= {key: value} if value else {}
+    (run.path / "test.json").write_text(json.dumps(found))
+    with pytest.raises(UsageError, match="champion has not as many favourites, and shares of th"):
+        _ = conevo.Run(run.path).test_result
 
 
 @pytest.mark.parametrize("out", ["file/run", "/proc/run", "/dev/null/run"])

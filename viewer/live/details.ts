@@ -15,12 +15,16 @@ const FIELDS = [
   ["performance", "task performance"],
   ["fitness", "fitness"],
   ["specialization", "specialization S"],
-  ["castes", "castes"],
+  ["castes", "castes by S"],
+  ["favourites", "favourite settings"],
   ["thresholds", "SST, GST"],
   ["evaluations", "evaluations"],
   ["seconds", "time taken"],
   ["path", "folder"],
 ] as const;
+
+/** Which way the share of a favourite goes. */
+const SHARE = "1 = always the same one";
 
 /** The view of one run. */
 export class DetailsView {
@@ -90,6 +94,9 @@ export class DetailsView {
     this.set("specialization", number(run.specialization));
     const names = Object.entries(run.castes).map(([name, n]) => `${name} ${n}`);
     this.set("castes", casteBar(run, state), ` ${names.join(", ") || "–"}`);
+    const liked = Object.entries(run.favourites).map(([name, n]) => `${name} ${n}`).join(", ");
+    const share = `mean share ${number(run.favourite_share)}, ${SHARE}`;
+    this.set("favourites", liked ? `${liked} (${share})` : "–");
     this.set("thresholds", `${number(run.sst)}, ${number(run.gst)}`);
     const budget = run.budget ? ` of ${count(run.budget)}` : "";
     this.set("evaluations", `${count(run.evaluations)}${budget}`);
@@ -138,6 +145,9 @@ export class DetailsView {
     ]);
     const has = (key: string): boolean => column(key).some((value) => value !== null);
     const lines: Line[] = [["S (0 = always the same action, 1 = switches all the time)", column("specialization"), INK]];
+    if (has("favourite_share")) {
+      lines.push([`share of the favourite setting (${SHARE})`, column("favourite_share"), green]);
+    }
     if (has("sst")) lines.push(["SST", column("sst"), blue, [6, 3]]);
     if (has("gst")) lines.push(["GST", column("gst"), orange, [2, 3]]);
     this.lines(this.thresholds, "", lines, [0, 1]);

@@ -32,6 +32,8 @@ export interface Summary {
   sst: number | null;
   gst: number | null;
   castes: Record<string, number>;
+  favourites: Record<string, number>; // robots by favourite setting; none in earlier logs
+  favourite_share: number | null; // of the settings that a robot used, mean; 1: always the same
 }
 
 export interface Group {

@@ -101,6 +101,8 @@ export class RobotPanel {
     add("action", (t, r) => stage.actions[stage.action.at(t, r)]?.name ?? "none");
     add("caste", stage.castes[one.caste]!.name);
     add("specialization", one.specialization.toFixed(3));
+    const share = `${one.favourite}, ${(100 * one.share).toFixed(0)} %`;
+    add("favourite", one.favourite ? share : "–");
     add("fitness", one.fitness.toFixed(Math.abs(one.fitness) < 1000 ? 3 : 1));
     if (stage.energy) add("energy", (t, r) => stage.energy!.at(t, r).toFixed(1));
     add("x", (t, r) => stage.x.at(t, r).toFixed(3) + unit);

@@ -74,6 +74,8 @@ const robot = read.object({
   fitness: read.number,
   heuristic: read.text,
   neurons: read.list(read.count),
+  favourite: read.text,
+  share: read.length,
 });
 /** What is said about a robot over the whole epoch. */
 export type Robot = read.Of<typeof robot>;

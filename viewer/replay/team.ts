@@ -15,9 +15,11 @@ import { World } from "./world";
 const STACKED = "(max-width: 900px)";
 /** Pixels beside the world that it leaves to what is said about it. */
 const BESIDE = 250;
-/** What the column of S says. */
+/** What the column of S and castes says. */
 const DEGREE =
-  "S: degree of specialization (0 = always the same action, 1 = switches all the time)";
+  "S: degree of specialization (0 = always the same action, 1 = switches all the time); caste by " +
+  "S; share of the favourite setting in those that the robot used, in its colour (1 = always the " +
+  "same one), which S cannot see";
 
 export class Team {
   readonly element: HTMLElement;
@@ -75,7 +77,7 @@ export class Team {
       { class: "lines" },
       make("i"),
       caption,
-      make("p", { title: DEGREE }, "S, caste"),
+      make("p", { title: DEGREE }, "S, caste, favourite"),
       left,
       this.times,
       ends,

@@ -122,15 +122,21 @@ export class Timeline {
     }
   }
 
-  /** Return what stands at the end of a row: the degree of specialization S, and the caste. */
+  /** Return what stands at the end of a row: S, the caste, and the share of the favourite setting. */
   private ending(robot: number): HTMLElement {
-    const { caste, specialization: s } = this.stage.robots[robot]!;
+    const { caste, specialization: s, favourite, share } = this.stage.robots[robot]!;
     const kind = this.stage.castes[caste]!;
     const bar = make("i", { class: "bar" });
     bar.style.setProperty("--part", String(Math.min(Math.max(s, 0), 1)));
     const row = make("span", { "data-row": robot }, bar);
     row.append(make("b", {}, s.toFixed(2)), swatch(kind.colour), make("em", {}, kind.name));
-    row.title = `robot ${robot}: S = ${s.toFixed(3)}, ${kind.name}`;
+    const colour = this.stage.castes.find((one) => one.name === favourite)?.colour;
+    const part = make("i", { class: "bar" });
+    part.style.setProperty("--part", String(Math.min(share, 1)));
+    part.style.setProperty("--colour", colour || FAINT);
+    row.append(part);
+    const liked = favourite && `; favourite setting ${favourite}, share ${share.toFixed(3)}`;
+    row.title = `robot ${robot}: S = ${s.toFixed(3)}, ${kind.name}${liked}`;
     return row;
   }
 

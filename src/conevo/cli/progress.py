@@ -11,9 +11,9 @@ from typing import Any
 import click
 
 from conevo.cli.summary import declared, heading_of, measures_text
-from conevo.cli.text import bars, castes, count, duration, neurons, number
+from conevo.cli.text import bars, castes, count, duration, favourites, neurons, number
 from conevo.runs.run import Run
-from conevo.terms import S_MEANS, counted
+from conevo.terms import S_MEANS, SHARE_SCALE, counted
 from conevo.worlds.measures import Measure
 
 __all__ = ["watching"]
@@ -169,6 +169,9 @@ class Display:
             f"fittest team {number(last['team_fitness'])}",
         )
         yield "castes", castes(last["castes"])
+        if "favourites" in last:  # not in the log of a run that an earlier version began
+            liked = favourites(last["favourites"], last.get("favourite_share"))
+            yield "settings", f"{liked}; {SHARE_SCALE}"
         yield "S", f"{number(last['specialization'])} (mean {S_MEANS})"
         if last["sst"] is not None or last["gst"] is not None:
             yield (

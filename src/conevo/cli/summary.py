@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -13,6 +14,7 @@ from conevo.cli.text import (
     castes,
     count,
     duration,
+    favourites,
     generations,
     mean,
     n_finite,
@@ -29,7 +31,7 @@ from conevo.runs.outline import Outline
 from conevo.runs.records import own_numbers
 from conevo.runs.run import Run
 from conevo.runs.shrinkage import shrinkage
-from conevo.terms import S_SCALE, counted, quoted
+from conevo.terms import S_SCALE, SHARE_SCALE, counted, quoted
 from conevo.worlds.measures import Measure
 
 __all__ = [
@@ -178,10 +180,9 @@ def test_text(result: dict[str, Any]) -> str:
         f"Testing phase, {counted(n, 'fresh scenario')} (mean +- standard deviation; S: {S_SCALE})",
         table(head, rows),
     ]
-    lines += [
-        f"castes of the {row[0]}: {castes(tested['castes'])}"
-        for row, tested in zip(rows, teams.values(), strict=True)
-    ]
+    for row, tested in zip(rows, teams.values(), strict=True):
+        lines += [f"castes of the {row[0]}: {castes(tested['castes'])}"]
+        lines += _favourites_text(f"of the {row[0]}", tested)
     lacking = [
         name
         for name in measures
@@ -195,6 +196,17 @@ def test_text(result: dict[str, Any]) -> str:
     if "validation" in result:
         lines += ["", shrinkage_text(result)]
     return "\n".join(lines)
+
+
+def _favourites_text(of: str, tested: Mapping[str, Any]) -> list[str]:
+    """Return the favourite settings of a tested team, of which earlier versions kept nothing."""
+    if "favourites" not in tested:
+        return []
+    shares = [share for share in tested["favourite_shares"] if share is not None]
+    sizes = Counter(name for name in tested["favourites"] if name is not None)
+    in_order = dict(sorted(sizes.items(), key=lambda one: (-one[1], one[0])))
+    liked = favourites(in_order, sum(shares) / len(shares) if shares else None)
+    return [f"favourite settings {of}: {liked}; {SHARE_SCALE}"]
 
 
 def conditions_text(run: Run, both: dict[str, Any]) -> str:
@@ -220,6 +232,8 @@ def conditions_text(run: Run, both: dict[str, Any]) -> str:
             table(["conditions", "robots", *measures, "S"], rows),
             f"castes, own: {castes(both['own']['castes'])}",
             f"castes, changed: {castes(both['changed']['castes'])}",
+            *_favourites_text("under own conditions", both["own"]),
+            *_favourites_text("under changed conditions", both["changed"]),
         ]
     )
 

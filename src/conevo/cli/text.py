@@ -14,6 +14,7 @@ __all__ = [
     "castes",
     "count",
     "duration",
+    "favourites",
     "generations",
     "neurons",
     "mean",
@@ -100,6 +101,16 @@ def duration(seconds: float) -> str:
 def castes(sizes: Mapping[str, int]) -> str:
     """Return castes with their numbers of robots: "low 12, non-specialized 8"."""
     return ", ".join(f"{name} {size}" for name, size in sizes.items())
+
+
+def favourites(sizes: Mapping[str, int], share: float | None) -> str:
+    """Return favourite settings with their numbers of robots: "low 12, hi 7 (share 0.62)".
+
+    Args:
+        sizes: robots by favourite, largest first.
+        share: of the favourite in the settings that a robot used, mean.
+    """
+    return f"{castes(sizes)} (share {number(share)})" if sizes else "none"
 
 
 def neurons(n_hidden: Sequence[int]) -> str:

@@ -14,13 +14,14 @@ class About(TypedDict):
 
     label, run_id, method, seed: of the run. generation: in which the team was the fittest one.
     epoch: number of the scenario among those that the seed draws; scenario: its key. labels [R]:
-    caste of each robot in this epoch. specialization, fitness [R]: S and fitness in it. heuristic
-    [R]: name of a robot's heuristic controller, "" for its network. neurons [R]: slots in which a
-    robot has hidden neurons. units: what follows a value of each measure of performance, its unit
-    and that smaller is better if it is; conevo 0.1.0 wrote none. controller: its name and settings.
-    inputs, outputs: names of what robots sense and of what their controllers give; conevo 0.1.0
-    wrote none. like: world of the package whose class the world's own inherits. drawn: what it says
-    is drawn.
+    caste of each robot in this epoch. specialization, fitness [R]: S and fitness in it. favourites,
+    favourite_shares [R]: the setting that a robot used most in it and its share of all that it
+    used, "" and 0 if it used none; earlier versions wrote none. heuristic [R]: name of a robot's
+    heuristic controller, "" for its network. neurons [R]: slots in which a robot has hidden
+    neurons. units: what follows a value of each measure of performance, its unit and that smaller
+    is better if it is; conevo 0.1.0 wrote none. controller: its name and settings. inputs, outputs:
+    names of what robots sense and of what their controllers give; conevo 0.1.0 wrote none. like:
+    world of the package whose class the world's own inherits. drawn: what it says is drawn.
     """
 
     format: int
@@ -46,6 +47,8 @@ class About(TypedDict):
     castes: list[str]
     labels: list[str]
     specialization: list[float]
+    favourites: NotRequired[list[str]]
+    favourite_shares: NotRequired[list[float]]
     fitness: list[float]
     heuristic: list[str]
     neurons: list[list[int]]

@@ -81,7 +81,7 @@ def _check_team(playback: Playback) -> None:
         _colour(kind.colour, or_none=True)
     _indices("caste", [robot.caste for robot in playback.robots], len(playback.castes))
     for robot in playback.robots:
-        _finite("a robot", (robot.specialization, robot.fitness))
+        _finite("a robot", (robot.specialization, robot.fitness, robot.share))
         if playback.hidden is not None and not robot.heuristic:
             _indices("neuron", robot.neurons, playback.hidden.codes.shape[2])
     _channel("x", playback.x, (t, b))

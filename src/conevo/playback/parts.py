@@ -175,10 +175,14 @@ def begun(
 def _robots(parts: Parts, castes: list[str]) -> tuple[Robot, ...]:
     about = parts.about
     names = ("labels", "specialization", "fitness", "heuristic", "neurons")
-    rows: Any = zip(*(about[name] for name in names), strict=True)  # type: ignore[literal-required]
+    columns: list[Any] = [about[name] for name in names]  # type: ignore[literal-required]
+    liked = about.get("favourites") or [""] * parts.r
+    shares = about.get("favourite_shares") or [0.0] * parts.r
     return tuple(
-        Robot(castes.index(label), s, fitness, heuristic, tuple(neurons))
-        for label, s, fitness, heuristic, neurons in rows
+        Robot(castes.index(label), s, fitness, heuristic, tuple(neurons), favourite, share)
+        for label, s, fitness, heuristic, neurons, favourite, share in zip(
+            *columns, liked, shares, strict=True
+        )
     )
 
 

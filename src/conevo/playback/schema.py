@@ -133,7 +133,8 @@ class Robot:
     """What is said about a robot over the whole epoch.
 
     caste: index into the playback's castes. specialization: S. fitness. heuristic: its heuristic
-    controller, "" for its network. neurons: slots in which it has hidden neurons.
+    controller, "" for its network. neurons: slots in which it has hidden neurons. favourite: the
+    setting that it used most, "" if none is known; share: of it, in all settings that it used.
     """
 
     caste: int
@@ -141,6 +142,8 @@ class Robot:
     fitness: float
     heuristic: str = ""
     neurons: tuple[int, ...] = ()
+    favourite: str = ""
+    share: float = 0.0
 
 
 @dataclass(frozen=True)

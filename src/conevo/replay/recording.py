@@ -120,6 +120,8 @@ def record_epoch(
         **of_no_run,
         "labels": portrait.labels,
         "specialization": portrait.specialization,
+        "favourites": [name or "" for name in portrait.favourites],
+        "favourite_shares": np.nan_to_num(portrait.favourite_shares).tolist(),
     }
     in_order = {name: about[name] for name in About.__annotations__ if name in about}
     return cast("About", in_order), channels  # in the order that a file is read in

@@ -128,7 +128,12 @@ def _check(about: About) -> None:
     for name in ("labels", "specialization", "fitness", "heuristic", "neurons"):
         if len(about[name]) != r:
             raise ValueError(f"{name} of {len(about[name])} robots, not {r}")
-    if unknown := set(about["labels"]) - set(castes):
+    liked, shares = about.get("favourites", []), about.get("favourite_shares", [])
+    if not len(liked) == len(shares) in (0, r):
+        raise ValueError(f"{len(liked)} favourites and {len(shares)} shares of {r} robots")
+    if not all(0 <= share <= 1 for share in shares):
+        raise ValueError(f"a favourite's share is {min(shares)} to {max(shares)}, not 0 to 1")
+    if unknown := (set(about["labels"]) - set(castes)) | (set(liked) - {*castes, ""}):
         raise ValueError(f"castes that the world does not have: {', '.join(sorted(unknown))}")
 
 

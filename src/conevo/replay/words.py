@@ -52,6 +52,10 @@ def facts(about: About) -> tuple[tuple[str, str], ...]:
         low, high = min(neurons), max(neurons)
         found.append(("hidden neurons", str(low) if low == high else f"{low} to {high}"))
     found.append(("castes", _tally(about["labels"])))
+    liked = [name for name in about.get("favourites", ()) if name]
+    if liked:
+        share = sum(about["favourite_shares"]) / len(liked)  # 0 of whoever has none
+        found.append(("favourite settings", f"{_tally(liked)}; mean share {number(share)}"))
     return tuple(found)
 
 

@@ -15,6 +15,8 @@ from conevo.evolution.protocol import Method, Progress, Scores, State, Trials
 from conevo.rng import stream
 from conevo.runs.evaluation import Evaluate, Portrait
 from conevo.runs.settings import RunSettings
+from conevo.specialization import castes
+from conevo.specialization.favourite import mean_where_defined
 from conevo.terms import counted
 from conevo.worlds.measures import Measure
 from conevo.worlds.protocol import Outcome
@@ -263,6 +265,8 @@ def _record(
         "team_fitness": _finite(np.mean(ended.fittest_fitness)),
         "performance": {name: _finite(value) for name, value in portrait.performance.items()},
         "castes": portrait.castes,
+        "favourites": castes(name for name in portrait.favourites if name is not None),
+        "favourite_share": mean_where_defined(portrait.favourite_shares),
         "specialization": _finite(np.mean(ended.fittest_specialization)),
         "sst": None,
         "gst": None,

@@ -33,6 +33,12 @@ RunId = Annotated[str, StringConstraints(pattern="^[0-9a-f]{12}$")]
 Digest = Annotated[str, StringConstraints(pattern="^[0-9a-f]{32}$")]
 
 
+FAVOURITES = (
+    "favourites",
+    "favourite_shares",
+)  # of a test, one for each robot; earlier versions wrote none
+
+
 class MeasureHeader(TypedDict):
     """A measure of task performance, see ``worlds.measures``."""
 
@@ -152,6 +158,8 @@ class Generation(TypedDict):
     team_fitness: Finite
     performance: Annotated[dict[str, Finite], MinLen(1)]
     castes: dict[str, Count]
+    favourites: NotRequired[dict[str, Count]]
+    favourite_share: NotRequired[Finite]
     specialization: Finite
     sst: Finite
     gst: Finite
@@ -192,6 +200,8 @@ class Tested(TypedDict):
     specialization: list[Finite]
     labels: Annotated[list[str], MinLen(1)]
     castes: dict[str, Count]
+    favourites: NotRequired[list[str | None]]
+    favourite_shares: NotRequired[list[Finite]]
     n_hidden: Annotated[list[Count], MinLen(1)]
 
 
@@ -239,6 +249,9 @@ def contradiction(found: Mapping[str, Any]) -> str:
     for name, team in teams.items():
         if not len(team["labels"]) == len(team["specialization"]) == len(team["n_hidden"]):
             return f"{name} has not as many labels as robots"
+        n, likes = len(team["labels"]), [len(team[key]) for key in FAVOURITES if key in team]
+        if likes not in ([], [n, n]):
+            return f"{name} has not as many favourites, and shares of them, as robots"
     parts = list(teams.values())
     if "validation" in found:
         about = found["validation"]

@@ -101,7 +101,8 @@ def test_team(
 
     Returns:
         Plain data: the team's generation; ``spread`` of each performance measure and of the robots'
-        mean fitness; S and caste of each robot over all scenarios; the caste table.
+        mean fitness; S, caste, favourite setting and its share of each robot over all scenarios;
+        the caste table.
     """
     scenarios = world.scenarios([fold(seed, "test", k) for k in range(n_scenarios)])
     outcome = simulator.evaluate(*team.as_trial(), scenarios)
@@ -116,6 +117,8 @@ def test_team(
         "specialization": [round(value, 6) for value in portrait.specialization],
         "labels": portrait.labels,
         "castes": portrait.castes,
+        "favourites": portrait.favourites,
+        "favourite_shares": [_finite(round(share, 6)) for share in portrait.favourite_shares],
         "n_hidden": [int(n) for n in team.active.sum(axis=1)],
     }
 

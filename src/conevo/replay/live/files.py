@@ -26,7 +26,7 @@ MOST = 16 * 2**20  # bytes of a file that is read whole
 CHUNK = 2**20  # bytes of a log that are read at once
 DAMAGE = (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError)
 LARGEST = 1e100
-NAMES = 64  # measures or castes at most
+NAMES = 64  # measures, castes or settings at most
 NUMBERS = (
     "team_evaluations",
     "seconds",
@@ -39,6 +39,7 @@ NUMBERS = (
     "recombinations",
     "n_nonfinite",
 )
+FURTHER = ("favourite_share", "neurons")  # not in all logs, or a mean
 
 
 def stamp(path: Path) -> Stamp | None:
@@ -123,12 +124,14 @@ class Generations:
         numbers: of the record, by name; ``neurons`` is the mean over the team.
         performance: measures by name.
         castes: robots of each caste by name, in the order in which they appeared.
+        favourites: robots by their favourite setting, the same way; none of earlier versions.
     """
 
     def __init__(self) -> None:
-        self.numbers: dict[str, array[float]] = {name: array("d") for name in (*NUMBERS, "neurons")}
+        self.numbers: dict[str, array[float]] = {name: array("d") for name in (*NUMBERS, *FURTHER)}
         self.performance: dict[str, array[float]] = {}
         self.castes: dict[str, array[float]] = {}
+        self.favourites: dict[str, array[float]] = {}
 
     def __len__(self) -> int:
         return len(self.numbers["seconds"])
@@ -147,13 +150,16 @@ class Generations:
             if not row[name] >= 0:
                 raise ValueError(f"{name} must be a number from 0 on")
         sizes = [_number(size) for size in record["n_hidden"]]
+        row["favourite_share"] = _number(record.get("favourite_share"))
         row["neurons"] = sum(sizes) / len(sizes) if sizes else math.nan
         performance = _numbers(record["performance"], self.performance)
         castes = _numbers(record["castes"], self.castes)
+        favourites = _numbers(record.get("favourites", {}), self.favourites)
         for column, value in row.items():
             self.numbers[column].append(value)
         _extend(self.performance, performance, n, math.nan)
         _extend(self.castes, castes, n, 0.0)
+        _extend(self.favourites, favourites, n, 0.0)
 
 
 class Log:

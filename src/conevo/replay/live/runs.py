@@ -234,8 +234,10 @@ class Subject:
         """Return what the last generation came to; of a shaping of the last stage that has one."""
         stage = next((log.generations for log in reversed(self._logs) if log.generations), None)
         found: dict[str, Any] = {"champion": None, "champion_stage": 0}
-        found |= {"performance": {}, "declared": {}, "castes": {}}
-        found |= dict.fromkeys(("fitness", "best", "specialization", "sst", "gst"))
+        found |= {"performance": {}, "declared": {}, "castes": {}, "favourites": {}}
+        found |= dict.fromkeys(
+            ("fitness", "best", "specialization", "favourite_share", "sst", "gst")
+        )
         if stage is None:
             return found
         names = {"fitness": "team_fitness", "best": "best_fitness"}
@@ -246,9 +248,10 @@ class Subject:
             "performance": {name: _plain(c[-1]) for name, c in stage.performance.items()},
             "declared": {name: one.about for name, one in self.measures.items()},
             "castes": {name: int(c[-1]) for name, c in stage.castes.items() if c[-1] > 0},
+            "favourites": {name: int(c[-1]) for name, c in stage.favourites.items() if c[-1] > 0},
             **{
                 name: _plain(stage.numbers[names.get(name, name)][-1])
-                for name in ("fitness", "best", "specialization", "sst", "gst")
+                for name in ("fitness", "best", "specialization", "favourite_share", "sst", "gst")
             },
         }
 
