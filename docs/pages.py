@@ -40,3 +40,16 @@ def table(head: list[str], rows: list[list[Any]]) -> str:
     """Return a Markdown table."""
     lines = [f"| {' | '.join(map(str, line))} |\n" for line in [head, *rows]]
     return lines[0] + "|---" * len(head) + "|\n" + "".join(lines[1:])
+
+
+def read(path: Path) -> list[Row]:
+    """Return the rows that ``write`` wrote: numbers where they are numbers."""
+    with path.open(newline="") as file:
+        return [{k: _number(v) for k, v in row.items() if v != ""} for row in csv.DictReader(file)]
+
+
+def _number(text: str) -> Any:
+    try:
+        return float(text)
+    except ValueError:
+        return text

@@ -1,0 +1,112 @@
+"""The scripts of experiments/: the rule by hand, blind rovers, and tables of what was measured."""
+
+import math
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import conevo
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path += [str(ROOT / "experiments"), str(ROOT / "docs")]  # scripts import what they share
+
+import calibration_tables as tables  # noqa: E402
+import pages  # noqa: E402
+from blind import Blind, kind  # noqa: E402
+from incentives import Regime, fitted, incentive, residence, value  # noqa: E402
+
+RANGES, ACCURACIES = (0.07, 0.05, 0.03), (0.7, 0.8, 0.9)
+
+
+def regime(segregation=0.0, starts="random", iterations=1250, n_robots=20, **other):
+    return Regime(
+        **{"segregation": segregation, "starts": starts, "ranges": RANGES} | other,
+        accuracies=ACCURACIES, iterations=iterations, n_robots=n_robots,
+    )  # fmt: skip
+
+
+def test_two_switchers_for_one_iteration_by_hand():
+    """The only pair is in range of a rock with the product of two discs' areas."""
+    low, med, hi = (math.pi * r**2 for r in RANGES)
+    expected = (
+        500 * low * low * 0.25 * 0.25 * 0.7 * 0.7
+        + 1000 * low * med * 2 * 0.25 * 0.25 * 0.7 * 0.8
+        + 1500 * med * hi * 2 * 0.25 * 0.25 * 0.8 * 0.9
+        + 2000 * hi * hi * 0.25 * 0.25 * 0.9 * 0.9
+    )
+    found = value(regime(iterations=1, n_robots=2), "switchers")
+    assert found == pytest.approx(expected, rel=0.05)  # a contact cannot be longer than that
+    assert found < expected  # two detections of one rock count once
+
+
+def test_two_castes_by_hand():
+    """Rovers 0 and 1 are both low, one for A and one for B: they only ever detect A."""
+    low = math.pi * RANGES[0] ** 2
+    expected = 500 * low**2 * 0.7**2 * 0.7**2
+    found = value(regime(iterations=1, n_robots=2), "castes")
+    assert found == pytest.approx(expected, rel=0.2)
+
+
+def test_with_all_the_time_in_the_world_everything_is_found():
+    endless = regime(iterations=10**9, ranges=(0.2, 0.15, 0.1))
+    assert value(endless, "switchers") == pytest.approx(5000)
+    assert incentive(endless) == pytest.approx(1)
+
+
+def test_the_value_is_linear_in_segregation():
+    for starts in ("random", "by_robot"):
+        for team in ("castes", "switchers"):
+            ends = [value(regime(s, starts), team) for s in (0.0, 1.0)]
+            middle = value(regime(0.25, starts), team)
+            assert middle == pytest.approx(0.75 * ends[0] + 0.25 * ends[1])
+    assert incentive(regime(1.0, "by_robot")) > incentive(regime(0.0, "by_robot"))
+    assert incentive(regime(1.0, "random")) == pytest.approx(incentive(regime(0.0, "random")))
+
+
+def test_a_walker_leaves_its_quarter_slowly():
+    assert residence(0.3, 1) == pytest.approx(1, abs=0.02)
+    assert residence(0.3, 10**9) == pytest.approx(0.25, abs=0.01)
+    rng = np.random.default_rng(1)
+    at = rng.random((4000, 2)) / 2
+    inside = []
+    for _ in range(1250):
+        angle = rng.random(4000) * 2 * np.pi
+        step = 0.01 * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+        at = np.abs(at + step * (rng.random(4000) < 0.3)[:, None])
+        at = 1 - np.abs(1 - at)
+        inside.append((at < 0.5).all(axis=1).mean())
+    assert residence(0.3, 1250) == pytest.approx(np.mean(inside), abs=0.02)
+
+
+def test_the_constant_is_found_without_the_cells_for_testing():
+    cells = [(regime(s, "by_robot", n), 0.0) for s in (0.0, 0.5, 1.0) for n in (600, 1250)]
+    known = [(one, incentive(one, 3.3)) for one, _ in cells]
+    assert fitted([*known, (regime(0.25), 99.0), (regime(0.75), 0.01)]) == 3.3
+
+
+def test_blind_rovers_spend_their_time_as_their_shares_say():
+    world = conevo.world("rover/complex-5", iterations=400)
+    genes = np.stack([kind((1, 2, 1, 4), 1), kind((0, 0, 0, 1), 40, draw=3), kind((0, 1, 0, 0), 1)])
+    who = np.arange(20) % 3
+    rollout = conevo.Rollout(world, Blind(), n_threads=1)
+    scenarios = world.scenarios([5])
+    counts = rollout.evaluate(genes, who[None, :, None].astype(np.int32), scenarios).counts[0, 0]
+    mean = counts[who == 0].mean(axis=0) / 400
+    assert mean == pytest.approx([0.125, 0.25, 0.125, 0.5], abs=0.03)
+    assert counts[who == 1].tolist() == [[0, 0, 0, 400]] * 7
+    assert counts[who == 2].tolist() == [[0, 400, 0, 0]] * 6
+    seen = rollout.record(genes, who[:, None].astype(np.int32), scenarios)
+    steps = np.diff(np.stack([seen["x"], seen["y"]], axis=2), axis=0)
+    has_turned = (np.abs(np.diff(steps[:, who == 1], axis=0)) > 1e-5).any(axis=2)
+    assert 0.005 < has_turned.mean() < 0.12  # every 40 moves, and where it is refused
+
+
+def test_the_page_s_tables_are_those_of_its_numbers():
+    page = ROOT / "docs" / "results" / "calibration.md"
+    text = page.read_text()
+    for name, (part, make) in tables.PAGE_PARTS.items():
+        path = page.with_name(f"calibration{tables.PARTS[part]}.csv")
+        if part == "incentives" or path.exists():
+            assert f"<!-- {name} -->\n{make(pages.read(path))}<!-- end -->" in text, name
