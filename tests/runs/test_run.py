@@ -73,6 +73,19 @@ def test_a_run_on_differences_counts_every_team_that_was_played(
     assert finalist["selection"]["performance"]["value"] is not None
 
 
+@pytest.mark.parametrize("method", ["hetcne", "ccga", "mesp"])
+def test_elite_partners_and_differences_are_continued_bit_for_bit(
+    method: str, tmp_path: Path
+) -> None:
+    settings: dict[str, Any] = {"run__credit": "difference"}
+    if method != "hetcne":
+        settings["method__evaluation"] = "systematic"
+    whole = evolve_tiny(tmp_path / "whole", method, **settings, run__generations=3)
+    part = evolve_tiny(tmp_path / "part", method, **settings, run__generations=1)
+    part.resume(generations=3, threads=1)
+    assert content(part.path) == content(whole.path)
+
+
 @pytest.mark.parametrize(
     ("task", "settings", "words"),
     [
