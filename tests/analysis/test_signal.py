@@ -99,6 +99,21 @@ def test_trials_are_teams_played_one_by_one_each_in_a_scenario_of_its_own(method
     assert (row["genotypes"], row["of"], row["trials"], row["left_out"]) == (6, 6, TRIALS, 0)
 
 
+def test_a_difference_is_measured_as_it_is_selected_by(monkeypatch) -> None:
+    """Each team once more for each of four robots, in batches of trials or alone."""
+    config = tiny("ccga", run__credit="difference")
+    prices: list[str] = []
+    whole = measure_signal(config, trials=5, threads=1, announce=prices.append)
+    private = measure_signal(tiny("ccga"), trials=5, threads=1, announce=prices.append)
+    (row,), (other,) = whole["signal"], private["signal"]
+    assert (whole["credit"], private["credit"]) == ("difference", "robot")
+    assert np.isfinite(row["icc"])
+    assert row["icc"] != other["icc"]
+    assert ["150 team evaluations" in price for price in prices] == [True, False]
+    monkeypatch.setattr(signal, "BATCH", 1)
+    assert measure_signal(config, trials=5, threads=2) == whole
+
+
 @pytest.mark.parametrize("method", ["ccga", "mesp"])
 def test_batches_and_threads_change_nothing(method, monkeypatch) -> None:
     whole = measure_signal(tiny(method), trials=5, threads=1)

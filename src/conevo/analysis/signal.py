@@ -31,7 +31,7 @@ from conevo.evolution.generation import Populations
 from conevo.evolution.protocol import Method, Scores, State, Trials
 from conevo.rng import fold, stream
 from conevo.runs.config import RunConfig
-from conevo.runs.evaluation import score
+from conevo.runs.evaluation import play
 from conevo.runs.lab import Lab
 from conevo.runs.run import Run
 from conevo.runs.store import Store
@@ -224,7 +224,8 @@ def _price(lab: Lab, subjects: list[_Subject], trials: int) -> str:
     """Return what will be tried, and the team evaluations that it takes."""
     one = subjects[0]
     n_populations, _, n, _ = one.state.genes.shape
-    teams = trials * sum(subject.n_teams for subject in subjects)
+    plays = lab.config.run.plays(lab.world.n_robots)
+    teams = trials * plays * sum(subject.n_teams for subject in subjects)
     slots = int(one.state.active.sum())
     parts = n_populations if one.state.fitness.ndim == 2 else slots
     kind = "population" if one.state.fitness.ndim == 2 else "sub-population"
@@ -312,18 +313,22 @@ def _play(lab: Lab, asked: list[Trials], numbers: range) -> list[Scores]:
     )
     genes = np.concatenate([one.genes for one in asked])
     keys = [fold(lab.config.run.seed, "signal scenario", k) for k in numbers]
-    outcome = lab.simulator.evaluate(
+    scores = play(
+        lab.simulator,
         genes.astype(np.float32),
         teams.astype(np.int32),
         lab.world.scenarios(keys),
-        rounds=len(asked),
-    )
-    scores, n = score(outcome, lab.config.run.credit), len(asked[0].teams)
+        len(asked),
+        lab.config.run.credit,
+    ).scores
+    n = len(asked[0].teams)
     return [_rows_of(scores, slice(k * n, (k + 1) * n)) for k in range(len(asked))]
 
 
 def _rows_of(scores: Scores, teams: slice) -> Scores:
     """Return the scores of some of the teams."""
     values = {field.name: getattr(scores, field.name) for field in dataclasses.fields(scores)}
-    some: dict[str, Any] = {n: None if v is None else v[teams] for n, v in values.items()}
+    some: dict[str, Any] = {
+        n: v[teams] if isinstance(v, np.ndarray) else v for n, v in values.items()
+    }
     return Scores(**some)

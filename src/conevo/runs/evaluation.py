@@ -14,7 +14,7 @@ from conevo.specialization import activity, individual
 from conevo.specialization.favourite import favourite, favourite_share
 from conevo.worlds.protocol import Outcome, Scenarios, Simulator, World, setting_columns
 
-__all__ = ["Evaluation", "Portrait", "describe", "make_evaluator", "score", "without"]
+__all__ = ["Evaluation", "Portrait", "describe", "make_evaluator", "play", "score", "without"]
 
 
 @dataclass(frozen=True)
@@ -69,10 +69,6 @@ def make_evaluator(
     have rounds, so many further ones in each. With ``scenarios`` "fixed" those of generation 0 are
     met in all. Trials that ask for fixed scenarios meet the same ``fittest_epochs`` of them in all
     generations. What all generations meet is drawn once.
-
-    With ``credit`` "difference" every team plays in the same scenarios once more for each robot,
-    which then has an empty network. Choice: an empty network, not a robot that is not there, which
-    a world need not know; it stands in the way and acts as any whose outputs are all equal.
     """
 
     def keys(trials: Trials) -> list[int]:
@@ -94,19 +90,39 @@ def make_evaluator(
     def evaluate(trials: Trials) -> Evaluation:
         genes = np.asarray(trials.genes, dtype=np.float32)
         teams = np.asarray(trials.teams, dtype=np.int32)
-        scenarios, rounds = met(trials), trials.rounds
-        outcome = simulator.evaluate(genes, teams, scenarios, rounds=rounds)
-        if credit != "difference":
-            return Evaluation(score(outcome, credit), outcome)
-        rest = [
-            _value(simulator.evaluate(genes, without(teams, robot), scenarios, rounds=rounds))
-            for robot in range(teams.shape[1])
-        ]
-        fitness = _value(outcome)[:, None] - np.stack(rest, axis=1)
-        scores = replace(score(outcome), fitness=fitness, plays=1 + len(rest))
-        return Evaluation(scores, outcome)
+        return play(simulator, genes, teams, met(trials), trials.rounds, credit)
 
     return evaluate
+
+
+def play(
+    simulator: Simulator,
+    genes: npt.NDArray[np.float32],
+    teams: npt.NDArray[np.int32],
+    scenarios: Scenarios,
+    rounds: int,
+    credit: str,
+) -> Evaluation:
+    """Play teams and give each robot its credit.
+
+    With the credit "difference" every team plays in the same scenarios once more for each robot,
+    which then has an empty network. Choice: an empty network, not a robot that is not there, which
+    a world need not know; it stands in the way and acts as any whose outputs are all equal.
+
+    Args:
+        simulator: of the world.
+        genes, teams, scenarios, rounds: as for ``Simulator.evaluate``.
+        credit: as in ``RunSettings``.
+    """
+    outcome = simulator.evaluate(genes, teams, scenarios, rounds=rounds)
+    if credit != "difference":
+        return Evaluation(score(outcome, credit), outcome)
+    rest = [
+        _value(simulator.evaluate(genes, without(teams, robot), scenarios, rounds=rounds))
+        for robot in range(teams.shape[1])
+    ]
+    fitness = _value(outcome)[:, None] - np.stack(rest, axis=1)
+    return Evaluation(replace(score(outcome), fitness=fitness, plays=1 + len(rest)), outcome)
 
 
 def without(teams: npt.NDArray[np.int32], robot: int) -> npt.NDArray[np.int32]:
