@@ -51,6 +51,7 @@ class Cell:
         hidden: hidden neurons of the champion.
         evaluations: team evaluations of every run.
         stage: of a shaping.
+        gst: mean threshold of the distance of genotypes.
         exchanges, exchange_share: pairs that recombine between populations in a generation, and
             their share of those that could.
     """
@@ -68,11 +69,17 @@ class Cell:
     hidden: float = 10.0
     evaluations: int = 50_000
     stage: int = 0
+    gst: float = 0.2
     exchanges: float = 5.0
     exchange_share: float = 0.05
 
 
 Truth = dict[tuple[str, str], Cell]  # (environment, method)
+
+
+def shared(method: str) -> float:
+    """Return the share of the pairs that exchange: more without one of the metrics."""
+    return 0.2 if method in ("cone-1", "cone-2") else 0.05
 
 
 def of_rovers(method: str, n: int) -> tuple[str, ...]:
@@ -103,8 +110,8 @@ def rover() -> Truth:
                 "mixed": 1500 / 3500,
             }
             covered = best * (0.3 if method in VARIANTS else 0.4)
-            castes = of_rovers(method, n)
-            truth[f"complex-{n}", method] = Cell(best * value, covered, castes=castes, **about)
+            more = {"castes": of_rovers(method, n), "exchange_share": shared(method)}
+            truth[f"complex-{n}", method] = Cell(best * value, covered, **about, **more)
             if method in METHODS:
                 covered = 0.3 if is_cne else 0.4
                 truth[f"extended-{n}", method] = Cell(value, covered, **about)
@@ -153,8 +160,21 @@ def pursuit() -> Truth:
                 seen={name: share[n - 1] for name, share in SEEN.get(method, {}).items()},
                 members=members.get(n, {}).get(method, ("entrapment",)),
                 idle=0.8 if method == "cone" and is_better else 0.0,
+                exchange_share=shared(method),
             )
     return truth
+
+
+def of_robots(method: str, n: int) -> tuple[str, ...]:
+    """Return the castes in complex environment n (tables 6.9 to 6.13)."""
+    if method in ("homcne", "hetcne"):
+        return ("non-specialized",)
+    types = ("C", "BC", "AB", "AC", "ABC", "ABC", "AB", "ABC", "ABC")[n - 1]
+    jobs = ("detector", "gatherer", "constructor")
+    castes = [f"{kind}-{job}" for kind in types for job in jobs]
+    if n == 6 or (n, method) == (9, "ccga"):
+        castes.remove("C-constructor")
+    return (*castes, "non-specialized")
 
 
 def gacc() -> Truth:
@@ -166,14 +186,20 @@ def gacc() -> Truth:
     hard = dict(zip(METHODS, (0.305, 0.305, 0.71, 0.79, 0.93), strict=True))
     hard |= dict.fromkeys(VARIANTS, 0.6)
     easy = dict(zip(METHODS, (0.475, 0.475, 0.51, 0.54, 0.55), strict=True))
-    loss = {"cone": 0.5}
+    loss = dict(zip(METHODS, (0.1, 0.1, 0.3, 0.3, 0.5), strict=True))
     for n in range(1, 11):
         for method, share in easy.items():
-            truth[f"simple-{n}", method] = Cell(share)
+            truth[f"simple-{n}", method] = Cell(share, several=0.0)
         for method, share in hard.items() if n < 10 else ():
             clones = 0.1 if method == "cone" else 0.5
             truth[f"complex-{n}", method] = Cell(
-                share, loss=loss.get(method, 0.3), clones=clones, mixed=0.15, stage=n
+                share,
+                loss=loss.get(method, 0.3),
+                clones=clones,
+                mixed=0.15,
+                stage=n,
+                castes=of_robots(method, n),
+                exchange_share=shared(method),
             )
     return truth
 
@@ -240,6 +266,13 @@ def write_tables(
     return folder
 
 
+def _around(share: float, method: str, seed: int) -> float | None:
+    """Return a run's share of pairs that exchange: of CONE's variants it differs by seed."""
+    if method not in EXCHANGING:
+        return None
+    return share if method == "cone" else share * (1.1 if seed % 2 else 0.9)
+
+
 def _about(
     run: str,
     world: str,
@@ -272,7 +305,7 @@ def _about(
         "optimum": 10 * int(number) if world == "gacc-v2" else None,
         "n_robots": 20,
         "exchanges": cell.exchanges if method in EXCHANGING else None,
-        "exchange_share": cell.exchange_share if method in EXCHANGING else None,
+        "exchange_share": _around(cell.exchange_share, method, seed),
         "run_id": run,
         "conevo": "0.1.0",
         "code": "0",
@@ -310,7 +343,8 @@ def _results(
     yield from played("test", "champion")
     yield from played("test", "generation 0", 0.1)
     for generation, hidden in ((8, cell.hidden), (9, 10.0)):
-        yield "generations", {"run": run, "generation": generation, "hidden": hidden}
+        about = {"run": run, "generation": generation, "hidden": hidden}
+        yield "generations", about | {"gst": cell.gst + 0.01 * (generation - 8.5)}
     yield "champions", {"run": run, "generation": 8, "measure": MEASURES[world][0]}
     if not studies:
         return

@@ -25,6 +25,7 @@ __all__ = [
     "VARIANTS",
     "about",
     "as_cloned",
+    "changes_little",
     "cloned",
     "has_castes",
     "has_only_in",
@@ -71,6 +72,11 @@ def about(
         Part((within(quantity, method, environments, share - ABOUT, share + ABOUT),))
         for method, share in shares.items()
     )
+
+
+def changes_little(place: str, most: float) -> tuple[Part, ...]:
+    """Return: of changed settings each method's main measure changes by a share at most."""
+    return (Part(tuple(within("change", method, (place,), -most, most) for method in METHODS)),)
 
 
 def lesioned(environments: tuple[str, ...], of: str = "") -> tuple[Compare, ...]:

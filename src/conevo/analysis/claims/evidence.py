@@ -73,7 +73,8 @@ class Evidence:
     Runs of different budgets are never compared in an environment. Choice: of several budgets that
     all compared methods have there, the one with the most runs is taken. Choice: between
     environments budgets may differ if no other runs are there, as between those evolved directly
-    and those learned in stages (6.4.2).
+    and those learned in stages (6.4.2). Choice: the latter are also compared in one environment
+    where that is what is claimed, each with its own budget.
 
     Attributes:
         world, preset, variant: of all its runs; the world with its version.
@@ -103,6 +104,7 @@ class Evidence:
         runs: tuple[list[RunOf], list[RunOf]] = ([], [])
         present: set[str] = set()
         budgets: set[str] = set()
+        are_apart = all(QUANTITIES[one.quantity].is_apart for one in (a, b))
         for here, there in zip(a.environments, b.environments, strict=True):
             of_a, of_b = self.by_budget(a, here), self.by_budget(b, there)
             common = sorted(of_a.keys() & of_b.keys())
@@ -110,7 +112,7 @@ class Evidence:
                 chosen_a = chosen_b = max(
                     common, key=lambda budget: min(len(of_a[budget]), len(of_b[budget]))
                 )
-            elif here != there and of_a and of_b:
+            elif (here != there or are_apart) and of_a and of_b:
                 chosen_a, chosen_b = _usual(of_a), _usual(of_b)
             else:
                 continue

@@ -34,6 +34,7 @@ from conevo.analysis.claims.cases import (
     TWO_PREY,
     VARIANTS,
     about,
+    changes_little,
     has_castes,
     teams,
 )
@@ -197,6 +198,15 @@ PURSUIT: tuple[Claim, ...] = (
             Part(above("path", SHAPING, ("cone",), OTHERS)),
             *has_castes("three hidden neurons", (SHAPING[2], SHAPING[5]), ("cone",)),
         ),
+    ),
+    Claim(
+        "P15",
+        "settings changed by a fifth: capture time changes by 15 % at most",
+        "4.2",
+        "pursuit",
+        changes_little(TEAMS[2], 0.15),
+        caution="the thesis names no environment: judged by plans as pursuit-sensitivity, at each "
+        "combination of levels by itself",
     ),
     Claim(
         "P16",

@@ -6,9 +6,13 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from conevo.analysis.claims.sensitivity import changed
 from conevo.analysis.frames import Tables
 
 __all__ = ["QUANTITIES", "Quantity", "Reading"]
+
+RARE = 0.1  # of the pairs of sub-populations that could recombine
+SIMILAR_BELOW = 0.25  # distance of genotypes
 
 PLAYED = """
     WITH played AS (
@@ -52,6 +56,10 @@ HIDDEN = """
     SELECT run, bool_or(round(g.hidden) = {n})::INTEGER
     FROM generations g JOIN champions c USING (run, generation) GROUP BY run
 """
+SIMILAR = f"""
+    SELECT run, (avg(gst) <= {SIMILAR_BELOW})::INTEGER FROM generations
+    WHERE gst IS NOT NULL GROUP BY run
+"""
 CASTES = "SELECT run, ({condition})::INTEGER FROM robots GROUP BY run"
 HAS_ANY = "bool_or(caste = 'non-specialized')"
 SPECIALIZED = "count(DISTINCT caste) FILTER (WHERE caste NOT IN ('non-specialized', 'move'))"
@@ -70,12 +78,14 @@ class Quantity:
         is_share: 1 if something was seen in the run, else 0.
         needs_exchange: whether a value of CONE's is one of CONE only if its populations exchanged;
             not so what one of its robots does, and what was exchanged.
+        is_apart: whether it is of runs whose budgets are not those of others: of a stage, say.
     """
 
     read: Reading
     lacks: str
     is_share: bool = False
     needs_exchange: bool = True
+    is_apart: bool = False
 
 
 def _performance(measure: str | None, study: str, team: str) -> Reading:
@@ -131,6 +141,18 @@ def _members(*behaviours: str) -> Quantity:
     return Quantity(read, "no members of behaviours recorded", is_share=True)
 
 
+def _when_shaped(is_shaped: bool) -> Reading:
+    """Return the main measure of runs that are stages of a shaping, or of the others."""
+    return lambda tables: {
+        one.run: one.value for one in tables.values() if ("/stage-" in one.run) == is_shaped
+    }
+
+
+def _exchanged(value: str, is_share: bool = False) -> Quantity:
+    read = _query(f"SELECT run, {value} FROM runs")
+    return Quantity(read, "no exchange between populations", is_share, needs_exchange=False)
+
+
 COLLECTIVES = ("entrapment", "pursuer-blocker", "spiders-fly", "role-switcher")
 QUANTITIES: dict[str, Quantity] = {
     "value": _tested("value"),
@@ -156,12 +178,24 @@ QUANTITIES: dict[str, Quantity] = {
     ),
     "complementary": Quantity(_query(COMPLEMENTARY), "no team of two behaviours"),
     "one caste": _castes("count(DISTINCT caste) = 1"),
+    "only non-specialized": _castes("bool_and(caste = 'non-specialized')"),
     "two castes": _castes("count(DISTINCT caste) FILTER (WHERE caste <> 'move') >= 2"),
     "several castes": _castes(f"{HAS_ANY} AND {SPECIALIZED} >= 2"),
     "mixed castes": _castes(f"{HAS_ANY} AND {SPECIALIZED} >= 1"),
     "all castes": _castes(f"{HAS_ANY} AND {SPECIALIZED} >= 3"),
     **{f"only {caste}": _castes(f"bool_and(caste = '{caste}')") for caste in ("med", "hi")},
     **{f"some {caste}": _castes(f"bool_or(caste = '{caste}')") for caste in ("low", "med", "hi")},
+    **{f"any of {kind}": _castes(f"bool_or(caste LIKE '{kind}-%')") for kind in "ABC"},
+    **{
+        f"detectors and gatherers of {kind}": _castes(
+            f"bool_or(caste = '{kind}-detector') AND bool_or(caste = '{kind}-gatherer')"
+        )
+        for kind in "ABC"
+    },
+    **{
+        f"constructors of {kind}": _castes(f"bool_or(caste = '{kind}-constructor')")
+        for kind in "ABC"
+    },
     "idle predators": Quantity(
         _query(SEEN.format(kind="individual", behaviour="idle")),
         "no behaviours recorded",
@@ -173,6 +207,14 @@ QUANTITIES: dict[str, Quantity] = {
     "members of pursuer-blocker and spiders-fly": _members("pursuer-blocker", "spiders-fly"),
     "members of spiders-fly and role-switcher": _members("spiders-fly", "role-switcher"),
     "path": _tested("path"),
+    "delivered after shaping": Quantity(_when_shaped(True), "no shaping", is_apart=True),
+    "delivered directly": Quantity(_when_shaped(False), "no direct evolution", is_apart=True),
+    "change": Quantity(changed, "no runs of changed and unchanged settings"),
+    "exchange": _exchanged("exchange_share"),
+    "rare exchange": _exchanged(f"(exchange_share <= {RARE})::INTEGER", is_share=True),
+    "similar genotypes": Quantity(
+        _query(SIMILAR), "no threshold of similarity", is_share=True, needs_exchange=False
+    ),
     "three hidden neurons": Quantity(
         _query(HIDDEN.format(n=3)), "no champion recorded", is_share=True
     ),

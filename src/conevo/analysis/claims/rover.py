@@ -32,6 +32,7 @@ from conevo.analysis.claims.cases import (
     SIMPLE,
     VARIANTS,
     as_cloned,
+    changes_little,
     cloned,
     has_castes,
     has_only_in,
@@ -241,6 +242,16 @@ ROVER: tuple[Claim, ...] = (
             Part(alike("area", (COMPLEX[6], COMPLEX[8]), [("hetcne", "mesp")])),
         ),
         caution="that area differs in all others is not claimed here: 5.4.1 has it alike in most",
+    ),
+    Claim(
+        "R22",
+        "settings changed by a fifth (learning), a quarter (generations, epochs) or 30 % (world): "
+        "value changes by 25 % at most",
+        "5.3.2",
+        "rover",
+        changes_little(COMPLEX[4], 0.25),
+        caution="the thesis names no environment: judged by plans as rover-sensitivity, at each "
+        "combination of levels by itself",
     ),
     Claim(
         "R23",
