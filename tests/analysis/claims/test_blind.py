@@ -12,11 +12,13 @@ from analysis.claims.known_truth import rover, write_tables
 from conevo.analysis.claims import CLAIMS, Verdict, verdicts
 from conevo.analysis.frames import SCHEMA, Tables
 
-R9 = next(claim for claim in CLAIMS if claim.id == "R9")
+BY_ID = {claim.id: claim for claim in CLAIMS}
 
 
-def verdict_of(folder: Path, method: str, first: float | None, last: float | None = 0.9) -> Verdict:
-    """Return the verdict on R9 with studies of signal of one method's runs."""
+def verdict_of(
+    folder: Path, method: str, first: float | None, last: float | None = 0.9, claim: str = "R9"
+) -> Verdict:
+    """Return the verdict on a claim with studies of signal of one method's runs."""
     columns = ", ".join(f'"{name}" {kind}' for name, kind in SCHEMA["signal"].items())
     with duckdb.connect() as connection:
         connection.execute(f"CREATE TABLE signal ({columns})")
@@ -28,7 +30,7 @@ def verdict_of(folder: Path, method: str, first: float | None, last: float | Non
             )
         connection.execute(f"COPY signal TO '{folder / 'signal.parquet'}' (FORMAT parquet)")
     with Tables(folder) as tables:
-        (found,) = verdicts(tables, [R9])
+        (found,) = verdicts(tables, [BY_ID[claim]])
     return found
 
 
@@ -49,6 +51,11 @@ def test_with_signal_or_without_a_study_it_is_judged(folder) -> None:
     assert verdict_of(folder, "cone", 0.05).verdict == "reproduced"
     assert verdict_of(folder, "cone", 0.05, last=0.0).verdict == "reproduced"
     assert verdict_of(folder, "nobody", 0.0).verdict == "reproduced"
+
+
+def test_what_is_exchanged_is_judged_with_signal_or_without(folder) -> None:
+    with_it = verdict_of(folder, "cone", 0.9, claim="C1R").alone
+    assert verdict_of(folder, "cone", 0.0, claim="C1R").alone == with_it
 
 
 def test_no_signal_comes_before_no_exchange(tmp_path) -> None:

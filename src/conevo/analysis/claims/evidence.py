@@ -125,7 +125,8 @@ class Evidence:
         asked = zip((a, b), runs, strict=True)
         made = [_exchange(one, of) for one, of in asked]
         least = min((one for one in made if one[0] is not None), default=(None, None))
-        known = [one for one in map(_reliability, runs) if one is not None]
+        measured = [_reliability(*pair) for pair in zip((a, b), runs, strict=True)]
+        known = [one for one in measured if one is not None]
         return Gathered(
             (first, second),
             frozenset(present),
@@ -161,7 +162,7 @@ class Evidence:
             run for place, budget in chosen.items() for run in self._runs(sample, place, budget)
         ]
         budgets, made = frozenset(chosen.values()), _exchange(sample, runs)
-        return Gathered((flat,), present, budgets, made, _reliability(runs))
+        return Gathered((flat,), present, budgets, made, _reliability(sample, runs))
 
     def _runs(self, sample: Sample, environment: str, budget: str) -> list[RunOf]:
         """Return the runs of a sample in one environment at one budget."""
@@ -241,8 +242,10 @@ def _exchange(sample: Sample, runs: Sequence[RunOf]) -> Exchange:
     return math.fsum(made) / len(runs), math.fsum(shares) / len(runs)
 
 
-def _reliability(runs: Sequence[RunOf]) -> float | None:
+def _reliability(sample: Sample, runs: Sequence[RunOf]) -> float | None:
     """Return the mean reliability of fitness in runs; None unless all have a study of it."""
+    if not QUANTITIES[sample.quantity].needs_signal:
+        return None
     known = [one.reliability for one in runs if one.reliability is not None]
     return math.fsum(known) / len(runs) if runs and len(known) == len(runs) else None
 

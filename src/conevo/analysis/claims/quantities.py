@@ -78,6 +78,8 @@ class Quantity:
         is_share: 1 if something was seen in the run, else 0.
         needs_exchange: whether a value of CONE's is one of CONE only if its populations exchanged;
             not so what one of its robots does, and what was exchanged.
+        needs_signal: whether it says something of methods only if these select by more than luck;
+            not so what was exchanged.
         is_apart: whether it is of runs whose budgets are not those of others: of a stage, say.
     """
 
@@ -85,6 +87,7 @@ class Quantity:
     lacks: str
     is_share: bool = False
     needs_exchange: bool = True
+    needs_signal: bool = True
     is_apart: bool = False
 
 
@@ -150,7 +153,13 @@ def _when_shaped(is_shaped: bool) -> Reading:
 
 def _exchanged(value: str, is_share: bool = False) -> Quantity:
     read = _query(f"SELECT run, {value} FROM runs")
-    return Quantity(read, "no exchange between populations", is_share, needs_exchange=False)
+    return Quantity(
+        read,
+        "no exchange between populations",
+        is_share,
+        needs_exchange=False,
+        needs_signal=False,
+    )
 
 
 COLLECTIVES = ("entrapment", "pursuer-blocker", "spiders-fly", "role-switcher")
@@ -213,7 +222,11 @@ QUANTITIES: dict[str, Quantity] = {
     "exchange": _exchanged("exchange_share"),
     "rare exchange": _exchanged(f"(exchange_share <= {RARE})::INTEGER", is_share=True),
     "similar genotypes": Quantity(
-        _query(SIMILAR), "no threshold of similarity", is_share=True, needs_exchange=False
+        _query(SIMILAR),
+        "no threshold of similarity",
+        is_share=True,
+        needs_exchange=False,
+        needs_signal=False,
     ),
     "three hidden neurons": Quantity(
         _query(HIDDEN.format(n=3)), "no champion recorded", is_share=True
