@@ -14,9 +14,11 @@ import numpy as np
 import pytest
 
 from analysis.finished_runs import Cell, cells, mean_of, write_campaign
+from conevo.analysis.courses import read_histories
 from conevo.analysis.frames import Tables
 from conevo.analysis.report import sections_of, write_report
 from conevo.analysis.sections.behaviours import behaviours
+from conevo.analysis.sections.castes import castes
 from conevo.analysis.sections.champions import champions
 from conevo.analysis.sections.interventions import lesions
 from conevo.analysis.sections.overview import read_campaign
@@ -184,6 +186,38 @@ def test_losses_are_those_of_the_same_run(report, campaign) -> None:
     assert float(hom["lost"]) == pytest.approx(np.mean([expected[r] for r in mine]), rel=1e-9)
     left = 100 * sum(value[r] for r in mine) / sum(whole[r] for r in mine)
     assert float(hom["percent"]) == pytest.approx(left, rel=1e-9)
+
+
+def test_castes_by_s_stand_next_to_favourite_settings(tmp_path) -> None:
+    """Two champions of two robots: one moves and detects in turn, one is of an earlier version."""
+    campaign = write_campaign(tmp_path / "c", cells(["rover/complex-1"], ["mesp"]), 3)
+    robots = (
+        ("s1", 0, "non-specialized", "low", 1.0),
+        ("s1", 1, "non-specialized", "low", 0.5),
+        ("s2", 0, "hi", "hi", 0.8),
+        ("s2", 1, "non-specialized", None, None),  # which detected nothing
+        ("s3", 0, "hi", None, None),
+    )
+    with Tables(campaign / "tables") as tables:
+        runs = {run[-2:]: run for (run,) in tables.query("SELECT run FROM runs")[1]}
+        tables.query("DELETE FROM robots")
+        for seed, robot, caste, setting, share in robots:
+            values = [f"'{runs[seed]}'", str(robot), f"'{caste}'"]
+            values += ["NULL" if x is None else repr(x) for x in (setting, share)]
+            tables.query(
+                "INSERT INTO robots (run, robot, caste, favourite_setting, setting_share) "
+                f"VALUES ({', '.join(values)})"
+            )
+        scope = scopes(tables)[0]
+        teams, favourites = castes(scope, read_histories(tables, scope.group)).exhibits[-2:]
+    assert [row["devoted"] for row in teams.rows] == [1.0]  # one of each of two champions
+    method = {"treatment": "Multi-Agent ESP"}
+    low = {"caste": "non-specialized", "setting": "low", "robots": 2, "share": 0.75, "devoted": 1}
+    hi = {"caste": "hi", "setting": "hi", "robots": 1, "share": 0.8, "devoted": 1}
+    portions = [{"portion": pytest.approx(part)} for part in (2 / 3, 1 / 3)]
+    assert favourites.rows == [method | low | portions[0], method | hi | portions[1]]
+    assert [{k: row[k] for k in low} for row in favourites.numbers] == [low, hi]
+    assert "cannot see settings" in favourites.note
 
 
 def test_intervals_of_losses_end_where_losses_do(tmp_path) -> None:

@@ -21,9 +21,11 @@ DIVERSITY = "hierarchic_social_entropy"
 PAYS = "diversity that pays"
 DIRECTIONS = {
     "specialization": S_SCALE,
+    "independent_specialization": "S of independent draws; 0 = always the same action",
     "relative_specialization": "0 = always the same action, 1 = as if drawn",
     "favourite_setting": SHARE_SCALE,
     "affinity": SHARE_SCALE,
+    "devoted": "1 = every robot has more than half of its work in one setting",
     "favourite_action": SHARE_SCALE,
 }
 
