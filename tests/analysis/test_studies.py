@@ -227,12 +227,15 @@ def test_behaviours_of_predators(runs, found) -> None:
     assert [row["caste"] for row in found[PURSUIT]["robots"]] == labels
     of = [life.specialization for life in watched.lifetimes]
     assert [row["specialization"] for row in found[PURSUIT]["robots"]] == of
-    counts: dict[str, dict[str, int]] = {"individual": {}, "collective": {}, "team": {}}
+    kinds = ("individual", "member", "collective", "team")
+    counts: dict[str, dict[str, int]] = {kind: {} for kind in kinds}
     for row in found[PURSUIT]["behaviours"]:
         counts[row["kind"]][row["behaviour"]] = row["count"]
     assert counts["individual"] == {
         name: labels.count(name) for name in (*BEHAVIOURS, "non-specialized")
     }
+    members = watched.seen.composition(labels)
+    assert counts["member"] == {name: n or 0 for name, n in members.items()}
     usual, captures = most_frequent(seen.all_captures)
     assert counts["collective"] == captures
     assert list(captures) == list(COLLECTIVES)
