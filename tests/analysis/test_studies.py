@@ -240,6 +240,29 @@ def test_behaviours_of_predators(runs, found) -> None:
     assert counts["collective"] == captures
     assert list(captures) == list(COLLECTIVES)
     assert counts["team"] == {usual: len(seen.all_captures)}
+    members = watched.seen.composition(labels)
+    assert counts["member"] == {name: n or 0 for name, n in members.items()}
+    assert sum(counts["member"].values()) == len(labels)
+
+
+def test_predators_of_two_behaviours_are_composed(runs, monkeypatch: pytest.MonkeyPatch) -> None:
+    labels = ["blocker", "pursuer", "blocker", "non-specialized", "pursuer"]
+    monkeypatch.setattr(observed.Observed, "labels", labels)
+    found = study(runs[PURSUIT], 2, threads=1)
+    played = values(found["scores"], "composed")
+    assert {team for team, _ in played} == {"pursuer-blocker", "spiders-fly"}
+    fitness = [row["fitness"] for row in found["robots"]]
+    pursuer, blocker = (max(of, key=lambda k: fitness[k]) for of in ((1, 4), (0, 2)))
+    lab = Lab.equip(runs[PURSUIT].config, 1, "cpu")
+    genes, rows = runs[PURSUIT].champion.as_trial()
+    seed = runs[PURSUIT].config.run.seed
+    places = observed.observe(runs[PURSUIT], 2, threads=1).seen.together(
+        [fold(seed, "clones", k) for k in range(2)]
+    )
+    who = [pursuer] * 3 + [blocker] * 2
+    alone = lab.simulator.evaluate(genes, np.ascontiguousarray(rows[:, who]), places)
+    for name, result in alone.performance.items():
+        assert played["pursuer-blocker", name] == result[0].tolist()
 
 
 def test_captures_of_several_kinds(runs, monkeypatch: pytest.MonkeyPatch) -> None:

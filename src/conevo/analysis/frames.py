@@ -286,8 +286,9 @@ class Tables:
 
         Args:
             measure: one of the world's task performance measures; None: each world's main one.
-            study: "test" (of the finished run), "lesion" or "clones".
-            team: test: "champion" or "generation 0"; lesion and clones: "whole" or a caste.
+            study: "test" (of the finished run), "lesion", "clones" or "composed".
+            team: test: "champion" or "generation 0"; lesion and clones: "whole" or a caste;
+                composed: a collective behaviour.
         """
         rows = self._connection.execute(
             """

@@ -16,7 +16,7 @@ from conevo.runs.champions import Team
 from conevo.specialization.individual import NON_SPECIALIZED
 from conevo.worlds.protocol import Scenarios, Simulator, World
 
-__all__ = ["WHOLE", "Compared", "clone", "lesion", "replacement"]
+__all__ = ["WHOLE", "Compared", "clone", "fittest_of", "lesion", "replacement"]
 
 WHOLE = "whole"  # the team as it was evolved
 
@@ -79,15 +79,20 @@ def clone(
         scenarios: E scenarios for all the teams.
     """
     genes, teams = team.as_trial()
-    credit = np.asarray(fitness, dtype=np.float64)
-    credit = np.where(np.isfinite(credit), credit, -np.inf)
     cloned = [teams]
     for caste in castes:
-        own = np.flatnonzero(np.asarray(labels) == caste)
-        fittest = own[credit[own].argmax()]
+        fittest = fittest_of(caste, labels, fitness)
         cloned.append(np.repeat(teams[:, [fittest]], len(labels), axis=1))
     outcome = simulator.evaluate(genes, np.concatenate(cloned), scenarios)
     return Compared((WHOLE, *castes), outcome.performance)
+
+
+def fittest_of(caste: str, labels: Sequence[str], fitness: npt.ArrayLike) -> int:
+    """Return the fittest robot of a caste: ties go to the first, non-finite values rank last."""
+    credit = np.asarray(fitness, dtype=np.float64)
+    credit = np.where(np.isfinite(credit), credit, -np.inf)
+    own = np.flatnonzero(np.asarray(labels) == caste)
+    return int(own[credit[own].argmax()])
 
 
 def replacement(world: World, caste: str) -> int:

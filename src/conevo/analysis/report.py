@@ -38,6 +38,7 @@ from conevo.analysis.sections.castes import castes
 from conevo.analysis.sections.champions import champions
 from conevo.analysis.sections.claims import claims
 from conevo.analysis.sections.comparisons import comparisons
+from conevo.analysis.sections.composed import composed
 from conevo.analysis.sections.interventions import clones, lesions
 from conevo.analysis.sections.learning import learning
 from conevo.analysis.sections.metrics import definitions, metrics
@@ -125,6 +126,7 @@ def _about(scope: Scope, title: str, spent: Spent) -> Section:
         castes(scope, histories),
         lesions(scope),
         clones(scope),
+        composed(scope),
         metrics(scope),
         behaviours(scope),
     ]

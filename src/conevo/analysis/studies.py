@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from conevo.analysis.composed import compose
 from conevo.analysis.fittest import equip
 from conevo.analysis.lesions import Compared, clone, lesion
 from conevo.analysis.observed import Observed, watch
@@ -79,7 +80,8 @@ def study(
 
     Returns:
         Plain data. scores: rows {study, team, measure, scenario, value} of the studies "lesion" and
-        "clones", teams "whole" and castes; the testing phase is the run's own (``test_result``).
+        "clones", teams "whole" and castes, and "composed", collective behaviours; the testing phase
+        is the run's own (``test_result``).
         robots: robot, caste, specialization (S), fitness, hidden, and what S cannot see:
         favourite_setting and setting_share (its share of the settings used, 1 = always the same),
         affinity, favourite_action and action_share (of its time), independent (the S of
@@ -111,8 +113,14 @@ def study(
         [caste for caste in altered if caste not in NOT_CLONED],
         watched.seen.together(clones) if watched is not None else lab.world.scenarios(clones),
     )
+    teams = [] if watched is None else watched.seen.compositions(clones)
+    composed = compose(lab.simulator, team, portrait.labels, portrait.fitness, teams)
     return {
-        "scores": _rows("lesion", lesioned) + _rows("clones", cloned),
+        "scores": [
+            *_rows("lesion", lesioned),
+            *_rows("clones", cloned),
+            *(row for one in composed for row in _rows("composed", one)),
+        ],
         "robots": _robots(team, portrait),
         "actions": _actions(lab, outcome),
         "metrics": measure(portrait.activity),

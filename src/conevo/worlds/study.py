@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from conevo.worlds.protocol import Scenarios, Simulator
 
-__all__ = ["Account", "AccountPart", "Seen", "StudyWords", "WorldStudy", "load_study"]
+__all__ = ["Account", "AccountPart", "Composed", "Seen", "StudyWords", "WorldStudy", "load_study"]
 
 NEEDED = ("BEHAVIOURS", "COLLECTIVES", "WORDS", "observe", "account")
 
@@ -57,6 +57,20 @@ class Account(NamedTuple):
     parts: Sequence[AccountPart]
 
 
+class Composed(NamedTuple):
+    """A team composed of robots of several behaviours.
+
+    Attributes:
+        name: of the collective behaviour.
+        roles: behaviour of each of its robots.
+        scenarios: that it plays.
+    """
+
+    name: str
+    roles: Sequence[str]
+    scenarios: Scenarios
+
+
 class Seen(Protocol):
     """What a team was seen to do in some recorded epochs."""
 
@@ -70,6 +84,9 @@ class Seen(Protocol):
 
     def together(self, keys: Sequence[int]) -> Scenarios:
         """Return the scenarios that clones play, one per key."""
+
+    def compositions(self, keys: Sequence[int]) -> Sequence[Composed]:
+        """Return the teams that robots can be composed to, if any, in scenarios of the keys."""
 
     def composition(self, labels: Sequence[str]) -> dict[str, int | None]:
         """Return how many robots belong to each collective behaviour, and to none.

@@ -41,6 +41,7 @@ class Cell:
         value: mean of the world's main measure.
         area: mean of the rovers' second one.
         loss: share of its performance that a team loses by a lesion.
+        composed: performance of composed teams, as a share of the team's.
         clones: performance of a team of clones of a specialist, as a share of the team's.
         mixed: that of the clones of a non-specialized robot.
         castes: of the team, a robot each; None: two specialized and the non-specialized.
@@ -59,6 +60,7 @@ class Cell:
     value: float
     area: float = 0.4
     loss: float = 0.2
+    composed: float = 0.9
     clones: float = 0.5
     mixed: float = 0.4
     castes: tuple[str, ...] | None = None
@@ -372,6 +374,8 @@ def _results(
         share = cell.mixed if caste == "non-specialized" else cell.clones
         yield from played("clones", caste, share)
     if is_predator:
+        for name in ("pursuer-blocker", "spiders-fly", "role-switcher"):
+            yield from played("composed", name, cell.composed)
         specialists = tuple(caste for caste in castes if caste != "non-specialized")
         yield from _behaviours(run, cell, seed, n, specialists)
 

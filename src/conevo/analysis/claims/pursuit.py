@@ -11,6 +11,8 @@ Nitschke 2009, sections 4.3, 4.5 and 4.6, appendix A.
 - Choice: an exception (types 1, 6, 7 of P4) claims nothing about what is excepted.
 - Choice: complementary are evolved teams with predators of at least two behaviours; of each run's
   teams of clones the best stands for all, and methods are pooled (figure 4.12 names none).
+- Choice: of a run's teams of clones the best stands for all in P13 too, methods pooled. Of type 1,
+  where two predators are too few (4.5.2, 4.5.4), nothing is claimed.
 - Choice: table 4.5 has one number for all team types, so P10 and P17 compare their runs together.
 - Choice: table 4.4 shows one team of each method. Claimed are the collective behaviours with
   specialized members in most champions of teams with as many predators and one prey, not how many.
@@ -149,7 +151,7 @@ PURSUIT: tuple[Claim, ...] = (
                 )
             ),
         ),
-        caution="the teams of figure 4.12 were composed by hand; these evolved",
+        caution="the teams of figure 4.12 were composed, as in P13; these evolved",
     ),
     Claim(
         "P10",
@@ -188,6 +190,27 @@ PURSUIT: tuple[Claim, ...] = (
         ),
         caution="that CONE's spiders-fly fails with types 4 to 6 up to generation 250 only cannot "
         "be judged: champions are watched, not generations",
+    ),
+    Claim(
+        "P13",
+        "composed pursuer-blocker, spiders-fly and role-switcher teams hold the prey longer than "
+        "cloned teams (types 2-5)",
+        "4.6.5",
+        "pursuit",
+        (
+            Part(
+                tuple(
+                    Compare(
+                        "above",
+                        Sample(f"composed {name}", METHODS, (e,)),
+                        Sample("clones", METHODS, (e,)),
+                    )
+                    for e in ONE_PREY[1:]
+                    for name in ("pursuer-blocker", "spiders-fly", "role-switcher")
+                )
+            ),
+        ),
+        caution="type 1, in 4.6.5 too, is left out: by 4.5.2 and 4.5.4 two predators are too few",
     ),
     Claim(
         "P14",

@@ -185,6 +185,10 @@ QUANTITIES: dict[str, Quantity] = {
     "clones of the non-specialized": _cloned(
         "= 'non-specialized'", "no non-specialized robot cloned"
     ),
+    **{
+        f"composed {name}": Quantity(_performance(None, "composed", name), f"no {name} composed")
+        for name in COLLECTIVES[1:]
+    },
     "complementary": Quantity(_query(COMPLEMENTARY), "no team of two behaviours"),
     "one caste": _castes("count(DISTINCT caste) = 1"),
     "only non-specialized": _castes("bool_and(caste = 'non-specialized')"),

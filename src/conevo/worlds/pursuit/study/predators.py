@@ -3,7 +3,8 @@
 Nitschke 2009, sections 4.6.4 to 4.6.6. Their castes are their individual behaviours.
 
 - Choice: predators begin clones' scenarios close together around the prey (4.6.5), all teams in the
-  same places; at random if obstacles are in the way or they see less far than they are wide.
+  same places; at random if obstacles are in the way or they see less far than they are wide. So do
+  composed teams, but for spiders-fly, whose prey is in infrared range of a wall.
 """
 
 from __future__ import annotations
@@ -19,9 +20,10 @@ from conevo.rng import stream
 from conevo.terms import S_SCALE
 from conevo.worlds.pursuit.study.behaviours import BEHAVIOURS, Rules, executed
 from conevo.worlds.pursuit.study.captures import COLLECTIVES, composition, most_frequent
+from conevo.worlds.pursuit.study.composed import COMPOSED, roles_of
 from conevo.worlds.pursuit.study.observation import Observation, record_team
 from conevo.worlds.pursuit.study.reproduction import place_together, reproduce_individuals
-from conevo.worlds.study import Account, AccountPart, StudyWords
+from conevo.worlds.study import Account, AccountPart, Composed, StudyWords
 
 if TYPE_CHECKING:
     from conevo.worlds.protocol import Scenarios, Simulator
@@ -85,12 +87,29 @@ class Predators:
 
     def together(self, keys: Sequence[int]) -> Scenarios:
         """Return scenarios in which the predators begin around the prey, at random if none fits."""
+        return self._placed(keys, at_wall=False)
+
+    def compositions(self, keys: Sequence[int]) -> list[Composed]:
+        """Return the teams of figure 4.12, of one prey only; spiders-fly begins at a wall."""
+        world = self.seen.world
+        if world.n_prey > 1:
+            return []
+        return [
+            Composed(
+                name,
+                roles_of(name, world.n_robots),
+                self._placed(keys, at_wall=name == "spiders-fly"),
+            )
+            for name in COMPOSED
+        ]
+
+    def _placed(self, keys: Sequence[int], *, at_wall: bool) -> Scenarios:
         seen = self.seen
         if not self._fits_together:
             return seen.world.scenarios(keys)
         roles = [""] * seen.world.n_robots
         poses = np.stack(
-            [place_together(stream(key, "places"), seen, roles, at_wall=False) for key in keys]
+            [place_together(stream(key, "places"), seen, roles, at_wall=at_wall) for key in keys]
         )
         x, y, heading = (np.ascontiguousarray(poses[..., k]) for k in range(3))
         return replace(seen.world.scenarios(keys), x=x, y=y, heading=heading)
