@@ -2,13 +2,13 @@
 
     python experiments/calibration.py [--scenarios N] [--write docs/results/calibration.md]
 
-plays heuristic, blind and random teams in the rover worlds: types mixed or apart, starts anywhere
-or by robot, four ranges, all rocks in range or one for an activation, high and low accuracies.
-Of every reading it asks what the thesis' results ask for (``CRITERIA``). Then castes by place are
-compared with switchers, over segregation, accuracies and ranges, in five times as many scenarios.
-With ``--write`` the numbers go to two CSV files next to the page, and the tables between its
-markers; ``--again`` makes the tables from the files. One thread; the same arguments give the same
-numbers.
+plays heuristic, blind and random teams in the rover worlds: types mixed and starts anywhere, or
+types apart and starts by robot; four ranges; all rocks in range or one for an activation; high and
+low accuracies. Of every reading it asks what the thesis' results ask for (``CRITERIA``). Then
+castes by place are compared with switchers, over segregation, accuracies and ranges, in five times
+as many scenarios. With ``--write`` the numbers go to two CSV files next to the page, and the tables
+between its markers; ``--again`` makes the tables from the files. One thread; the same arguments
+give the same numbers.
 """
 
 from __future__ import annotations
@@ -222,10 +222,10 @@ def judged(reading: Reading, iterations: int, keys: Sequence[int], simple: dict[
 
 
 def readings() -> Iterator[Reading]:
-    """Yield every reading; what blind teams reach at 0.5 is the mean of 0 and 1."""
-    for found in itertools.product((0.0, 1.0), ("random", "by_robot"), RANGES, (0, 1)):
-        for accuracies in ACCURACIES:
-            yield Reading(*found, accuracies)
+    """Yield every reading, with types mixed and starts anywhere first."""
+    for segregation, starts in ((0.0, "random"), (1.0, "by_robot")):
+        for others in itertools.product(RANGES, (0, 1), ACCURACIES):
+            yield Reading(segregation, starts, *others)
 
 
 def measure_readings(n_scenarios: int) -> Iterator[Row]:

@@ -12,6 +12,7 @@ import conevo
 ROOT = Path(__file__).resolve().parent.parent
 sys.path += [str(ROOT / "experiments"), str(ROOT / "docs")]  # scripts import what they share
 
+import calibration  # noqa: E402
 import calibration_tables as tables  # noqa: E402
 import pages  # noqa: E402
 from blind import Blind, kind  # noqa: E402
@@ -103,10 +104,37 @@ def test_blind_rovers_spend_their_time_as_their_shares_say():
     assert 0.005 < has_turned.mean() < 0.12  # every 40 moves, and where it is refused
 
 
+def test_each_robot_of_a_caste_uses_a_setting_of_its_region():
+    """Regions 0 to 3 have A (low, low), B (low, med), C (med, hi), D (hi, hi)."""
+    assert calibration.by_place(8).tolist() == [0, 0, 1, 2, 0, 1, 2, 2]
+
+
+def test_a_ratio_and_its_error_by_hand():
+    found = calibration.of_pair(np.array([2.0, 4.0]), np.array([4.0, 4.0]), "blind ")
+    assert found["blind ratio"] == 0.75
+    assert found["blind log ratio se"] == pytest.approx(1 / 3)  # of -1 and 1, over the mean of 3
+
+
+def test_what_a_reading_must_be_like():
+    row = {"random": 50.0, "blind switchers": 4100.0, "blind castes": 3900.0}
+    row |= {f"complex-{e}": 3000.0 + e for e in range(1, 11)}
+    row |= {f"simple-{e}": 2900.0 + e for e in range(1, 11)}
+    row |= {"top -30 %": 0.8, "top +30 %": 1.2}
+    assert tables.n_met(row) == len(tables.CRITERIA) == 5
+    for name, change in {
+        "complex > simple": {"simple-1": 9999.0},
+        "environment 10 best": {"complex-3": 3011.0},
+        "±30 % < 25 %": {"top -30 %": 0.7},
+        "random <= 100": {"random": 101.0},
+        "best blind >= 4000": {"blind switchers": 3999.0},
+    }.items():
+        other = row | change
+        assert [one for one, is_met in tables.CRITERIA.items() if not is_met(other)] == [name]
+
+
 def test_the_page_s_tables_are_those_of_its_numbers():
     page = ROOT / "docs" / "results" / "calibration.md"
     text = page.read_text()
     for name, (part, make) in tables.PAGE_PARTS.items():
-        path = page.with_name(f"calibration{tables.PARTS[part]}.csv")
-        if part == "incentives" or path.exists():
-            assert f"<!-- {name} -->\n{make(pages.read(path))}<!-- end -->" in text, name
+        rows = pages.read(page.with_name(f"calibration{tables.PARTS[part]}.csv"))
+        assert f"<!-- {name} -->\n{make(rows)}<!-- end -->" in text, name
