@@ -77,6 +77,8 @@ METHODS: dict[str, Look] = {
     "cone-1": Look(5, "#dcaeca", PURPLE),
     "cone-2": Look(6, "#d8edfa", SKY),
     "cone-3": Look(7, "#8f755a", "#6b4e30"),
+    "cone-es": Look(8, "#cfacfb", "#7e1c67"),
+    "hom-es": Look(9, "#a5bd9c", "#7fa75c"),
 }
 """The look of every method of the registry."""
 

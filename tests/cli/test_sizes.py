@@ -44,6 +44,7 @@ def test_a_number_beyond_all_measure_is_one_line(words: str, say, tmp_path: Path
     ("method", "settings", "words"),
     [
         ("cone", ("genotypes=1000000",), "method.genotypes = 1,000,000 in"),
+        ("cone-es", ("pairs=1000000",), "method.pairs = 1,000,000 ask for most"),
         ("homcne", ("genotypes=1000000", "epochs=10000"), "teams and run.epochs = 10,000 ask"),
     ],
 )

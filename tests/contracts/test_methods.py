@@ -48,11 +48,11 @@ def variants():
     for name in (*METHODS, *in_files()):
         entry = resolve(name)
         names = {field.name for field in fields(entry.config_class)}
-        small = {"genotypes": GENOTYPES, "elite_portion": 0.5}
+        small = {"genotypes": GENOTYPES, "elite_portion": 0.5, "pairs": 2 * ROUNDS}
         small |= dict.fromkeys(("stagnation_v", "stagnation_w", "stagnation_y"), 1)
         config = {key: value for key, value in small.items() if key in names}
         if "evaluation" not in names:
-            yield name, config
+            yield name, config | ({"rounds": ROUNDS} if "pairs" in names else {})
             continue
         for evaluation in ("systematic", "shared"):
             yield name, {**config, "evaluation": evaluation, "rounds": ROUNDS}

@@ -15,14 +15,18 @@ from conevo.evolution.inheritance import breed_from, hand_on
 LAYOUT = Layout(n_robots=2, n_hidden=3, max_hidden=5, n_genes=4)
 CONE = method("cone").config
 TAKEN = {"genes", "active", "progress.n_hidden"}
-every_method = pytest.mark.parametrize("name", METHODS)
+AROUND_A_TEAM = [name for name in METHODS if hasattr(method(name), "begin_with")]
+with_populations = pytest.mark.parametrize("name", [m for m in METHODS if m not in AROUND_A_TEAM])
+around_a_team = pytest.mark.parametrize("name", AROUND_A_TEAM)
 
 
 def build(name: str):
     """Return a method with short windows, so that thresholds and sizes change soon."""
     known = {one.name for one in fields(METHODS[name].config_class)}
     windows = {"stagnation_v", "stagnation_w", "stagnation_y"} & known
-    return method(name, genotypes=6, elite_portion=0.5, **dict.fromkeys(sorted(windows), 1))
+    sizes = {"genotypes": 6, "elite_portion": 0.5, "pairs": 10}
+    sizes = {key: size for key, size in sizes.items() if key in known}
+    return method(name, **sizes, **dict.fromkeys(sorted(windows), 1))
 
 
 def evolve(learner, state: State, generations: int) -> State:
@@ -54,7 +58,7 @@ def same(a: State, b: State, names: set[str]) -> None:
         np.testing.assert_equal(left[name], right[name], err_msg=name)
 
 
-@every_method
+@with_populations
 def test_genes_and_slots_are_taken_over_and_all_else_begins_anew(name: str) -> None:
     learner = build(name)
     old = evolve(learner, learner.init(LAYOUT, 3), 8)
@@ -91,7 +95,7 @@ def test_thresholds_that_an_ancestor_does_not_have_are_refused() -> None:
         breed_from(learner, LAYOUT, 3, genes, active)
 
 
-@every_method
+@with_populations
 @pytest.mark.parametrize("n_robots", [1, 2, 5])
 def test_a_team_of_another_size_is_filled_in_turn(name: str, n_robots: int) -> None:
     learner = build(name)
@@ -114,7 +118,7 @@ def test_a_team_of_another_size_is_filled_in_turn(name: str, n_robots: int) -> N
     assert not later.genes[~later.active].any()
 
 
-@every_method
+@with_populations
 def test_nothing_of_the_old_state_is_changed_or_shared(name: str) -> None:
     learner = build(name)
     old = evolve(learner, learner.init(LAYOUT, 3), 2)
@@ -126,7 +130,7 @@ def test_nothing_of_the_old_state_is_changed_or_shared(name: str) -> None:
     np.testing.assert_array_equal(old.genes, before)
 
 
-@every_method
+@with_populations
 def test_populations_that_do_not_fit_are_refused(name: str) -> None:
     learner = build(name)
     old = learner.init(LAYOUT, 3)
@@ -146,7 +150,7 @@ def test_neurons_are_no_networks() -> None:
         hand_on(ccga, LAYOUT, 3, mesp.init(LAYOUT, 3))
 
 
-@every_method
+@with_populations
 def test_populations_bred_from_a_team_have_it_whole_and_vary_around_it(name: str) -> None:
     learner = build(name)
     fresh = learner.init(LAYOUT, 3)
@@ -171,7 +175,7 @@ def test_populations_bred_from_a_team_have_it_whole_and_vary_around_it(name: str
     assert learner.ask(state).teams.shape == learner.ask(fresh).teams.shape
 
 
-@every_method
+@with_populations
 def test_start_noise_is_normal_noise_on_every_gene_but_those_of_the_team_itself(name: str) -> None:
     learner = replace(
         build(name), config=replace(build(name).config, genotypes=2000, start_noise=0.02)
@@ -205,6 +209,111 @@ def test_a_team_of_other_sizes_is_refused() -> None:
     assert breed_from(build("mesp"), LAYOUT, 3, genes, active).progress.n_hidden.tolist() == [5, 5]
     with pytest.raises(UsageError, match="has networks of 3 neurons, which never grow"):
         breed_from(build("ccga"), LAYOUT, 3, genes, active)
+
+
+# --- methods that begin around a team -------------------------------------------------------------
+
+AROUND = {"mean", "deviations", "active", "phase", "progress.n_hidden"}
+ONE_BIT = 2.0**-23  # of a gene of 1
+
+
+def team_of(n_robots: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return a team [R, 5, 4] whose robots differ, and its slots in use: three of five."""
+    active = np.zeros((n_robots, 5), dtype=bool)
+    active[:, [0, 1, 3]] = True
+    genes = np.random.default_rng(4).uniform(-1, 1, (n_robots, 5, 4)).astype(np.float32)
+    return np.where(active[..., None], genes, np.float32(0)), active
+
+
+@around_a_team
+@pytest.mark.parametrize("ancestor", ["own", "cone", "homcne"])
+def test_a_method_without_populations_begins_around_the_fittest_team(
+    name: str, ancestor: str
+) -> None:
+    learner = build(name)
+    before = learner if ancestor == "own" else build(ancestor)
+    old = evolve(before, before.init(LAYOUT, 3), 8)
+    new, fresh = hand_on(learner, LAYOUT, 7, old), learner.init(LAYOUT, 7)
+    same(new, fresh, contents(fresh).keys() - AROUND)
+    ended = old.progress
+    bred = breed_from(learner, LAYOUT, 7, ended.fittest_genes, ended.fittest_active)
+    same(new, bred, set(contents(new)))
+    assert evolve(learner, new, 3).progress.generation == 3
+
+
+@around_a_team
+@pytest.mark.parametrize("n_robots", [1, 2, 5])
+def test_it_begins_with_each_robot_of_the_team_in_turn(name: str, n_robots: int) -> None:
+    learner: Any = build(name)
+    genes, active = team_of(3)
+    layout = replace(LAYOUT, n_robots=n_robots)
+    state: Any = breed_from(learner, layout, 3, genes, active)
+    expected = genes[np.arange(n_robots) % 3]
+    if name == "hom-es":
+        expected = np.broadcast_to(expected.mean(axis=0, dtype=np.float64), expected.shape)
+        assert not state.deviations.any()
+    np.testing.assert_allclose(state.mean + state.deviations, expected, rtol=0, atol=ONE_BIT)
+    assert np.abs(state.deviations.mean(axis=0, dtype=np.float64)).max() <= ONE_BIT
+    assert state.active.tolist() == active[0].tolist()
+    assert state.progress.n_hidden.tolist() == [3]
+    assert state.problem(learner.init(layout, 3)) == ""
+    played = learner.ask(state).networks()
+    np.testing.assert_allclose(played.mean(axis=0), expected, rtol=0, atol=0.1)
+    assert not played[:, :, [2, 4]].any()
+    assert evolve(learner, state, 2).progress.generation == 2
+
+
+@around_a_team
+@pytest.mark.parametrize("n_robots", [1, 3, 7, 20])
+def test_of_a_team_of_clones_it_is_the_clone_bit_for_bit(name: str, n_robots: int) -> None:
+    learner: Any = build(name)
+    genes, active = team_of(1)
+    clones = genes.repeat(n_robots, axis=0), active.repeat(n_robots, axis=0)
+    state: Any = breed_from(learner, replace(LAYOUT, n_robots=n_robots), 3, *clones)
+    np.testing.assert_array_equal(state.mean, genes[0])
+    assert not state.deviations.any()
+
+
+@around_a_team
+def test_a_slot_that_some_robot_uses_begins_with_zeros_in_the_others(name: str) -> None:
+    genes, active = team_of(2)
+    genes[1, 3], active[1, 3] = 0, False
+    state: Any = breed_from(build(name), LAYOUT, 3, genes, active)
+    assert state.active.tolist() == [True, True, False, True, False]
+    np.testing.assert_allclose(state.mean[3], genes[0, 3] / 2, rtol=0, atol=ONE_BIT)
+
+
+@around_a_team
+def test_teams_that_do_not_fit_are_refused(name: str) -> None:
+    learner = build(name)
+    old = evolve(learner, learner.init(LAYOUT, 3), 1)
+    for layout, words in (
+        (replace(LAYOUT, max_hidden=6), "ES cannot begin with this team: 5 slots became 6"),
+        (replace(LAYOUT, n_genes=9), "ES cannot begin with this team: 4 genes per neuron became 9"),
+    ):
+        with pytest.raises(UsageError, match=words):
+            hand_on(learner, layout, 3, old)
+        with pytest.raises(UsageError, match=words):
+            breed_from(learner, layout, 3, *team_of(2))
+    for learner_of in (learner, build("cone")):  # before its first team there is nothing to fit
+        anew = hand_on(learner, LAYOUT, 3, learner_of.init(LAYOUT, 3))
+        same(anew, learner.init(LAYOUT, 3), set(contents(anew)))
+    with pytest.raises(UsageError, match="the method it is from has none"):
+        hand_on(build("cone"), LAYOUT, 3, old)
+
+
+@around_a_team
+def test_nothing_of_a_team_is_changed_or_shared(name: str) -> None:
+    learner = build(name)
+    genes, active = team_of(1)
+    given = genes.copy(), active.copy()
+    state: Any = breed_from(learner, replace(LAYOUT, n_robots=1), 3, genes, active)
+    for one in (state.mean, state.deviations, state.active):
+        assert not np.shares_memory(one, genes)
+        assert not np.shares_memory(one, active)
+    evolve(learner, state, 2)
+    np.testing.assert_array_equal(genes, given[0])
+    np.testing.assert_array_equal(active, given[1])
 
 
 @dataclass(frozen=True)

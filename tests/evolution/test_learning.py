@@ -9,10 +9,11 @@ LAYOUT = Layout(n_robots=3, n_hidden=3, max_hidden=3, n_genes=5)
 
 CASES = [
     *((name, {"genotypes": 60}, 40) for name in ("homcne", "hetcne")),
+    *((name, {"pairs": 50}, 40) for name in ("cone-es", "hom-es")),
     *(
         (name, {"genotypes": 20, "evaluation": evaluation, "rounds": 5}, 40)
         for name in METHODS
-        if name not in ("homcne", "hetcne")
+        if name not in ("homcne", "hetcne", "cone-es", "hom-es")
         for evaluation in ("systematic", "shared")
     ),
 ]
@@ -21,9 +22,11 @@ CASES = [
 @pytest.mark.parametrize(("name", "config", "generations"), CASES)
 def test_error_halves(name, config, generations):
     target = np.random.default_rng(0).uniform(-1, 1, (3, 3, 5))
-    if name in ("homcne", "hetcne"):
-        target[:] = target[0]  # one population can only learn one target
-    learner = method(name, elite_portion=0.25, **config)
+    if name in ("homcne", "hetcne", "hom-es"):
+        target[:] = target[0]  # clones can only learn one target
+    if "genotypes" in config:
+        config = config | {"elite_portion": 0.25}
+    learner = method(name, **config)
     state = learner.init(LAYOUT, root=11)
     error = []
     while state.progress.generation < generations:

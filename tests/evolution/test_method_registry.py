@@ -12,10 +12,17 @@ import conevo.evolution
 from conevo.errors import UsageError
 from conevo.evolution import METHODS, method
 
+OURS = ("cone-es", "hom-es")
+
 
 def test_the_five_methods_and_three_variants():
     published = ["homcne", "hetcne", "ccga", "mesp", "cone", "cone-1", "cone-2", "cone-3"]
     assert [name for name in METHODS if name in published] == published
+
+
+def test_variants_have_a_family():
+    families = {name: METHODS[name].family for name in METHODS if METHODS[name].family != name}
+    assert families == {"cone-1": "cone", "cone-2": "cone", "cone-3": "cone", "hom-es": "cone-es"}
 
 
 @pytest.mark.parametrize("name", METHODS)
@@ -25,12 +32,13 @@ def test_an_entry_builds_its_method(name):
     assert (built.name, built.title) == (entry.name, entry.title)
     assert type(built.config) is entry.config_class
     assert is_dataclass(built.config)
+    size = "pairs" if name in OURS else "genotypes"
+    assert size in {field.name for field in fields(entry.config_class)}
     with pytest.raises(AttributeError):
-        built.config.genotypes = 3
-    config = {field.name for field in fields(entry.config_class)}
-    assert "genotypes" in config
+        setattr(built.config, size, 3)
     assert entry.summary
-    assert "Nitschke 2009" in entry.source
+    assert entry.source.startswith("conevo's own") == (name in OURS)
+    assert name in OURS or "Nitschke 2009" in entry.source
 
 
 @pytest.mark.parametrize(
@@ -47,6 +55,15 @@ def test_an_entry_builds_its_method(name):
         ("cone", {"sst": float("nan")}, "method.sst = nan: must be a finite number"),
         ("cone", {"gd_aggregate": "max"}, "gd_aggregate = 'max': must be 'mean' or 'sum'"),
         ("cone-1", {"use_gdm": True}, "method.use_gdm = True: must be False"),
+        ("cone-es", {"genotypes": 4}, "unknown key 'method.genotypes'"),
+        ("cone-es", {"pairs": 1}, "method.pairs = 1: must be greater than or equal to 2"),
+        ("cone-es", {"spread": 0}, "method.spread = 0: must be greater than 0"),
+        ("hom-es", {"individual": 0.5}, "method.individual = 0.5: must be less than or equal to 0"),
+        (
+            "cone-es",
+            {"pairs": 52, "rounds": 5},
+            "method.rounds = 5: must divide the pairs evenly, of which there are 52",
+        ),
     ],
 )
 def test_wrong_requests(name, config, message):

@@ -16,6 +16,7 @@ from conevo.runs.settings import RunSettings
 from conevo.worlds.registry import WORLDS
 
 TASK = "rover/complex-1"
+OURS = ("cone-es", "hom-es")
 
 
 @pytest.mark.parametrize("preset", PRESETS)
@@ -67,6 +68,10 @@ def test_thesis_preset_has_the_sizes_of_the_thesis() -> None:
     }  # fmt: skip
     for name, size in sizes.items():
         assert resolve(TASK, name, "thesis").method_config.genotypes == size
+    for world in WORLDS:  # ours, at the price of HomCNE
+        task = f"{world}/{WORLDS[world].environments[0]}"
+        teams = resolve(task, "homcne", "thesis").method_config.genotypes
+        assert {2 * resolve(task, name, "thesis").method_config.pairs for name in OURS} == {teams}
     run = resolve(TASK, "cone", "thesis").run
     assert (run.generations, run.epochs) == (250, 10)
 

@@ -45,6 +45,9 @@ def tiny_settings(method: str, task: str = TASK, **changes: Any) -> dict[str, An
     tiny = {k: v for k, v in TINY.items() if k[:6] != "world." or k[6:] in world}
     small = conevo.world(task, **{k[6:]: v for k, v in tiny.items() if k[:6] == "world."})
     tiny["method.genotypes"] = max(tiny["method.genotypes"], small.n_robots)  # HetCNE's least
+    if "genotypes" not in known:
+        del tiny["method.genotypes"]
+        tiny |= {"method.pairs": 4, "method.rounds": 2}
     return tiny | restless | {key.replace("__", "."): value for key, value in changes.items()}
 
 

@@ -30,7 +30,9 @@ def hand_on(method: Method, layout: Layout, root: int, state: State) -> State:
     Choice: fitness of different tasks does not compare, so windows, histories, partners and
     counters begin anew, and thresholds unless ``thresholds_from`` of CONE's parameters says where
     they were. Choice: in a team with more robots than before population p begins as
-    a copy of population p mod P; in a smaller one the last populations are left behind.
+    a copy of population p mod P; in a smaller one the last populations are left behind. A method
+    that has a function ``begin_with(layout, root, genes, active)`` has no populations: it begins
+    around the fittest team of the last generation, or anew if there is none yet.
 
     Args:
         method: the method of the new task.
@@ -43,6 +45,9 @@ def hand_on(method: Method, layout: Layout, root: int, state: State) -> State:
             networks in one of the two only, one of the two has no populations, or ``state`` does
             not have the thresholds that are asked for.
     """
+    if hasattr(method, "begin_with"):
+        ended = state.progress
+        return _around(method, layout, root, ended.fittest_genes, ended.fittest_active)
     fresh = method.init(layout, root)
     if not (isinstance(fresh, Populations) and isinstance(state, Populations)):
         who = "the method it is from" if isinstance(fresh, Populations) else method.title
@@ -89,6 +94,8 @@ def breed_from(
         UsageError: slots or genes are not as many as in the task, or the method's networks, which
             keep their size, have another one, or it has no populations, or asks for thresholds.
     """
+    if hasattr(method, "begin_with"):
+        return _around(method, layout, root, genes, active)
     fresh = method.init(layout, root)
     if not isinstance(fresh, Populations):
         raise UsageError(
@@ -168,6 +175,30 @@ def _with_thresholds(fresh: Populations, method: Method, state: State | None) ->
             f"(populations of a method with that threshold have one, a champion has none)"
         )
     return replace(fresh, **found)
+
+
+def _around(method: Any, layout: Layout, root: int, genes: FloatArray, active: BoolArray) -> State:
+    """Return generation 0 of a method that begins around a team [R, U, G], not with populations.
+
+    Raises:
+        UsageError: slots or genes are not as many as in the layout.
+    """
+    wanted = (layout.max_hidden, layout.n_genes)
+    different = [
+        f"{found} {name} became {right}"
+        for name, found, right in zip(
+            ("slots", "genes per neuron"), genes.shape[1:], wanted, strict=True
+        )
+        if found != right
+    ]
+    if different:
+        raise UsageError(f"{method.title} cannot begin with this team: {'; '.join(different)}")
+    state: State = (
+        method.begin_with(layout, root, genes, active)
+        if active.any()
+        else method.init(layout, root)
+    )
+    return state
 
 
 def _with(fresh: Populations, genes: FloatArray, active: BoolArray) -> Populations:

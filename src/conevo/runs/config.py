@@ -456,7 +456,7 @@ def _read_preset(preset: str, world: WorldEntry, method: MethodEntry, controller
     worlds = parse_toml(source.read_text(encoding="utf-8"), f"preset {preset!r}")
     generic, own = dict(worlds[ANY]), dict(worlds.get(world.short_name, {}))
     by_method = generic.pop("method") | own.pop("method", {})
-    name, family = method.name, method.name.split("-")[0]
+    name, family = method.name, method.family
     if not (method.file or {family, name} & set(by_method)):
         raise UsageError(f"preset {preset!r} has no settings for method {name!r} in {world.name!r}")
     sizes = {} if method.file else by_method.get(family, {}) | by_method.get(name, {})

@@ -112,11 +112,14 @@ def check_memory(config: RunConfig, layout: Layout) -> None:
     robots, genotypes = layout.n_robots, getattr(method, "genotypes", 1)
     is_shared = getattr(method, "evaluation", "") == "shared"
     teams = genotypes * (getattr(method, "rounds", 1) if is_shared else robots)
+    name = "genotypes"
+    if pairs := getattr(method, "pairs", 0):  # of teams, every robot with genes of its own
+        name, genotypes, teams = "pairs", pairs, 2 * pairs
     genes = 4 * robots * layout.max_hidden * layout.n_genes * genotypes
     team = 4 * robots * layout.max_hidden * (1 + layout.n_genes)
     needs = {
-        f"method.genotypes = {genotypes:,}": 3 * genes,  # parents, children, partners
-        f"method.genotypes = {genotypes:,} in {teams:,} teams": teams * team,
+        f"method.{name} = {genotypes:,}": 3 * genes,  # parents, children, partners
+        f"method.{name} = {genotypes:,} in {teams:,} teams": teams * team,
         f"{teams:,} teams and run.epochs = {run.epochs:,}": teams * run.epochs * 40 * robots,
     }
     there = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")

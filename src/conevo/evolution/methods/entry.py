@@ -45,6 +45,11 @@ class MethodEntry:
         return f"{self.file}:{self.name}" if self.file else self.name
 
     @property
+    def family(self) -> str:
+        """The method whose variant this is, "cone" for all that its module has; or its own name."""
+        return self.module.rpartition(".")[2].replace("_", "-") if self.module else self.name
+
+    @property
     def config_class(self) -> type[Any]:
         """The dataclass of its parameters; it refuses what they do not allow."""
         from conevo.parameters import checked

@@ -89,6 +89,24 @@ METHODS: dict[str, MethodEntry] = {
             config_name="Cone3Config",
             method_name="Cone",
         ),
+        MethodEntry(
+            name="cone-es",
+            title="CONE-ES",
+            summary="an evolution strategy of one shared controller and of each robot's deviation",
+            source="conevo's own, after Nitschke 2009, chapter 3, and Salimans et al. 2017",
+            module="conevo.evolution.methods.cone_es",
+            config_name="ConeEsConfig",
+            method_name="ConeEs",
+        ),
+        MethodEntry(
+            name="hom-es",
+            title="HomES",
+            summary="one shared controller only: an evolution strategy over teams of clones",
+            source="conevo's own, after Salimans et al. 2017",
+            module="conevo.evolution.methods.cone_es",
+            config_name="HomEsConfig",
+            method_name="ConeEs",
+        ),
     )
 }
 

@@ -1,0 +1,391 @@
+"""CONE-ES: an evolution strategy of one shared controller and of each robot's deviation from it.
+
+Ours, not the thesis'. It keeps CONE's idea (Nitschke 2009, chapter 3: robots that behave and look
+alike share genes, and how much is regulated by what it brings) in a form in which fitness says
+enough to steer by. Robot r has the genes ``mean + deviations[r]``. Pairs of teams are tried, one
+perturbed, the other perturbed the opposite way; as Salimans, Ho, Chen, Sidor and Sutskever 2017 do,
+fitness counts by rank among the teams of a round.
+
+- Shared part: every robot of a team has the same perturbation, and the team's fitness says which
+  way the mean steps. A team of twenty tells it twenty times better than a robot of its own could.
+- Individual part: in a ``share`` of the pairs every robot has a perturbation of its own on top, and
+  its own fitness says which way it would go. That is mostly luck. What is not luck comes again: the
+  products of directions of different generations, [R, R], are not biased by it. Their eigenvectors
+  are what robots have in common, castes among them, and those whose eigenvalue is above all that
+  luck makes are kept: a robot steps as the ones like it do, in proportion to the signal.
+- The share grows where there is such a signal and shrinks where there is none (as GST does, 3.5.2).
+- The team is the judge: each generation the mean's clones play in the scenarios of the fittest
+  team. While deviations do not pay, they decay, and the clones are the generation's fittest team.
+
+With ``individual = 0`` (the variant HomES) nothing is individual: a plain evolution strategy over
+teams of clones.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Annotated
+
+import numpy as np
+from annotated_types import Ge, Gt, Le
+
+from conevo.evolution.population import random_genes
+from conevo.evolution.protocol import (
+    BoolArray,
+    FloatArray,
+    Layout,
+    Progress,
+    Scores,
+    Trials,
+)
+from conevo.parameters import WrongValue, parameters
+from conevo.rng import stream
+
+__all__ = ["ConeEs", "ConeEsConfig", "ConeEsState", "HomEsConfig"]
+
+FIRST = 4  # generations of directions before they are compared
+GROWTH = 1.1  # of the share, in a generation with a signal; its inverse without
+TRUST = 0.8  # memory of what deviations are worth to the team
+
+
+@parameters("method")
+class ConeEsConfig:
+    """Parameters of CONE-ES. Choice: all values are by experiment, none is tuned to a world."""
+
+    pairs: Annotated[int, Ge(2), Le(1_000_000)] = 50
+    """mirrored pairs of teams in a generation."""
+    rounds: Annotated[int, Ge(1), Le(10_000)] = 5
+    """rounds among which the pairs are divided evenly; each has scenarios of its own, and teams are
+    ranked in it."""
+    spread: Annotated[float, Gt(0), Le(1)] = 0.1
+    """standard deviation of a perturbation in gene units."""
+    step: Annotated[float, Gt(0), Le(1)] = 0.02
+    """root mean square of the mean's step in a generation, in gene units."""
+    memory: Annotated[float, Ge(0), Le(0.999)] = 0.8
+    """share of the direction before that the next step keeps."""
+    individual: Annotated[float, Ge(0), Le(1)] = 0.5
+    """share of the pairs in which robots have perturbations of their own, at the start; it is
+    regulated. 0 switches all that is individual off."""
+    individual_least: Annotated[float, Gt(0), Le(1)] = 0.1
+    """the least that this share shrinks to."""
+    individual_step: Annotated[float, Ge(0), Le(1)] = 0.02
+    """root mean square of the deviations' step, in gene units, if all of it were signal."""
+    individual_memory: Annotated[float, Ge(0.5), Le(0.999)] = 0.9
+    """share of the robots' directions before that the next generation keeps."""
+    signal: Annotated[float, Ge(0), Le(1)] = 0.15
+    """portion of signal, in what robots have most in common, above which the share grows."""
+    decay: Annotated[float, Ge(0), Le(1)] = 0.1
+    """portion of the deviations that goes in a generation in which they do not pay."""
+
+    def __post_init__(self) -> None:
+        """Refuse rounds that pairs cannot be divided among."""
+        if self.pairs % self.rounds:
+            problem = f"must divide the pairs evenly, of which there are {self.pairs}"
+            raise WrongValue("rounds", f"method.rounds = {self.rounds}", problem)
+
+
+@parameters("method")
+class HomEsConfig(ConeEsConfig):
+    """Parameters of HomES: CONE-ES without anything individual."""
+
+    individual: Annotated[float, Ge(0), Le(0)] = 0.0
+    """always 0."""
+
+
+@dataclass(frozen=True)
+class ConeEsState:
+    """What CONE-ES remembers.
+
+    Attributes:
+        progress: the header.
+        phase: "first" (random teams of clones), "pairs", "fittest".
+        active: [U] the slots in use.
+        mean: [U, G] float32 the shared genes, zero in empty slots.
+        deviations: [R, U, G] float32 what robots add to them; their mean over robots is 0.
+        direction: [U, G] float64 of the mean's steps, averaged over generations.
+        directions: [R, U, G] float64 of each robot, by its own fitness, likewise.
+        likeness: [R, R] float64 products of directions of different generations, averaged.
+        luck: mean square of a generation's directions, averaged.
+        age: generations that are in these averages.
+        share: of the pairs in which robots have perturbations of their own.
+        worth: of the deviations to the team: what it has more than clones of the mean, as a portion
+            of both, averaged over generations.
+    """
+
+    progress: Progress
+    phase: str
+    active: BoolArray
+    mean: FloatArray
+    deviations: FloatArray
+    direction: FloatArray
+    directions: FloatArray
+    likeness: FloatArray
+    luck: float
+    age: int
+    share: float
+    worth: float
+
+    def problem(self, first: ConeEsState) -> str:
+        """Return the field that cannot be that of a state between generations, if there is one."""
+        for name in ("active", "mean", "deviations", "direction", "directions", "likeness"):
+            found, right = getattr(self, name), getattr(first, name)
+            if found.shape != right.shape or not np.isfinite(found).all():
+                return name
+        if not (np.abs(self.mean + self.deviations) <= 1.001).all():
+            return "deviations"
+        if not self.active.any():
+            return "active"
+        for name, least, most in (
+            ("share", 0.0, 1.0),
+            ("worth", -1.0, 1.0),
+            ("luck", 0.0, np.inf),
+            ("age", 0, np.inf),
+        ):
+            if not least <= getattr(self, name) <= most:
+                return name
+        return "" if self.phase in ("first", "pairs") else "phase"
+
+
+@dataclass(frozen=True)
+class ConeEs:
+    """Evolution strategy of a shared controller and individual deviations; see the module."""
+
+    config: ConeEsConfig = field(default_factory=ConeEsConfig)
+    name: str = "cone-es"
+    title: str = "CONE-ES"
+
+    def init(self, layout: Layout, root: int) -> ConeEsState:
+        """Return generation 0, in which random controllers are tried as clones.
+
+        Choice: as many as a generation has teams; the fittest is the first mean.
+        """
+        robots, slots, genes = layout.n_robots, layout.max_hidden, layout.n_genes
+        return ConeEsState(
+            progress=Progress.first(layout, root),
+            phase="first",
+            active=np.arange(slots) < layout.n_hidden,
+            mean=np.zeros((slots, genes), dtype=np.float32),
+            deviations=np.zeros((robots, slots, genes), dtype=np.float32),
+            direction=np.zeros((slots, genes)),
+            directions=np.zeros((robots, slots, genes)),
+            likeness=np.zeros((robots, robots)),
+            luck=0.0,
+            age=0,
+            share=self.config.individual,
+            worth=0.0,
+        )
+
+    def begin_with(
+        self, layout: Layout, root: int, genes: FloatArray, active: BoolArray
+    ) -> ConeEsState:
+        """Return generation 0 around a team: its mean controller, and each robot's deviation.
+
+        Choice: a slot that only some robots use holds zeros in the others. HomES begins with the
+        mean alone.
+
+        Args:
+            layout: the size of the problem.
+            root: the seed of every random decision.
+            genes: [R', U, G] the team's; robot r takes after its robot r mod R'.
+            active: [R', U] its slots in use; the mean's are those that any of them uses.
+        """
+        fresh = self.init(layout, root)
+        used = np.asarray(active.any(axis=0))
+        team = (genes * active[..., None])[np.arange(layout.n_robots) % len(genes)]
+        mean, deviations = self._parted(team)
+        return replace(
+            fresh,
+            progress=replace(fresh.progress, n_hidden=np.array([used.sum()])),
+            phase="pairs",
+            active=used,
+            mean=mean,
+            deviations=deviations,
+        )
+
+    def ask(self, state: ConeEsState) -> Trials:
+        """Return random clones in generation 0, later the pairs; then the fittest team."""
+        if state.phase == "fittest":
+            return self._trials(state, np.stack(self._finalists(state)))
+        if state.phase == "first":
+            return self._trials(state, self._clones(state, self._candidates(state)))
+        shared, own = self._perturbations(state)
+        moved = np.broadcast_to(shared[:, None], (len(shared), *state.deviations.shape)).copy()
+        moved[self._is_own(state)] += own
+        both = self.config.spread * np.stack([moved, -moved])  # [2, pairs, R, U, G]
+        rounds = both.reshape(2, self.config.rounds, -1, *state.deviations.shape)
+        teams = rounds.swapaxes(0, 1).reshape(-1, *state.deviations.shape)
+        return self._trials(state, state.mean + state.deviations + teams)
+
+    def tell(self, state: ConeEsState, trials: Trials, scores: Scores) -> ConeEsState:
+        """Return the state after these scores."""
+        is_first = state.phase != "fittest"
+        state = replace(state, progress=state.progress.counted(trials, scores, is_first=is_first))
+        credit = np.where(np.isfinite(scores.fitness), scores.fitness, np.nan)  # [N, R]
+        fitness = credit.mean(axis=1)
+        if state.phase == "fittest":
+            crowned = replace(state, progress=state.progress.crowned(trials, scores))
+            return self._end(crowned, fitness)
+        state = replace(state, progress=state.progress.graded(fitness))
+        if state.phase == "first":
+            best = np.where(np.isnan(fitness), -np.inf, fitness).argmax()
+            mean = self._candidates(state)[best] * state.active[:, None]
+            return replace(state, phase="fittest", mean=mean)
+        return self._step(state, credit)
+
+    def _step(self, state: ConeEsState, credit: FloatArray) -> ConeEsState:
+        """Return the state with mean and deviations one step further, by credit [N, R]."""
+        config, n_robots = self.config, len(state.deviations)
+        shared, own = self._perturbations(state)
+        gain = self._gains(credit.mean(axis=1, keepdims=True))[:, 0]
+        direction = np.tensordot(gain, shared, axes=1) / config.pairs
+        direction = config.memory * state.direction + (1 - config.memory) * direction
+        centre = state.mean + config.step * direction / _size(direction, state.active)
+        state = replace(state, phase="fittest", direction=direction)
+        deviations = state.deviations
+        if config.individual:
+            gains = self._gains(credit)[self._is_own(state)]
+            found: FloatArray = np.einsum("nr,nrug->rug", gains, own) / config.pairs
+            state = self._remember(state, found - found.mean(axis=0))
+            kept, signal = _signal(state, config.individual_memory)
+            size = _size(state.directions, np.broadcast_to(state.active, (n_robots, kept.shape[1])))
+            deviations = deviations + config.individual_step * kept / size
+            if state.age > FIRST:
+                grows = signal > config.signal
+                share = state.share * GROWTH if grows else state.share / GROWTH
+                state = replace(state, share=float(np.clip(share, config.individual_least, 1.0)))
+            numbers = {"individual_share": state.share, "individual_signal": signal}
+            state = replace(state, progress=state.progress.with_numbers(**numbers))
+        team = np.clip(centre + deviations, -1, 1) * state.active[:, None]
+        mean, deviations = self._parted(team)
+        return replace(state, mean=mean, deviations=deviations)
+
+    def _parted(self, team: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the mean [U, G] of a team [R, U, G] and its deviations, which are 0 for clones."""
+        genes = team.astype(np.float32)
+        mean = genes.mean(axis=0, dtype=np.float64).astype(np.float32)
+        return mean, (genes - mean) * np.float32(self.config.individual > 0)
+
+    def _remember(self, state: ConeEsState, found: FloatArray) -> ConeEsState:
+        """Return the state with the robots' directions [R, U, G] of a generation averaged in."""
+        keep, n_robots = self.config.individual_memory, len(found)
+        new, old = found.reshape(n_robots, -1), state.directions.reshape(n_robots, -1)
+        n_genes = state.active.sum() * found.shape[2]
+        likeness = state.likeness
+        if state.age:
+            together = new @ old.T / (n_genes * (1 - keep**state.age))
+            likeness = keep * likeness + (1 - keep) * (together + together.T) / 2
+        return replace(
+            state,
+            directions=keep * state.directions + (1 - keep) * found,
+            likeness=likeness,
+            luck=float(keep * state.luck + (1 - keep) * (new**2).sum() / (n_genes * n_robots)),
+            age=state.age + 1,
+        )
+
+    def _end(self, state: ConeEsState, fitness: FloatArray) -> ConeEsState:
+        """Return the first state of the next generation, given the finalists' fitness."""
+        progress, worth, deviations = state.progress, state.worth, state.deviations
+        if len(fitness) == 2:
+            team, clones = fitness if worth >= 0 else fitness[::-1]
+            both = abs(team) + abs(clones)
+            failed = float(np.isnan(clones)) - float(np.isnan(team))
+            more = float((team - clones) / both) if both > 0 else failed
+            worth = TRUST * worth + (1 - TRUST) * more
+            if worth < 0:
+                deviations = ((1 - self.config.decay) * deviations).astype(np.float32)
+            progress = progress.with_numbers(individual_worth=worth)
+        progress = replace(progress, generation=progress.generation + 1)
+        return replace(state, progress=progress, phase="pairs", worth=worth, deviations=deviations)
+
+    def _finalists(self, state: ConeEsState) -> list[FloatArray]:
+        """Return the team with deviations and that of clones, [R, U, G], the fitter one first."""
+        team = state.mean + state.deviations
+        if not state.deviations.any():
+            return [team]
+        clones = np.broadcast_to(state.mean, team.shape)
+        return [team, clones] if state.worth >= 0 else [clones, team]
+
+    def _candidates(self, state: ConeEsState) -> FloatArray:
+        """Return the random controllers [2 * pairs, U, G] of generation 0."""
+        shape = (2 * self.config.pairs, *state.mean.shape)
+        return random_genes(stream(state.progress.root, "genotypes"), shape)
+
+    def _clones(self, state: ConeEsState, controllers: FloatArray) -> FloatArray:
+        shape = (len(controllers), len(state.deviations), *state.mean.shape)
+        return np.broadcast_to(controllers[:, None], shape)
+
+    def _perturbations(self, state: ConeEsState) -> tuple[FloatArray, FloatArray]:
+        """Return those of a generation: shared [pairs, U, G], and own ones [n, R, U, G]."""
+        generator = stream(state.progress.root, "pairs", state.progress.generation)
+        used = state.active[:, None]
+        shared = generator.standard_normal((self.config.pairs, *state.mean.shape), dtype=np.float32)
+        n_own = int(self._is_own(state).sum())
+        own = generator.standard_normal((n_own, *state.deviations.shape), dtype=np.float32)
+        return shared * used, own * used
+
+    def _is_own(self, state: ConeEsState) -> BoolArray:
+        """Return the pairs [pairs] in which robots have perturbations of their own, by round."""
+        per_round = self.config.pairs // self.config.rounds
+        n_own = max(int(state.share * per_round + 0.5), int(state.share > 0))
+        return np.tile(np.arange(per_round) < n_own, self.config.rounds)
+
+    def _gains(self, fitness: FloatArray) -> FloatArray:
+        """Return what the first of each pair has over the second, [pairs, C], in ranks of a round.
+
+        Args:
+            fitness: [2 * pairs, C].
+        """
+        rounds = fitness.reshape(self.config.rounds, -1, fitness.shape[1])
+        ranks = np.stack([_ranks(one) for one in rounds])
+        half = ranks.shape[1] // 2
+        gains: FloatArray = (ranks[:, :half] - ranks[:, half:]).reshape(-1, fitness.shape[1])
+        return gains
+
+    def _trials(self, state: ConeEsState, teams: FloatArray) -> Trials:
+        """Return teams [N, R, U, G] as trials."""
+        genes = np.clip(teams, -1, 1).astype(np.float32).reshape(-1, teams.shape[-1])
+        rows = np.arange(len(genes), dtype=np.int32).reshape(teams.shape[:3])
+        is_last = state.phase == "fittest"
+        return Trials(
+            generation=state.progress.generation,
+            genes=genes,
+            teams=np.where(state.active, rows, np.int32(-1)),
+            scenarios="fixed" if is_last else "fresh",
+            portrait=is_last,
+            rounds=1 if is_last else self.config.rounds,
+            purpose=state.phase,
+        )
+
+
+def _ranks(fitness: FloatArray) -> FloatArray:
+    """Return the ranks [N, C] of each column, from -1/2 (the least) to 1/2; equals share one."""
+    order = np.where(np.isfinite(fitness), fitness, -np.inf)
+    below = (order[None] < order[:, None]).sum(axis=1)
+    equal = (order[None] == order[:, None]).sum(axis=1)
+    ranks: FloatArray = (below + (equal - 1) / 2) / max(len(order) - 1, 1) - 0.5
+    return ranks
+
+
+def _size(directions: FloatArray, active: BoolArray) -> float:
+    """Return the root mean square of the genes in use, at least a tiny number."""
+    n = active.sum() * directions.shape[-1]
+    return float(np.sqrt((directions**2).sum() / n)) + 1e-12
+
+
+def _signal(state: ConeEsState, memory: float) -> tuple[FloatArray, float]:
+    """Return what of the robots' directions [R, U, G] is signal, and the largest portion of it.
+
+    A Wiener filter over robots. Without any signal the products of different generations are as
+    often negative as positive, and so are their eigenvalues: none above the size of the smallest
+    is believed, and the others count as much as they exceed it.
+    """
+    directions = state.directions
+    if state.age <= FIRST:
+        return np.zeros_like(directions), 0.0
+    full = 1 - memory**state.age
+    values, vectors = np.linalg.eigh(state.likeness / (1 - memory ** (state.age - 1)))
+    believed = np.maximum(values - max(-values[0], 0.0), 0.0)
+    noise = state.luck / full * (1 - memory) / (1 + memory)
+    portion = believed / (believed + noise + 1e-30)
+    kept = np.einsum("rk,k,sk,sug->rug", vectors, portion, vectors, directions)
+    return kept, float(portion.max())
