@@ -1,0 +1,194 @@
+"""Make the map of regimes: where CONE-ES finds more than the same strategy over clones, HomES.
+
+    python experiments/regime_map.py CAMPAIGN --write docs/results/regimes.md
+
+reads what is finished of a campaign of the plan `regimes`. With ``--write`` a row per run goes to
+the CSV file next to the page, the figure to the PNG file, and the tables between the page's
+markers; ``--again`` makes tables and figure from the CSV file.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+sys.path.append(str(Path(__file__).resolve().parents[1] / "docs"))
+from conevo.analysis.frames import Tables
+from conevo.campaigns.campaign import Campaign
+from conevo.campaigns.plan import PlannedRun
+from conevo.cli.find import find_campaign, sealed
+from conevo.errors import ConevoError, UsageError
+from conevo.runs.run import Run
+from incentives import OF_REGION
+from pages import Row, put, read, table, write
+from regime_cells import CLONES, INDIVIDUAL, REGIONS, cells_of, used
+from regime_figure import draw
+from regime_tables import PAGE_PARTS
+
+SETTINGS = ("low", "med", "hi")
+SPREAD = ("conevo", "kernel_hash", "warp", "numpy", "python", "cpu")  # of the provenance
+
+
+def regime_of(planned: PlannedRun) -> Row:
+    """Return the regime of a run: the names of its levels, and the numbers that the rule needs.
+
+    Raises:
+        UsageError: the run is not of the plan.
+    """
+    levels = dict(part.partition("=")[::2] for part in planned.variant.split(", "))
+    if missing := {"segregation", "accuracies", "ranges"} - levels.keys():
+        raise UsageError(
+            f"{planned.label} has no level of {', '.join(sorted(missing))}; "
+            "the map takes campaigns of the plan regimes"
+        )
+    params = planned.configs()[-1].world_params
+    numbers = {f"{one}_{what}" for what in ("range", "accuracy") for one in SETTINGS}
+    return {
+        "ranges": levels["ranges"],
+        "accuracies": levels["accuracies"],
+        **{name: getattr(params, name) for name in ("segregation", "starts", "iterations")},
+        **{name: getattr(params, name) for name in sorted(numbers)},
+    }
+
+
+def rows_of(tables: Tables, planned: Sequence[PlannedRun]) -> list[Row]:
+    """Return a row per finished run of the two methods: its regime, value, cost and castes."""
+    regimes = {one.label: regime_of(one) for one in planned}
+    first = {one.run: one.value for one in tables.values(team="generation 0")}
+    cost = _keyed(tables, "SELECT run, evaluations, team_steps, core_seconds FROM runs")
+    shares = _keyed(
+        tables,
+        "SELECT run, avg(setting_share), avg(specialization) FROM robots "
+        "WHERE setting_share IS NOT NULL GROUP BY run",
+    )
+    castes = _castes(tables)
+    rows = []
+    for one in tables.values():
+        if one.run not in regimes or one.method not in (INDIVIDUAL, CLONES):
+            continue
+        row: Row = regimes[one.run] | {"method": one.method, "seed": one.seed, "value": one.value}
+        row |= {"first value": first.get(one.run)}
+        row |= dict(zip(("evaluations", "team_steps", "core_seconds"), cost[one.run], strict=True))
+        if one.run in shares:
+            row |= dict(zip(("favourite share", "S"), shares[one.run], strict=True))
+        rows.append(row | castes.get(one.run, {}))
+    order = ("ranges", "accuracies", "segregation", "method", "seed")
+    return sorted(rows, key=lambda row: tuple(row[name] for name in order))
+
+
+def _keyed(tables: Tables, sql: str) -> dict[str, tuple[Any, ...]]:
+    return {run: tuple(rest) for run, *rest in tables.query(sql)[1]}
+
+
+def _castes(tables: Tables) -> dict[str, Row]:
+    """Return, of each run, how often each region's robots used each setting, and what of it fits.
+
+    "in place" is the portion of robots whose favourite is a setting that the type of their region
+    (robot i begins in region i mod 4) asks for; of robots that used any.
+    """
+    counts: dict[str, Counter[str]] = {}
+    for run, robot, action, n in tables.query("SELECT run, robot, action, count FROM actions")[1]:
+        if action in SETTINGS:
+            counts.setdefault(run, Counter())[used(REGIONS[robot % 4], action)] += n
+    fits: dict[str, list[bool]] = {}
+    for run, robot, setting in tables.query("SELECT run, robot, favourite_setting FROM robots")[1]:
+        if setting is not None:
+            wanted = {SETTINGS[k] for k in OF_REGION[robot % 4]}
+            fits.setdefault(run, []).append(setting in wanted)
+    return {
+        run: {used(r, s): of[used(r, s)] for r in REGIONS for s in SETTINGS}
+        | ({"in place": float(np.mean(fits[run]))} if run in fits else {})
+        for run, of in counts.items()
+    }
+
+
+def made_with(campaign: Campaign, rows: Sequence[Row]) -> str:
+    """Return what was run and what it cost: seeds, budget, versions, machine, time."""
+    standing = campaign.standings()
+    done = [label for label, entry in standing.items() if entry.state == "finished"]
+    about = [Run(campaign.places.run(label)).provenance for label in done]
+    each = {key: sorted({str(one[key]) for one in about}) for key in SPREAD}
+    worlds = sorted({one["world"]["name"] for one in about})
+    seeds = sorted({int(row["seed"]) for row in rows})
+    spent = [int(row["evaluations"]) for row in rows]
+    lines = [
+        ["runs finished, of those planned", f"{len(done)} of {len(standing)}"],
+        ["seeds", ", ".join(map(str, seeds))],
+        ["team evaluations of a run", f"{min(spent):,} to {max(spent):,}"],
+        ["team-steps", f"{sum(row['team_steps'] for row in rows) / 1e9:.2f} x 10^9"],
+        ["core seconds, tests and studies too", f"{sum(row['core_seconds'] for row in rows):,.0f}"],
+        ["worlds", ", ".join(worlds)],
+        *([key, ", ".join(values)] for key, values in each.items()),
+    ]
+    return table(["", ""], lines)
+
+
+def write_page(rows: list[Row], page: Path) -> None:
+    """Write figure and tables of the rows of runs."""
+    cells = cells_of(rows)
+    for name, make in PAGE_PARTS.items():
+        put(make(cells), page, name)
+    page.with_suffix(".png").write_bytes(draw(cells))
+
+
+def show(cells: Any) -> None:
+    """Print every table."""
+    for name, make in PAGE_PARTS.items():
+        print(f"{name}\n\n{make(cells)}")
+
+
+def rows_and_cost(name: str) -> tuple[list[Row], str]:
+    """Return the rows of a campaign's runs, and what they cost.
+
+    Raises:
+        UsageError: there is no such campaign, or none of its runs tells anything.
+    """
+    campaign = find_campaign(name)
+    planned: Mapping[str, PlannedRun] = campaign.planned
+    with sealed(campaign) as folder, Tables(folder) as tables:
+        rows = rows_of(tables, list(planned.values()))
+    if not rows:
+        raise UsageError(f"{campaign.path} has no finished run of {INDIVIDUAL} or {CLONES}")
+    return rows, made_with(campaign, rows)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Make the map."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("campaign", nargs="?", help="directory, or name in campaigns/")
+    parser.add_argument("--write", type=Path, help="page whose tables are replaced")
+    parser.add_argument("--again", action="store_true", help="from the CSV file, not a campaign")
+    args = parser.parse_args(arguments)
+    page: Path | None = args.write
+    if page and not page.is_file():
+        parser.error(f"--write {page}: there is no such page")
+    if args.again != (args.campaign is None):
+        parser.error("name a CAMPAIGN, or --again with the page whose CSV file is to be read")
+    numbers = page and page.with_suffix(".csv")
+    if args.again:
+        if not (page and numbers and numbers.is_file()):
+            parser.error("--again needs --write PAGE with a CSV file next to it")
+        rows = read(numbers)
+    else:
+        try:
+            rows, cost = rows_and_cost(args.campaign)
+        except ConevoError as error:
+            parser.error(str(error))
+        print(cost)
+        if page and numbers:
+            put(cost, page, "cost")
+            write(rows, numbers)
+            rows = read(numbers)  # rounded as whoever makes them again finds them
+    if page:
+        write_page(rows, page)
+    show(cells_of(rows))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,195 @@
+"""The regime map in tables: what every cell shows, castes, and how well the rule predicts it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from conevo.analysis.statistics import compare
+from pages import table
+from regime_cells import CLONES, INDIVIDUAL, REGIONS, Cell, Judged, apart, judge, of_region, used
+
+__all__ = ["PAGE_PARTS", "judged", "regime_words"]
+
+KEYS = ["ranges", "accuracies", "segregation"]
+
+
+def key(cell: Cell) -> list[str]:
+    """Return the first columns of a cell's row."""
+    return [cell.ranges, cell.accuracies, f"{cell.regime.segregation:g}"]
+
+
+def regime_words(cell: Cell) -> str:
+    """Return a cell in words."""
+    return f"{cell.ranges} ranges, {cell.accuracies} accuracies, {cell.regime.segregation:g}"
+
+
+def number(value: float | None, form: str = ".2f") -> str:
+    """Return a number, or a dash where there is none."""
+    return "–" if value is None or math.isnan(value) else f"{value:{form}}".replace("-", "−")
+
+
+def interval(low: float | None, high: float | None, form: str) -> str:
+    """Return an interval, or a dash where there is none."""
+    return "–" if low is None else f"{number(low, form)} to {number(high, form)}"
+
+
+def percent(share: float | None) -> str:
+    """Return a share in percent, with its sign."""
+    return "–" if share is None else f"{number(100 * share, '+.1f')} %"
+
+
+def values(cells: Sequence[Cell]) -> str:
+    """Return the value of both methods in each cell, and their difference."""
+    head = [*KEYS, "n of both", "HomES (sd)", "CONE-ES (sd)", "difference", "95 % interval"]
+    head += ["of the clones'", "interval of it", "p, Holm", "decided"]
+    lines = []
+    for cell in cells:
+        of = cell.value
+        bold = "**" if cell.is_clear else ""
+        line = [*key(cell), f"{of.n_b}, {of.n_a}"]
+        for mean, sd in ((of.mean_b, of.sd_b), (of.mean_a, of.sd_a)):
+            line.append(f"{number(mean, '.0f')} ({number(sd, '.0f')})")
+        line.append(f"{bold}{number(of.difference, '+.0f')}{bold}")
+        line.append(interval(of.low, of.high, "+.0f"))
+        line.append(percent(cell.share(of.difference)))
+        low, high = cell.share(of.low), cell.share(of.high)
+        line.append("–" if low is None else f"{percent(low)} to {percent(high)}")
+        line += [number(cell.p, ".3f"), cell.verdict]
+        lines.append(line)
+    clear = [cell.value.difference or 0 for cell in cells if cell.is_clear]
+    above, n = sum(one > 0 for one in clear), sum(cell.value.low is not None for cell in cells)
+    return (
+        table(head, lines)
+        + f"\n{len(cells)} cells, {n} with an interval; it excludes 0 in {len(clear)}: CONE-ES is "
+        f"above HomES in {above}, below in {len(clear) - above}. If nothing differed anywhere, "
+        f"about {n / 20:.1f} would.\n"
+    )
+
+
+def castes(cells: Sequence[Cell]) -> str:
+    """Return what S cannot see, next to S: settings, regions, and places."""
+    head = [*KEYS, "favourite's share: HomES", "CONE-ES", "difference (95 %)"]
+    head += ["between regions: HomES", "CONE-ES", "in place: HomES", "CONE-ES", "S: HomES"]
+    head += ["CONE-ES"]
+    lines = []
+    for cell in cells:
+        line = key(cell)
+        both = [cell.each(method, "favourite share") for method in (CLONES, INDIVIDUAL)]
+        more = compare(both[1], both[0])
+        line += [number(float(np.mean(one)) if one else None) for one in both]
+        around = interval(more.low, more.high, "+.2f")
+        line.append(f"{number(more.difference, '+.2f')} ({around})")
+        for what in (apart, "in place", "S"):
+            line += [number(cell.mean(method, what)) for method in (CLONES, INDIVIDUAL)]
+        lines.append(line)
+    return table(head, lines)
+
+
+def settings(cells: Sequence[Cell]) -> str:
+    """Return with which settings the robots of each region work: low / med / hi in percent."""
+    head = [*KEYS, "method", *(f"region {region}" for region in REGIONS)]
+    lines = []
+    for cell in cells:
+        for method, title in ((CLONES, "HomES"), (INDIVIDUAL, "CONE-ES")):
+            runs = [row for row in cell.runs[method] if used("A", "low") in row]
+            if runs:
+                shares = [
+                    np.nanmean([of_region(row, region) for row in runs], axis=0)
+                    for region in REGIONS
+                ]
+                texts = [" / ".join(f"{100 * part:.0f}" for part in one) for one in shares]
+                lines.append([*key(cell), title, *texts])
+    return table(head, lines)
+
+
+# --- the rule -------------------------------------------------------------------------------------
+
+
+def judged(cells: Sequence[Cell]) -> list[Judged]:
+    """Return the rule, with the threshold that was found and with 1, and what it must beat."""
+    return [
+        judge(cells, "the rule", lambda cell: cell.incentive),
+        judge(cells, "the rule, threshold 1", lambda cell: cell.incentive, at=1.0),
+        judge(cells, "segregation alone", lambda cell: cell.regime.segregation, near=0.5),
+        judge(cells, "the same sign everywhere", lambda cell: 1.0),
+    ]
+
+
+def rule(cells: Sequence[Cell]) -> str:
+    """Return how many cells have the predicted sign, of those for finding and for testing."""
+    head = [
+        "predicted by",
+        "threshold",
+        "right, of those for finding",
+        "right, of those for testing",
+    ]
+    head += ["for testing, interval excludes 0: right", "wrong"]
+    lines = [
+        [
+            one.name,
+            limit_words(one.threshold),
+            "{} of {}".format(*one.found),
+            "{} of {}".format(*one.tested),
+            listed(one.right),
+            listed(one.wrong),
+        ]
+        for one in judged(cells)
+    ]
+    return table(head, lines) + f"\n{likeness(cells)}\n"
+
+
+def limit_words(threshold: float) -> str:
+    """Return a threshold in words where it is below or above everything."""
+    return {math.inf: "above all", -math.inf: "below all"}.get(threshold, f"{threshold:.2f}")
+
+
+def listed(cells: Sequence[Cell]) -> str:
+    """Return cells in words, and how many."""
+    return f"{len(cells)}: " + "; ".join(map(regime_words, cells)) if cells else "none"
+
+
+def likeness(cells: Sequence[Cell]) -> str:
+    """Return the rank correlation of the rule's ratio and the difference's share."""
+    from scipy.stats import spearmanr
+
+    shares = [(cell.incentive, cell.share(cell.value.difference)) for cell in cells]
+    known = [(ratio, share) for ratio, share in shares if share is not None]
+    if len(known) < 3:
+        return "Too few cells for a rank correlation."
+    rank = float(spearmanr(*zip(*known, strict=True)).statistic)
+    return (
+        "Spearman's rank correlation of the rule's ratio and the difference as a share of the "
+        f"clones' value, over {len(known)} cells: {number(rank, '+.2f')}."
+    )
+
+
+def predicted(cells: Sequence[Cell]) -> str:
+    """Return what the rule says about each cell, and what was seen."""
+    limit = judged(cells)[0].threshold
+    head = [*KEYS, "for", "castes / switchers by the rule", "predicted", "seen", "as predicted"]
+    lines = []
+    for cell in cells:
+        of = cell.value.difference
+        says, seen = cell.incentive > limit, None if of is None else of > 0
+        line = [*key(cell), "finding" if cell.is_for_finding else "testing"]
+        line += [f"{cell.incentive:.2f}", better(says), "–" if seen is None else better(seen)]
+        line[-1] += " (clear)" if cell.is_clear else ""
+        lines.append([*line, "–" if seen is None else "yes" if says == seen else "no"])
+    return table(head, lines)
+
+
+def better(is_individual: bool) -> str:
+    """Return who is better."""
+    return "CONE-ES" if is_individual else "HomES"
+
+
+PAGE_PARTS: dict[str, Callable[[Sequence[Cell]], str]] = {
+    "values": values,
+    "rule": rule,
+    "predicted": predicted,
+    "castes": castes,
+    "settings": settings,
+}
