@@ -254,3 +254,53 @@ def test_places_that_are_taken_are_refused_with_what_can_be_done(say, tmp_path: 
     said = say(*shape("--out", "file/here"))
     assert said.code == 3
     assert "cannot write file/here: " in said.err
+
+
+def first(*more: str) -> list[str]:
+    settings = {key: value for key, value in TINY.items() if key != "method.genotypes"}
+    return ["run", "rover/complex-1", "--method", "ccga", *sets(settings), *more]
+
+
+def test_clones_first_is_one_command(say, tmp_path: Path) -> None:
+    said = say(*first("--first", "homcne", "--dry-run"))
+    assert (said.code, list(tmp_path.iterdir())) == (0, [])
+    assert "complex-1-homcne-to-ccga-smoke-s1-" in said.out
+    assert "HomCNE, preset smoke, seed 1: 61 team evaluations in the first generation" in said.out
+    said = say(*first("--first", "homcne", "--set", "first_share=0.4", "--threads", "1"))
+    assert (said.code, said.err) == (0, "")
+    assert "stage 1 of 2: rover-v2/complex-1, HomCNE, preset smoke" in said.out
+    assert "rover-v2/complex-1, CCGA, preset smoke, seed 1, begun by HomCNE" in said.out
+    (path,) = (tmp_path / "runs").iterdir()
+    rows = [line.split() for line in said.out.splitlines() if re.match(r" +\d  rover", line)]
+    assert [row[:7] for row in rows] == [
+        ["1", "rover-v2/complex-1", "HomCNE", "finished", "2", "of", "2"],
+        ["2", "rover-v2/complex-1", "CCGA", "finished", "3", "of", "3"],
+    ]
+    (row,) = json.loads(say("list", "runs", "--json").out)
+    assert (row["world"], row["method"]) == ("rover-v2/complex-1", "ccga")
+    assert say("test", str(path), "--stages", "--scenarios", "1").code == 0
+    for line in re.findall(r"^  (conevo .*)$", said.out, flags=re.MULTILINE):
+        again = say(*shlex.split(line)[1:])
+        assert again.code == 0, again.err
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["--first", "homcnee"], "first on the command line: unknown method 'homcnee'; did you"),
+        (["--first", "ccga"], "first = 'ccga' on the command line: ccga evolves the second"),
+        (["--first", "homcne", "--shape"], "--first starts one run of two stages: leave out"),
+        (["--first", "homcne", "--seeds", "2"], "--first starts one run of two stages: leave out"),
+        (["--first", "homcne", "--from", "x"], "--first starts one run of two stages: leave out"),
+        (["--first", "homcne", "--config", "x"], "--first and --config are mutually exclusive"),
+        (["--first", "homcne", "--set", "first_share=2"], "first_share = 2 on the command line"),
+        (["--first", "homcne", "--budget-evaluations", "60"],
+         "stage 1 (homcne): run.budget_evaluations = 30 does not pay for one generation"),
+    ],
+)  # fmt: skip
+def test_what_cannot_come_first_is_one_line(say, words: list[str], says: str) -> None:
+    said = say(*first(*words))
+    assert (said.code, said.out) == (2, "")
+    assert said.err.startswith(f"conevo: error: {says}")
+    assert said.err.count("\n") == 1
+    assert not Path("runs").exists()

@@ -137,7 +137,10 @@ SCHEMA: dict[str, dict[str, str]] = {
 }
 """Columns of each table and their DuckDB types, as written to and read from NAME.parquet.
 
-``runs``: title is the method's name as published; planned_evaluations is the budget of team
+``runs``: one row for each run or stage of a shaping. Two stages of one task, of which another
+method evolves the first, are one run: generations, evaluations and team_steps are counted through
+both, here and in ``generations``; method and champion are the second's, generation 0 is the
+first's. title is the method's name as published; planned_evaluations is the budget of team
 evaluations that a run was given, NULL without one; evaluations is what it spent; exchanges is the
 number of pairs of sub-populations that recombined between populations, in the mean of the
 generations, exchange_share that of the pairs that could have; both are NULL for methods that never

@@ -178,7 +178,7 @@ class Campaign:
     def _is_shorter(self, label: str) -> bool:
         """Whether a sealed run has another length than the plan, which was extended meanwhile."""
         planned, path = self.planned[label], self.places.run(label)
-        if planned.shape or not (path / "DONE").is_file():
+        if planned.in_stages or not (path / "DONE").is_file():
             return False
         return read_json(path / "provenance.json").get("run_id") != planned.run_ids[0]
 

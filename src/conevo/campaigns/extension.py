@@ -73,7 +73,7 @@ def check_plan(campaign: Campaign, runs: Mapping[str, PlannedRun]) -> None:
             cells[key] = _why_not(planned.configs(), runs[label].configs())
         if why := cells[key]:
             raise UsageError(f"{campaign.path} holds another campaign: run {label} {why}; {advice}")
-        if planned.shape and campaign.places.run(label).exists():
+        if planned.in_stages and campaign.places.run(label).exists():
             raise UsageError(
                 f"{campaign.path}: {label} is a shaping that has begun, and stages keep their "
                 f"length; {advice}"
@@ -98,7 +98,7 @@ def settle(places: Places) -> None:
 
 def _cell(planned: PlannedRun) -> list[object]:
     """Return all of a run but its seed."""
-    return [planned.tasks, planned.method, planned.preset, planned.overrides]
+    return [planned.tasks, planned.method, planned.preset, planned.overrides, planned.of_first]
 
 
 def _why_not(old: list[RunConfig], new: list[RunConfig]) -> str:

@@ -21,9 +21,10 @@ import tomli_w
 from conevo.campaigns.inputs import located, shown_as
 from conevo.errors import UsageError, unknown_name
 from conevo.evolution.inheritance import refuse_idle
-from conevo.evolution.methods.registry import MethodEntry
+from conevo.evolution.methods.registry import MethodEntry, name_in
 from conevo.evolution.methods.registry import resolve as resolve_method
-from conevo.runs.config import IN_FILES, PRESETS, RunConfig, resolve
+from conevo.runs.config import IN_FILES, PRESETS, RunConfig
+from conevo.runs.first import FIRST, SHARE, resolve_stages, take_first, without_method
 from conevo.runs.shaping import tasks_up_to
 from conevo.worlds.registry import WorldEntry
 from conevo.worlds.registry import resolve as resolve_world
@@ -44,10 +45,11 @@ class PlannedRun:
         method: address of the method.
         preset, seed: as for any run.
         variant: levels of all factors but world and method, "gst=0.1"; empty if there are none.
-        overrides: settings over those of the preset.
+        overrides: settings over those of the preset, ``first`` and ``first_share`` among them.
         shape: whether the environments before this one are learned first.
         studies: what is made of it when it is finished.
         run_ids: of the run, or of every stage.
+        of_first: settings of the first stage, if another method evolves it (``runs.first``).
     """
 
     label: str
@@ -60,24 +62,42 @@ class PlannedRun:
     shape: bool
     studies: tuple[str, ...]
     run_ids: tuple[str, ...]
+    of_first: dict[str, Any] = field(default_factory=dict)
 
     @property
     def values(self) -> list[Any]:
         """Its world, its method and its settings."""
-        return [self.world, self.method, *self.overrides.values()]
+        return [self.world, self.method, *self.overrides.values(), *self.of_first.values()]
 
     def mapped(self, change: Callable[[Any], Any]) -> PlannedRun:
         """Return the run with its world, its method and its settings changed."""
-        overrides = {key: change(value) for key, value in self.overrides.items()}
+        overrides, of_first = (
+            {key: change(value) for key, value in settings.items()}
+            for settings in (self.overrides, self.of_first)
+        )
         names = {"world": change(self.world), "method": change(self.method)}
-        return dataclasses.replace(self, **names, overrides=overrides)
+        return dataclasses.replace(self, **names, overrides=overrides, of_first=of_first)
+
+    @property
+    def in_stages(self) -> bool:
+        """Whether its directory is that of a shaping, with a run for every stage."""
+        return len(self.run_ids) > 1
+
+    @property
+    def courses(self) -> dict[str, list[str]]:
+        """What tables call the run, or every stage, each with its directories in order.
+
+        Two stages of one task, of which another method evolves the first, are one run there.
+        """
+        if not self.in_stages:
+            return {self.label: [self.label]}
+        stages = [f"{self.label}/stage-{k}" for k in range(1, len(self.run_ids) + 1)]
+        return {stage: [stage] for stage in stages} if self.shape else {self.label: stages}
 
     @property
     def names(self) -> list[str]:
         """What tables call the run, or every stage."""
-        if not self.shape:
-            return [self.label]
-        return [f"{self.label}/stage-{k}" for k in range(1, len(self.run_ids) + 1)]
+        return list(self.courses)
 
     @property
     def tasks(self) -> list[str]:
@@ -91,17 +111,15 @@ class PlannedRun:
             UsageError: they are not what they were when the plan was written out.
         """
         place = "in the campaign's plan"
-        found = [
-            resolve(
-                task,
-                self.method,
-                self.preset,
-                self.seed,
-                overrides=self.overrides,
-                place=place,
-            )
-            for task in self.tasks
-        ]
+        found = resolve_stages(
+            self.tasks,
+            self.method,
+            self.preset,
+            self.seed,
+            self.overrides,
+            self.of_first,
+            place,
+        )
         if tuple(config.run_id for config in found) != self.run_ids:
             raise UsageError(
                 f"{self.label} was planned with other defaults or presets than this version's; "
@@ -244,20 +262,28 @@ class Plan:
         world, method = levels["world"], levels["method"]
         further = {k: v for k, v in levels.items() if k not in ("world", "method")}
         names = {"world": world, "method": method, "preset": self.preset}
-        overrides, shape = dict(self.settings), self.shape
+        shape = self.shape
         for one in self.where:
-            if one.holds(names):
-                overrides |= one.settings
-                shape = shape if one.shape is None else one.shape
-        for factor, level in further.items():
-            overrides |= self.levels[factor][level] if factor in self.levels else {factor: level}
-        if seed := {"seed", "run.seed"} & set(overrides):
+            shape = one.shape if one.shape is not None and one.holds(names) else shape
+        overrides = self._settings_of(names, further)
+        own, first = take_first(overrides, self.place)
+        of_first: dict[str, Any] = {}
+        if first is not None:
+            others = names | {"method": first.method}
+            found = self._settings_of(others, further, resolve_method(method).config_class)
+            of_first, _ = take_first(found, self.place)
+        elif SHARE in further:
+            raise UsageError(
+                f"factor {SHARE} {self.place}: it does nothing in runs without {FIRST}"
+            )
+        if seed := {"seed", "run.seed"} & {*own, *of_first}:
             raise UsageError(f"{seed.pop()} {self.place}: a campaign's seeds are campaign.seeds")
         tasks = tasks_up_to(world) if shape else [world]
-        configs = [
-            resolve(t, method, self.preset, overrides=overrides, place=self.place) for t in tasks
-        ]
-        refuse_idle(configs[-1].method_config, self.place)
+        configs = resolve_stages(tasks, method, self.preset, None, overrides, of_first, self.place)
+        if first is None:
+            refuse_idle(configs[-1].method_config, self.place)
+        elif FIRST not in further:
+            further = {FIRST: name_in(first.method), **further}
         variant = ", ".join(f"{k.rpartition('.')[2]}={shown_as(v)}" for k, v in further.items())
         address = configs[-1].address
         return [
@@ -272,9 +298,32 @@ class Plan:
                 shape=shape,
                 studies=self.studies,
                 run_ids=tuple(_with_seed(config, seed).run_id for config in configs),
+                of_first=of_first,
             )
             for seed in self.seeds
         ]
+
+    def _settings_of(
+        self,
+        names: Mapping[str, str],
+        further: Mapping[str, Any],
+        other: type[Any] | None = None,
+    ) -> dict[str, Any]:
+        """Return the settings of runs with these names and these levels of further factors.
+
+        Args:
+            names: world, method and preset.
+            further: factor -> level.
+            other: parameters of the method that levels are of, if it is not the one that is named:
+                what they set of it is left out.
+        """
+        found = dict(self.settings)
+        for one in self.where:
+            found |= one.settings if one.holds(names) else {}
+        for factor, level in further.items():
+            settings = self.levels[factor][level] if factor in self.levels else {factor: level}
+            found |= settings if other is None else without_method(settings, other)
+        return found
 
     @property
     def values(self) -> list[Any]:

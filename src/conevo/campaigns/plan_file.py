@@ -29,6 +29,10 @@ run with every seed::
     method = ["cone"]
     factors = { "method.gst" = [0.1, 0.2], ranges = ["small", "large"] }
 
+    [[where]]                      # two stages of one task, the first of another method; they share
+    method = ["ccga"]              # the run's budget: half each, unless first_share says otherwise
+    factors = { first = ["none", "homcne"] }   # as every factor, it may also be a setting
+
     [levels.ranges]                # a factor whose levels are several settings
     small = { "world.low_range" = 0.07, "world.hi_range" = 0.03 }
     large = { "world.low_range" = 0.2, "world.hi_range" = 0.1 }
@@ -37,7 +41,7 @@ run with every seed::
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -48,6 +52,7 @@ from conevo.errors import UsageError, shown, unknown_name
 from conevo.evolution.methods.registry import METHODS
 from conevo.reading import parse_toml, read_toml
 from conevo.runs.config import PRESETS
+from conevo.runs.first import FIRST
 from conevo.worlds.registry import resolve as resolve_world
 
 __all__ = ["STUDIES", "preset_names", "read_plan", "read_preset"]
@@ -116,7 +121,8 @@ def _parse(tables: Mapping[str, Any], place: str, name: str) -> Plan:
         raise UsageError(f"where {place} must be written [[where]]")
     every_run = {"world": [], "method": []} | _table(tables, "factors", place)
     factors = _factors(every_run, "factors", place)
-    where = tuple(_where(one, factors, place) for one in wheres)
+    firsts = _firsts(tables)
+    where = tuple(_where(one, factors, firsts, place) for one in wheres)
     return Plan(
         name=_name(head.get("name", name), place),
         title=_text(head.get("title", ""), "campaign.title", place),
@@ -235,8 +241,24 @@ def _expand(names: Iterable[str]) -> list[str]:
     return found
 
 
-def _where(table: Any, of_all: Mapping[str, Any], place: str) -> Where:
-    """Return one [[where]]; ``of_all`` are the factors of all runs, which it may not repeat."""
+def _firsts(value: Any, key: str = "") -> list[str]:
+    """Return every value of the setting ``first``, and level of a factor, anywhere in a plan."""
+    if isinstance(value, dict):
+        return [one for name, part in value.items() for one in _firsts(part, name)]
+    if isinstance(value, list):
+        return [one for part in value for one in _firsts(part, key)]
+    return [value] if key == FIRST and isinstance(value, str) else []
+
+
+def _where(table: Any, of_all: Mapping[str, Any], firsts: Sequence[str], place: str) -> Where:
+    """Return one [[where]].
+
+    Args:
+        table: as it is written.
+        of_all: the factors of all runs, which it may not repeat.
+        firsts: methods of first stages, which conditions may name as well.
+        place: where it is, for messages.
+    """
     if not isinstance(table, dict):
         raise UsageError(f"where {place} must be written [[where]]")
     conditions: dict[str, tuple[str, ...]] = {}
@@ -256,7 +278,8 @@ def _where(table: Any, of_all: Mapping[str, Any], place: str) -> Where:
             resolve_world(name)  # a condition on a world that does not exist never holds
     for key in ("world", "method"):
         names = conditions.get(key)
-        if names is not None and not any(n in of_all[key] or ".py" in n for n in names):
+        planned = [*of_all[key], *(firsts if key == "method" else ())]
+        if names is not None and not any(n in planned or ".py" in n for n in names):
             raise UsageError(
                 f"where.{key} = {shown(list(names))} {place} matches no run: factors.{key} is "
                 f"{', '.join(of_all[key])}"

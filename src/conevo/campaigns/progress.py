@@ -64,10 +64,10 @@ def last_written(places: Places, label: str) -> float | None:
 
 def progress_of(places: Places, planned: PlannedRun) -> Progress:
     """Return how far a run is; what is missing or damaged counts as not done."""
-    lengths = _lengths(places.run(planned.label), planned.shape)
+    lengths = _lengths(places.run(planned.label), planned.in_stages)
     done, spent, share = 0, 0, 0.0
     written: list[float] = []
-    names = planned.names
+    names = [part for parts in planned.courses.values() for part in parts]
     for k, name in enumerate(names):
         generations, evaluations, at = _last_generation(places.run(name) / GENERATIONS)
         if at is None:
@@ -89,11 +89,11 @@ def progress_of(places: Places, planned: PlannedRun) -> Progress:
     )
 
 
-def _lengths(path: Path, shape: bool) -> list[tuple[int, int]]:
+def _lengths(path: Path, in_stages: bool) -> list[tuple[int, int]]:
     """Return the generations and the budget of a run, or of each stage; none if unreadable."""
     try:
-        tables = read_toml(path / (SHAPING if shape else CONFIG))
-        runs = [stage["run"] for stage in (tables["stages"] if shape else [tables])]
+        tables = read_toml(path / (SHAPING if in_stages else CONFIG))
+        runs = [stage["run"] for stage in (tables["stages"] if in_stages else [tables])]
         found = [(int(run["generations"]), int(run["budget_evaluations"])) for run in runs]
     except (ConevoError, KeyError, TypeError, ValueError):
         return []

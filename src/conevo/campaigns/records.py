@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, NotRequired
 
 from annotated_types import Ge, Le, MinLen
 from pydantic import StringConstraints
@@ -28,3 +28,6 @@ class PlannedLine(TypedDict):
     shape: bool
     studies: list[str]
     run_ids: Annotated[list[RunId], MinLen(1)]
+    of_first: NotRequired[
+        dict[str, bool | int | float | str]
+    ]  # conevo 0.2.0.dev0 had none at first

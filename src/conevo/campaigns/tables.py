@@ -125,26 +125,26 @@ def _last_cost(places: Places, label: str) -> float:
 
 def _rows(places: Places, planned: PlannedRun, cost: float) -> Iterator[tuple[str, Row]]:
     """Yield every row that a finished run has in any table."""
-    names = planned.names
-    for name in names:
-        path = places.run(name)
-        run = Run(path)
-        provenance, records, test = run.provenance, run.generations(), run.test_result
-        if test is None or not records:
-            raise DamagedFile(f"{path} is sealed, but lacks its generations or its testing phase")
-        Store(path).refuse_changed()
+    for name, parts in planned.courses.items():
+        runs = [Run(places.run(part)) for part in parts]
+        tests = [_tested(run) for run in runs]
+        run, provenance = runs[-1], runs[-1].provenance
+        records, sessions, before = _joined(runs)
+        test = tests[-1] | {"generation_0": tests[0]["generation_0"]}
         world = provenance.get("world") or describe_world(run.config.build_world())  # 0.1.0: none
         measures = world["measures"]
-        exchanges, share = exchanged(records)
+        exchanges, share = exchanged(run.generations())
+        budgets = [one.outline.budget_evaluations for one in runs]
         yield (
             "runs",
-            _run_row(planned, run.outline, world["name"], provenance, records)
+            _run_row(planned, run.outline, world["name"], provenance, records, sessions)
             | {
                 "run": name,
+                "planned_evaluations": sum(budgets) if all(budgets) else None,
                 "measure": measures[0]["name"],
                 "optimum": world["optimum"],
                 "n_robots": world["n_robots"],
-                "core_seconds": cost / len(names),
+                "core_seconds": cost / len(planned.courses),
                 "exchanges": exchanges,
                 "exchange_share": share,
             },
@@ -158,7 +158,7 @@ def _rows(places: Places, planned: PlannedRun, cost: float) -> Iterator[tuple[st
                 for scenario, value in enumerate(values["values"]):
                     yield "scores", about | {"scenario": scenario, "value": value}
         for row in shrinkage(test) if "validation" in test else ():
-            yield "champions", _champion_row(name, test["validation"], row)
+            yield "champions", _champion_row(name, test["validation"], row, before)
         for record in records:
             yield from _generation_rows(name, record)
         if places.study(name).is_file():
@@ -168,12 +168,45 @@ def _rows(places: Places, planned: PlannedRun, cost: float) -> Iterator[tuple[st
                 yield "signal", {"run": name} | {k: row[k] for k in SCHEMA["signal"] if k in row}
 
 
+def _tested(run: Run) -> Row:
+    """Return the testing phase of a run, after checking that it is as it was sealed."""
+    test = run.test_result
+    if test is None or not run.generations():
+        raise DamagedFile(f"{run.path} is sealed, but lacks its generations or its testing phase")
+    Store(run.path).refuse_changed()
+    return test
+
+
+def _joined(runs: Sequence[Run]) -> tuple[list[Row], list[Row], int]:
+    """Return the generations and sessions of a run, or of its stages as those of one run.
+
+    Generations, team evaluations and team-steps are counted through the stages.
+
+    Returns:
+        Both, and the number of generations before the last stage.
+    """
+    records: list[Row] = []
+    sessions: list[Row] = []
+    before = 0
+    for run in runs:
+        before, last = len(records), records[-1] if records else {}
+        sessions += map(dict, sessions_of(run.provenance, before))
+        for record in run.generations():
+            summed = {k: record[k] + last.get(k, 0) for k in ("team_evaluations", "team_steps")}
+            records.append(record | summed | {"generation": before + record["generation"]})
+    return records, sessions, before
+
+
 def _run_row(
-    planned: PlannedRun, run: Outline, world: str, provenance: Row, records: Sequence[Row]
+    planned: PlannedRun,
+    run: Outline,
+    world: str,
+    provenance: Row,
+    records: Sequence[Row],
+    sessions: Sequence[Row],
 ) -> Row:
     environment = run.environment
     family, _, number = environment.rpartition("-")
-    sessions = sessions_of(provenance)
     is_numbered = bool(family) and number.isdecimal()
     return {
         "task": f"{world}/{environment}",
@@ -187,7 +220,6 @@ def _run_row(
         "seed": run.seed,
         "variant": planned.variant,
         "generations": len(records),
-        "planned_evaluations": run.budget_evaluations or None,
         "evaluations": records[-1]["team_evaluations"],
         "team_steps": records[-1]["team_steps"],
         "seconds": sum(record["seconds"] for record in records),
@@ -226,9 +258,9 @@ def _generation_rows(name: str, record: Row) -> Iterator[tuple[str, Row]]:
         yield "castes", about | {"caste": caste, "robots": robots}
 
 
-def _champion_row(name: str, validation: Row, row: Row) -> Row:
+def _champion_row(name: str, validation: Row, row: Row, before: int) -> Row:
     means = {key: row[key]["mean"] for key in ("validation", "test")}
-    about = {"run": name, "generation": validation["chosen"]}
+    about = {"run": name, "generation": before + validation["chosen"]}
     return about | {"finalists": len(validation["finalists"])} | row | means
 
 

@@ -33,7 +33,7 @@ from conevo.reading import read_json_lines
 from conevo.runs.directory import as_json, kind_of
 from conevo.runs.durable import replace_file
 from conevo.runs.run import Run, start
-from conevo.runs.shaping import Shaping, start_shaping
+from conevo.runs.shaping import Shaping, start_stages
 from conevo.runs.time_limit import TimeLimit
 
 __all__ = ["carry_out", "core_seconds", "main", "planned_runs"]
@@ -54,7 +54,7 @@ def planned_runs(root: Path) -> dict[str, PlannedRun]:
     """
     path = Places(root).runs
     runs = [
-        PlannedRun(**{key: _frozen(line[key]) for key in PlannedLine.__annotations__})
+        PlannedRun(**{k: _frozen(line[k]) for k in PlannedLine.__annotations__ if k in line})
         for line in read_json_lines(path, PlannedLine)
     ]
     if not runs:
@@ -144,21 +144,11 @@ def _evolve(
     else:
         configs = planned.configs()
         command = f"conevo campaign start, run {planned.label}"
-        if planned.shape:
-            found = start_shaping(
-                planned.tasks,
-                planned.method,
-                planned.preset,
-                planned.seed,
-                path,
-                planned.overrides,
-                threads=threads,
-                device=device or CPU,
-                command=command,
-            )
+        how: dict[str, Any] = {"threads": threads, "device": device or CPU, "command": command}
+        if planned.in_stages:
+            found = start_stages(configs, path, **how)
         else:
-            on = device or CPU
-            found = start(configs[0], path, threads=threads, device=on, command=command)
+            found = start(configs[0], path, **how)
     longer = None if found.run_ids == planned.run_ids else planned.configs()[0]
     if longer and (isinstance(found, Shaping) or found.provenance.get("stem_id") != longer.stem_id):
         raise UsageError(f"{path} is not the run that was planned; move it away and retry")
@@ -167,7 +157,7 @@ def _evolve(
         time.sleep(0.2)
     if found.status == "running":
         raise _InUse
-    how: dict[str, Any] = {"threads": threads, "device": device, "accept_other_code": True}
+    how = {"threads": threads, "device": device, "accept_other_code": True}
     if longer and isinstance(found, Run):
         for kind in STUDIES:  # of a team, and of populations, that may not stay
             places.study(planned.label, kind).unlink(missing_ok=True)
@@ -178,12 +168,15 @@ def _evolve(
 
 
 def _study(places: Places, planned: PlannedRun, found: Run | Shaping, threads: int) -> None:
-    """Make the studies of a run, or of every stage, that were not made yet."""
+    """Make the studies of a run, or of every stage, that were not made yet.
+
+    Of a run whose first stage another method evolves, they are those of the second.
+    """
     from conevo.analysis.signal import signal_study
     from conevo.analysis.studies import study
 
     make: dict[str, Callable[..., Any]] = {"teams": study, "signal": signal_study}
-    runs = [found] if isinstance(found, Run) else found.stages
+    runs = [found] if isinstance(found, Run) else found.stages[-len(planned.names) :]
     for name, run in zip(planned.names, runs, strict=True):
         for kind in planned.studies:
             path = places.study(name, kind)

@@ -170,15 +170,17 @@ class Order:
         from conevo.cli.settings_text import print_dry_run
         from conevo.runs.directory import refuse_existing
         from conevo.runs.run import RUNS, beginning
-        from conevo.runs.shaping import label
+        from conevo.runs.shaping import label, stand_ins
 
         if len(configs) == 1:
             found = None if origin is None else find_last(origin)
             path, ancestor, ancestry = beginning(configs[0], self.out, found, of_champion)
+            ancestors = [ancestor]
         else:
-            path, ancestor, ancestry = Path(self.out or RUNS / label(configs)), None, {}
+            path, ancestry = Path(self.out or RUNS / label(configs)), {}
+            ancestors = [*stand_ins(configs)]
             refuse_existing(path)
-        print_dry_run(configs, path, self.as_json, ancestor, ancestry)
+        print_dry_run(configs, path, self.as_json, ancestors, ancestry)
 
     def run(self, config: RunConfig, origin: str | None = None, of_champion: bool = False) -> None:
         """Start a run and carry it on to its end.
@@ -202,21 +204,31 @@ class Order:
         )
         carry_on(begun, self.threads, self.style, self.limit)
 
-    def shape(self, tasks: Sequence[str]) -> None:
-        """Start a shaping and carry it on to its end."""
-        from conevo.runs.shaping import start_shaping
+    def resolve_both(self, world: str | None, first: str) -> list[RunConfig]:
+        """Return the configurations of a run's two stages, the first of which ``first`` evolves.
 
-        begun = start_shaping(
-            tasks,
-            self.method,
+        Settings of the method are the second stage's; ``first_share`` may be among the settings.
+        """
+        from conevo.runs.first import FIRST, SHARE, resolve_stages, without_method
+
+        if self.config is not None:
+            raise UsageError("--first and --config are mutually exclusive; use --set for settings")
+        share = self.overrides.pop(SHARE, None)
+        config = self.resolve(world)
+        return resolve_stages(
+            [config.address],
+            config.method_entry.address,
             self.preset,
             self.seed,
-            self.out,
-            self.overrides,
-            config=self.config,
-            threads=self.threads,
-            device=self.device,
-            command=self.command,
-            place=PLACE,
+            self.overrides | {FIRST: first} | ({} if share is None else {SHARE: share}),
+            without_method(self.overrides, config.method_entry.config_class),
+            PLACE,
         )
+
+    def shape(self, configs: Sequence[RunConfig]) -> None:
+        """Start a shaping and carry it on to its end."""
+        from conevo.runs.shaping import start_stages
+
+        how: dict[str, Any] = {"threads": self.threads, "device": self.device}
+        begun = start_stages(configs, self.out, command=self.command, **how)
         carry_on(begun, self.threads, self.style, self.limit)

@@ -24,6 +24,10 @@ __all__ = ["run"]
     "--shape", is_flag=True,
     help="Evolve in stages: the environments of its family from number 1 up to this one.",
 )  # fmt: skip
+@click.option(
+    "--first", metavar="NAME",
+    help="Evolve a first stage by this method; --method begins with its champion, budget shared.",
+)  # fmt: skip
 @click.option("--from", "origin", metavar="RUN", help="Start from the final populations of RUN.")
 @click.option(
     "--from-champion", "champion", metavar="RUN",
@@ -39,6 +43,7 @@ def run(
     world: str | None,
     prey: str | None,
     shape: bool,
+    first: str | None,
     origin: str | None,
     champion: str | None,
     dry_run: bool,
@@ -48,8 +53,10 @@ def run(
     """Evolve a team for WORLD/ENVIRONMENT (see: conevo list worlds) and test it.
 
     Everything is written to one directory. After Ctrl-C, continue with conevo resume. With --shape,
-    every stage is a run of its own and all settings apply to each stage. With --seeds, the runs
-    form a campaign in campaigns/; conevo campaign start continues it and conevo report reports it.
+    every stage is a run of its own and all settings apply to each stage. With --first there are
+    two, and settings of the method apply to the second (--set first_share=0.5: the first's share of
+    the budget). With --seeds, the runs form a campaign in campaigns/; conevo campaign start
+    continues it and conevo report reports it.
 
     Try: conevo run rover/complex-1 --method cone,homcne --seeds 3
     """
@@ -57,6 +64,11 @@ def run(
         raise UsageError("--from and --from-champion are mutually exclusive")
     if (origin or champion) and (shape or seeds is not None):
         raise UsageError("--from and --from-champion start one run: leave out --shape and --seeds")
+    if first is not None and (shape or origin or champion or seeds is not None):
+        raise UsageError(
+            "--first starts one run of two stages: leave out --shape, --from, --from-champion and "
+            "--seeds (a plan compares such runs: docs/campaigns.md)"
+        )
     order = Order(**options, comparing=seeds is not None)
     if prey is not None and world is not None:
         from conevo.worlds.registry import resolve
@@ -65,7 +77,8 @@ def run(
         if not hasattr(entry.params_class, "prey"):
             raise UsageError(f"--prey {prey!r}: {entry.name} has no prey to choose")
     order.take("world.prey", "--prey", prey)
-    config = order.resolve(world)
+    stages = [] if first is None else order.resolve_both(world, first)
+    config = stages[-1] if stages else order.resolve(world)
     if not dry_run and config.entry.files:
         from conevo.worlds.checking import refuse_wild_indices
 
@@ -77,11 +90,11 @@ def run(
     if shape:
         from conevo.runs.shaping import tasks_up_to
 
-        tasks = tasks_up_to(config.address)
-        if dry_run:
-            order.print_only([order.resolve(task) for task in tasks])
-        else:
-            order.shape(tasks)
+        stages = [order.resolve(task) for task in tasks_up_to(config.address)]
+    if len(stages) > 1 and dry_run:
+        order.print_only(stages)
+    elif len(stages) > 1:
+        order.shape(stages)
     elif dry_run:
         order.print_only([config], origin or champion, of_champion=champion is not None)
     else:

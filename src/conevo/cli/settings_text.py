@@ -92,7 +92,11 @@ def print_settings(rows: list[dict[str, Any]], as_json: bool) -> None:
 
 
 def print_dry_run(
-    configs: Sequence[RunConfig], path: Path, as_json: bool, ancestor: Any, ancestry: Any
+    configs: Sequence[RunConfig],
+    path: Path,
+    as_json: bool,
+    ancestors: Sequence[Any],
+    ancestry: Any,
 ) -> None:
     """Print what a run, or every stage of a shaping, would be.
 
@@ -103,10 +107,10 @@ def print_dry_run(
         configs: of the run, or of every stage.
         path: where it would be.
         as_json: whether to print JSON.
-        ancestor: what the run would begin with, None for random populations.
+        ancestors: what the run, or each stage, would begin with, None for random populations.
         ancestry: what its provenance would say of that.
     """
-    prices = [price_of(config, ancestor) for config in configs]
+    prices = [price_of(*one) for one in zip(configs, ancestors, strict=True)]
     if as_json:
         stages = [
             {"run_id": one.run_id, **dataclasses.asdict(price), "config": one.tables()}

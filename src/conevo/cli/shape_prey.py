@@ -25,4 +25,5 @@ def shape_prey(**options: Any) -> None:
     """
     from conevo.worlds.pursuit.evolved import TASKS
 
-    Order(**options).shape(TASKS)
+    order = Order(**options)
+    order.shape([order.resolve(task) for task in TASKS])

@@ -9,6 +9,7 @@ import click
 
 from conevo.cli.summary import controlled, generations_table, spaced, title
 from conevo.cli.text import castes, count, duration, number, progress, spread, table
+from conevo.evolution.methods.registry import title_of
 from conevo.runs.code import changes_text
 from conevo.runs.run import Run
 from conevo.runs.shaping import Shaping
@@ -21,6 +22,8 @@ __all__ = ["print_shaping_end", "shaping_text", "span", "stage_summary", "stages
 def span(shaping: Shaping) -> str:
     """Return the tasks of a shaping in short: "rover-v2/complex-1 to complex-3"."""
     first, last = shaping.outlines[0], shaping.outlines[-1]
+    if first.task == last.task:
+        return last.task
     return f"{first.task} to {last.environment}"
 
 
@@ -55,6 +58,7 @@ def shaping_text(shaping: Shaping, n_rows: int = 0) -> str:
     seconds = sum(record["seconds"] for record in records)
     parts = [
         title(shaping.outlines[-1]).replace(shaping.outlines[-1].task, span(shaping))
+        + _after(shaping)
         + (controlled(stages[0]) if stages else ""),
         f"{shaping.path}: {state}",
         f"{len(stages)} of {counted(len(shaping.outlines), 'stage')} begun, "
@@ -71,11 +75,18 @@ def shaping_text(shaping: Shaping, n_rows: int = 0) -> str:
     return "\n".join(parts)
 
 
+def _after(shaping: Shaping) -> str:
+    """Return what a title says of a first stage of another method, nothing if there is none."""
+    first, last = shaping.methods[0], shaping.methods[-1]
+    return f", begun by {title_of(first)}" if first != last else ""
+
+
 def stage_summary(run: Run) -> dict[str, Any]:
     """Return a stage in one object."""
     return {
         "run": str(run.path),
         "task": run.outline.task,
+        "method": run.outline.method,
         "status": run.status,
         "generations": len(run.generations()),
         "test": run.test_result,
@@ -117,6 +128,7 @@ def _table(stages: list[Run]) -> str:
     nothing: dict[str, Any] = {"performance": {}, "scenarios": 0}
     tests = [run.test_result["champion"] if run.test_result else nothing for run in stages]
     measures = list(dict.fromkeys(name for tested in tests for name in tested["performance"]))
+    is_mixed = len({run.outline.method for run in stages}) > 1
     rows = []
     for stage, (run, tested) in enumerate(zip(stages, tests, strict=True), start=1):
         records, champion, outline = run.generations(), run.champion, run.outline
@@ -125,7 +137,8 @@ def _table(stages: list[Run]) -> str:
         rows.append(
             [
                 str(stage),
-                run.outline.task,
+                outline.task,
+                *([title_of(outline.method)] if is_mixed else []),
                 run.status,
                 progress(len(records), outline.generations, spent, outline.budget_evaluations),
                 count(spent),
@@ -133,7 +146,8 @@ def _table(stages: list[Run]) -> str:
                 *("-" if s is None else spread(s, tested["scenarios"]) for s in spreads),
             ]
         )
-    head = ["stage", "task", "status", "done", "evaluations", "champion of", *measures]
+    head = ["stage", "task", *(["method"] if is_mixed else []), "status", "done", "evaluations"]
+    head += ["champion of", *measures]
     return table(head, rows)
 
 

@@ -26,7 +26,16 @@ from conevo.worlds.own_simulator import OwnSimulator
 from conevo.worlds.protocol import Scenarios, Simulator, World
 from conevo.worlds.simulators import device_for, simulator
 
-__all__ = ["Lab", "Price", "check_memory", "layout_of", "price_of", "refuse_other_state"]
+__all__ = [
+    "Lab",
+    "Price",
+    "check_memory",
+    "first_team",
+    "layout_of",
+    "price_of",
+    "refuse_other_state",
+    "refuse_unfit",
+]
 
 
 def layout_of(world: World, controller: Controller) -> Layout:
@@ -100,6 +109,26 @@ def _first(method: Method, layout: Layout, seed: int, ancestor: State | Team | N
     if problem := progress.problem(Progress.first(layout, seed)):
         raise UsageError(f"the first state of {method.title} has a progress with another {problem}")
     return state
+
+
+def first_team(config: RunConfig) -> Team:
+    """Return a team of generation 0 of a run, which no robot has played: it stands for a champion.
+
+    Raises:
+        UsageError: as ``price_of``.
+    """
+    method, layout = config.build_method(), layout_of(config.build_world(), config.controller)
+    check_memory(config, layout)
+    trials = method.ask(_first(method, layout, config.run.seed, None))
+    unknown = np.full(layout.n_robots, np.nan)
+    return Team(0, trials.networks()[0], trials.teams[0] >= 0, unknown, unknown)
+
+
+def refuse_unfit(before: RunConfig, config: RunConfig) -> None:
+    """Raise UsageError if the populations of one run cannot be bred from a team of another one."""
+    method, layout = config.build_method(), layout_of(config.build_world(), config.controller)
+    check_memory(config, layout)
+    _first(method, layout, config.run.seed, first_team(before))
 
 
 def check_memory(config: RunConfig, layout: Layout) -> None:

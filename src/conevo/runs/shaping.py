@@ -1,6 +1,7 @@
 """Shaping: a task learned in stages, each a run that begins with the last one's populations.
 
-Nitschke 2009, sections 4.3 (prey) and 6.4.2 (construction)::
+Nitschke 2009, sections 4.3 (prey) and 6.4.2 (construction). Where a stage has another method than
+the one before, its populations are bred from that one's champion (``runs.first``)::
 
     shaping.toml    the resolved configuration of every stage; never changes
     inputs/         copies of the files that it names: a world's, and its prey
@@ -39,9 +40,10 @@ from conevo.worlds.registry import product_of
 
 if TYPE_CHECKING:
     from conevo.evolution.protocol import State
+    from conevo.runs.champions import Team
     from conevo.runs.config import RunConfig
 
-__all__ = ["Shaping", "label", "start_shaping", "tasks_up_to"]
+__all__ = ["Shaping", "label", "start_shaping", "start_stages", "stand_ins", "tasks_up_to"]
 
 FORMAT = 1
 GENERATIONS = "generations.jsonl"
@@ -96,23 +98,49 @@ def start_shaping(
             not fit the next stage, or ``out`` exists; nothing was written.
         EnvironmentFailure: no such device, full disk, no permission.
     """
-    from conevo.runs.ancestry import refuse_other_controllers
     from conevo.runs.config import resolve
+
+    configs = [resolve(task, method, preset, seed, config, overrides, place) for task in tasks]
+    return start_stages(configs, out, threads=threads, device=device, command=command)
+
+
+def start_stages(
+    configs: Sequence[RunConfig],
+    out: str | Path | None = None,
+    *,
+    threads: int | None = None,
+    device: str = "cpu",
+    command: str = "conevo.runs.shaping.start_stages",
+) -> Shaping:
+    """Create the directory of a shaping whose stages have these configurations.
+
+    Args:
+        configs: of every stage, in order.
+        out, threads, device, command: as for ``start_shaping``.
+
+    Raises:
+        UsageError, EnvironmentFailure: as ``start_shaping``.
+    """
+    from conevo.runs.ancestry import refuse_other_controllers
     from conevo.runs.inputs import keep_inputs
     from conevo.runs.lab import Lab
 
-    if not tasks:
+    if not configs:
         raise UsageError("a shaping needs at least one task")
-    configs = [resolve(task, method, preset, seed, config, overrides, place) for task in tasks]
     path = Path(out) if out is not None else RUNS / label(configs)
     refuse_existing(path)
     if makes := product_of([stage.task for stage in configs]):
         makes.refuse(configs)
     state: State | None = None
     on: list[str] = []
-    for before, stage in zip([configs[0], *configs], configs, strict=False):
+    stand_in_of = stand_ins(configs)
+    for before, stage, stand_in in zip([configs[0], *configs], configs, stand_in_of, strict=False):
         lab = Lab.equip(stage, threads, device)
-        state = lab.rehearsed(lab.first_state(state))
+        try:
+            state = lab.rehearsed(lab.first_state(stand_in or state))
+        except UsageError as error:  # of two stages that share what was planned for one run
+            which = f"stage {len(on) + 1} ({stage.method}): " if any(stand_in_of) else ""
+            raise UsageError(f"{which}{error}") from error
         on.append(lab.device)
         refuse_other_controllers("a stage", before, stage)
     refuse_existing(path, is_new=True)
@@ -127,6 +155,19 @@ def start_shaping(
         }
         replace_file(draft / SHAPING, tomli_w.dumps(about).encode())
     return Shaping(path)
+
+
+def stand_ins(configs: Sequence[RunConfig]) -> list[Team | None]:
+    """Return for each stage a team in place of the champion that it will be bred from.
+
+    None for a stage that begins with the populations of the one before, or with random ones.
+    """
+    from conevo.runs.lab import first_team
+
+    return [
+        first_team(before) if before.method != stage.method else None
+        for before, stage in zip([configs[0], *configs], configs, strict=False)
+    ]
 
 
 class Shaping:
@@ -174,6 +215,11 @@ class Shaping:
     def tasks(self) -> list[str]:
         """World and environment of every stage, in order."""
         return [outline.task for outline in self.outlines]
+
+    @property
+    def methods(self) -> list[str]:
+        """The method of every stage, in order."""
+        return [outline.method for outline in self.outlines]
 
     @property
     def stages(self) -> list[Run]:
@@ -375,6 +421,7 @@ class Shaping:
             device=device_of(about, device),
             command=self._command,
             origin=begun[-1] if begun else None,
+            of_champion=bool(begun) and begun[-1].outline.method != self.methods[number - 1],
         )
 
     def _stage_path(self, number: int) -> Path:
@@ -384,9 +431,11 @@ class Shaping:
 def label(configs: Sequence[RunConfig]) -> str:
     """Return a readable, unique directory name."""
     first, last = configs[0], configs[-1]
-    tasks = f"{first.task}-to-{last.environment}".replace("/", "-")
+    to = "" if first.task == last.task else f"-to-{last.environment}"
+    methods = "-to-".join(dict.fromkeys(config.method for config in configs))
     ids = hashlib.blake2b("".join(config.run_id for config in configs).encode(), digest_size=3)
-    return f"{tasks}-{first.method}-{first.preset}-s{first.run.seed}-{ids.hexdigest()}"
+    task = f"{first.task}{to}".replace("/", "-")
+    return f"{task}-{methods}-{first.preset}-s{first.run.seed}-{ids.hexdigest()}"
 
 
 def _read(path: Path) -> dict[str, Any]:

@@ -423,7 +423,7 @@ class Subject:
 def span(tasks: Sequence[str]) -> str:
     """Return the tasks of a run or shaping in short: "rover-v2/complex-1 to complex-3"."""
     last = re.split("[/:]", tasks[-1])[-1]
-    return tasks[0] if len(tasks) == 1 else f"{tasks[0]} to {last}"
+    return tasks[0] if len(set(tasks)) == 1 else f"{tasks[0]} to {last}"
 
 
 def plain(values: npt.NDArray[np.float64]) -> list[float | None]:
