@@ -146,8 +146,19 @@ def test_the_first_mean_is_the_fittest_of_random_controllers() -> None:
     networks = trials.networks()
     assert (networks == networks[:, :1]).all()  # clones
     assert np.unique(networks[:, 0, 0, 0]).size == 60
+    values = worth(trials)[:, 0]
     state = told(learner, first, worth(trials))
-    np.testing.assert_array_equal(state.mean, networks[worth(trials)[:, 0].argmax(), 0])
+    again = learner.ask(state)  # the best fifth, in each of five rounds
+    assert (len(again.teams), again.rounds) == (60, 5)
+    best = np.argsort(-values, kind="stable")[:12]
+    tried = again.networks()[:, 0].reshape(5, 12, *networks.shape[2:])
+    np.testing.assert_array_equal(tried, np.broadcast_to(networks[best, 0], tried.shape))
+    luckier = worth(again)
+    luckier[[7, 19, 31, 43, 55]] += 100.0  # the eighth, in every round
+    luckier[3] += 400.0  # the fourth, in one of them
+    np.testing.assert_array_equal(told(learner, state, luckier).mean, networks[best[7], 0])
+    state = told(learner, state, worth(again))
+    np.testing.assert_array_equal(state.mean, networks[values.argmax(), 0])
     assert len(learner.ask(state).teams) == 1
 
 

@@ -29,10 +29,11 @@ from typing import Annotated
 import numpy as np
 from annotated_types import Ge, Gt, Le
 
-from conevo.evolution.population import random_genes
+from conevo.evolution.population import random_genes, ranking
 from conevo.evolution.protocol import (
     BoolArray,
     FloatArray,
+    IntArray,
     Layout,
     Progress,
     Scores,
@@ -66,13 +67,13 @@ class ConeEsConfig:
     individual: Annotated[float, Ge(0), Le(1)] = 0.5
     """share of the pairs in which robots have perturbations of their own, at the start; it is
     regulated. 0 switches all that is individual off."""
-    individual_least: Annotated[float, Gt(0), Le(1)] = 0.1
+    individual_least: Annotated[float, Gt(0), Le(1)] = 0.2
     """the least that this share shrinks to."""
     individual_step: Annotated[float, Ge(0), Le(1)] = 0.02
     """root mean square of the deviations' step, in gene units, if all of it were signal."""
     individual_memory: Annotated[float, Ge(0.5), Le(0.999)] = 0.9
     """share of the robots' directions before that the next generation keeps."""
-    signal: Annotated[float, Ge(0), Le(1)] = 0.15
+    signal: Annotated[float, Ge(0), Le(1)] = 0.1
     """portion of signal, in what robots have most in common, above which the share grows."""
     decay: Annotated[float, Ge(0), Le(1)] = 0.1
     """portion of the deviations that goes in a generation in which they do not pay."""
@@ -98,7 +99,8 @@ class ConeEsState:
 
     Attributes:
         progress: the header.
-        phase: "first" (random teams of clones), "pairs", "fittest".
+        phase: "first" (random teams of clones), "second" (the best of them once more in every
+            round), "pairs", "fittest".
         active: [U] the slots in use.
         mean: [U, G] float32 the shared genes, zero in empty slots.
         deviations: [R, U, G] float32 what robots add to them; their mean over robots is 0.
@@ -110,6 +112,7 @@ class ConeEsState:
         share: of the pairs in which robots have perturbations of their own.
         worth: of the deviations to the team: what it has more than clones of the mean, as a portion
             of both, averaged over generations.
+        best: [2 * pairs / rounds] int32 the best controllers of generation 0, the fittest first.
     """
 
     progress: Progress
@@ -124,6 +127,7 @@ class ConeEsState:
     age: int
     share: float
     worth: float
+    best: IntArray
 
     def problem(self, first: ConeEsState) -> str:
         """Return the field that cannot be that of a state between generations, if there is one."""
@@ -173,6 +177,7 @@ class ConeEs:
             age=0,
             share=self.config.individual,
             worth=0.0,
+            best=np.zeros(2 * self.config.pairs // self.config.rounds, dtype=np.int32),
         )
 
     def begin_with(
@@ -203,11 +208,14 @@ class ConeEs:
         )
 
     def ask(self, state: ConeEsState) -> Trials:
-        """Return random clones in generation 0, later the pairs; then the fittest team."""
+        """Return clones in generation 0, the best twice, later pairs; and the fittest team."""
         if state.phase == "fittest":
             return self._trials(state, np.stack(self._finalists(state)))
         if state.phase == "first":
             return self._trials(state, self._clones(state, self._candidates(state)))
+        if state.phase == "second":
+            best = self._clones(state, self._candidates(state)[state.best])
+            return self._trials(state, np.concatenate([best] * self.config.rounds))
         shared, own = self._perturbations(state)
         moved = np.broadcast_to(shared[:, None], (len(shared), *state.deviations.shape)).copy()
         moved[self._is_own(state)] += own
@@ -218,7 +226,7 @@ class ConeEs:
 
     def tell(self, state: ConeEsState, trials: Trials, scores: Scores) -> ConeEsState:
         """Return the state after these scores."""
-        is_first = state.phase != "fittest"
+        is_first = state.phase in ("first", "pairs")
         state = replace(state, progress=state.progress.counted(trials, scores, is_first=is_first))
         credit = np.where(np.isfinite(scores.fitness), scores.fitness, np.nan)  # [N, R]
         fitness = credit.mean(axis=1)
@@ -227,8 +235,10 @@ class ConeEs:
             return self._end(crowned, fitness)
         state = replace(state, progress=state.progress.graded(fitness))
         if state.phase == "first":
-            best = np.where(np.isnan(fitness), -np.inf, fitness).argmax()
-            mean = self._candidates(state)[best] * state.active[:, None]
+            return replace(state, phase="second", best=ranking(fitness)[: len(state.best)])
+        if state.phase == "second":
+            fittest = state.best[ranking(fitness.reshape(self.config.rounds, -1).mean(axis=0))[0]]
+            mean = self._candidates(state)[fittest] * state.active[:, None]
             return replace(state, phase="fittest", mean=mean)
         return self._step(state, credit)
 
