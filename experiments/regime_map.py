@@ -32,7 +32,10 @@ from regime_figure import draw
 from regime_tables import PAGE_PARTS
 
 SETTINGS = ("low", "med", "hi")
-SPREAD = ("conevo", "kernel_hash", "warp", "numpy", "python", "cpu")  # of the provenance
+PROVENANCE = {
+    "conevo": "conevo", "kernel": "kernel_hash", "Warp": "warp", "numpy": "numpy",
+    "Python": "python", "processor": "cpu",
+}  # fmt: skip
 
 
 def regime_of(planned: PlannedRun) -> Row:
@@ -113,7 +116,7 @@ def made_with(campaign: Campaign, rows: Sequence[Row]) -> str:
     standing = campaign.standings()
     done = [label for label, entry in standing.items() if entry.state == "finished"]
     about = [Run(campaign.places.run(label)).provenance for label in done]
-    each = {key: sorted({str(one[key]) for one in about}) for key in SPREAD}
+    each = {title: sorted({str(one[key]) for one in about}) for title, key in PROVENANCE.items()}
     worlds = sorted({one["world"]["name"] for one in about})
     seeds = sorted({int(row["seed"]) for row in rows})
     spent = [int(row["evaluations"]) for row in rows]

@@ -27,8 +27,11 @@ def regime_words(cell: Cell) -> str:
 
 
 def number(value: float | None, form: str = ".2f") -> str:
-    """Return a number, or a dash where there is none."""
-    return "–" if value is None or math.isnan(value) else f"{value:{form}}".replace("-", "−")
+    """Return a number, or a dash where there is none; 0 has no sign."""
+    if value is None or math.isnan(value):
+        return "–"
+    text = f"{value:{form}}"
+    return text.replace("-", "−") if float(text) else text.lstrip("+-")
 
 
 def interval(low: float | None, high: float | None, form: str) -> str:
