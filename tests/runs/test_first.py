@@ -108,7 +108,23 @@ def test_any_method_with_populations_may_follow(method: str, tmp_path: Path) -> 
         np.testing.assert_array_equal(population[:, 0], of)
 
 
-def test_a_method_without_populations_may_come_first_only(tmp_path: Path) -> None:
+def test_strategies_of_whole_teams_may_come_first_and_second(tmp_path: Path) -> None:
+    for k, (first, method) in enumerate((("hom-es", "ccga"), ("homcne", "cone-es"))):
+        small = {key: value for key, value in SHORT.items() if key != "method.genotypes"}
+        of_first = {key: value for key, value in small.items() if key != "first"}
+        settings = small | {"run.generations": 2, "first": first}
+        stages = resolve_stages([TASK], method, "smoke", 1, settings, of_first)
+        shaping = start_stages(stages, tmp_path / str(k), threads=1).resume(threads=1)
+        champion = shaping.stages[0].champion
+        assert champion is not None
+        with np.load(shaping.stages[1].path / "origin.npz") as origin:
+            found = origin["field.genes"][:, :, 0] if method == "ccga" else origin["field.mean"]
+        np.testing.assert_array_equal(
+            found, champion.genes if method == "ccga" else champion.genes[0]
+        )
+
+
+def test_a_method_that_cannot_begin_with_a_team_may_come_first_only(tmp_path: Path) -> None:
     name = f"{OWN_METHOD}:team-es"
     stages = resolve_stages([TASK], "ccga", "smoke", 1, SHORT | {"first": name}, TINY)
     shaping = start_stages(stages, tmp_path / "two", threads=1).resume(threads=1)
