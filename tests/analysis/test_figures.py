@@ -167,7 +167,7 @@ ONE, TEN = ["dark-1"], [f"complex-{k}" for k in range(1, 11)]
     [
         pytest.param(list(METHODS)[:2], 1, ONE, id="two methods"),
         pytest.param(list(METHODS)[:4], 1, ONE, id="four methods"),
-        pytest.param(list(METHODS), 1, TEN, id="eight methods, ten places"),
+        pytest.param(list(METHODS), 1, TEN, id="ten methods, ten places"),
         pytest.param(OWN, 1, ONE, id="long names"),
         pytest.param(list(METHODS)[:2], 2, TEN, id="two panels"),
         pytest.param(OWN, 8, ONE, id="eight panels"),
@@ -285,8 +285,8 @@ def test_places_in_the_svg_have_at_most_three_decimals() -> None:
 
 def test_methods_differ_without_colour() -> None:
     looks = method_looks(METHODS)
-    assert sorted(look.number for look in looks.values()) == list(range(8))
-    for column, least in ((HATCHES, 7), (DASHES, 8), (MARKERS, 8)):
+    assert sorted(look.number for look in looks.values()) == list(range(10))
+    for column, least in ((HATCHES, 9), (DASHES, 10), (MARKERS, 10)):
         assert len({str(one) for one in column}) == least
     plain = [look.area for look in looks.values() if not HATCHES[look.number]]
     lightness = sorted(lightness_of(colour) for colour in plain)

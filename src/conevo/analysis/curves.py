@@ -116,9 +116,9 @@ def lines(
                 color=look.line,
                 linestyle=("-", "--", ":")[parts.index(name.part) % 3]
                 if len(parts) > 1
-                else DASHES[look.number % 8],
+                else DASHES[look.number % len(DASHES)],
                 linewidth=1.0,
-                marker=MARKERS[look.number % 8],
+                marker=MARKERS[look.number % len(MARKERS)],
                 markersize=2.8,
                 markerfacecolor=look.line if name.part == parts[0] else "white",
                 markeredgewidth=0.5,

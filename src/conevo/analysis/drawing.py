@@ -24,11 +24,12 @@ if TYPE_CHECKING:
 WIDTH = 7.0  # inches: both columns of a page, or its text width
 COLUMN = 3.4  # one of two columns
 HEIGHT = 9.0  # of a page
-HATCHES = ("", "//", "||", "\\\\", "", "xx", "--", "++")  # by ``palette.Look.number``
+HATCHES = ("", "//", "||", "\\\\", "", "xx", "--", "++", "..", "oo")  # by ``palette.Look.number``
 DASHES: tuple[Any, ...] = (
     ":", "--", "-.", (0, (5, 1.5, 1, 1.5, 1, 1.5)), "-", (0, (1, 1)), (0, (8, 2)), (0, (3, 3)),
+    (0, (8, 2, 2, 2)), (0, (2, 4)),
 )  # fmt: skip
-MARKERS = "os^DvPX*"
+MARKERS = "os^DvPX*<p"
 SETTINGS: dict[Any, Any] = {
     "font.family": FONT,
     "font.size": SIZE,

@@ -102,7 +102,7 @@ def bars(
                     y,
                     width,
                     color=look.area,
-                    hatch=HATCHES[look.number % 8],
+                    hatch=HATCHES[look.number % len(HATCHES)],
                     edgecolor="white" if is_dark(look.area) else "black",
                     linewidth=0.4,
                 )
@@ -163,7 +163,7 @@ def points(
                     x,
                     y,
                     linestyle="none",
-                    marker=MARKERS[look.number % 8],
+                    marker=MARKERS[look.number % len(MARKERS)],
                     markersize=marker_size(len(places) * len(names)),
                     markerfacecolor=look.area,
                     markeredgecolor=look.line,
