@@ -368,6 +368,8 @@ def test_a_state_that_cannot_be_is_recognized() -> None:
         ("worth", -2.0),
         ("luck", -1.0),
         ("age", -1),
+        ("best", good.best - 100),
+        ("best", good.best[:1]),
         ("phase", "fittest"),
     ):
         with np.errstate(invalid="ignore"):

@@ -49,6 +49,16 @@ def test_a_budget_is_never_passed_and_nearly_spent(method: str, tmp_path: Path) 
     assert run.provenance["stopped_by"] == "budget"
 
 
+def test_a_first_generation_that_searches_more_widely_is_priced_apart(tmp_path: Path) -> None:
+    run = evolve_tiny(tmp_path / "run", "hom-es", run__budget_evaluations=45)
+    records = run.generations()
+    spent = [record["team_evaluations"] for record in records]
+    assert spent == [17, 26, 35, 44]  # four pairs, tried twice at first
+    price = price_of(run.config)
+    assert (price.evaluations, price.generations) == (17, 4)
+    assert price.team_steps == records[-1]["team_steps"]
+
+
 @pytest.mark.parametrize("method", ["homcne", "cone"])
 def test_a_run_on_differences_counts_every_team_that_was_played(
     method: str, tmp_path: Path

@@ -21,7 +21,7 @@ from conevo.rng import fold
 from conevo.runs.champions import Team
 from conevo.runs.config import RunConfig
 from conevo.runs.evaluation import Evaluate, make_evaluator, without
-from conevo.runs.loop import check_budget, price, rehearse
+from conevo.runs.loop import check_budget, price, rehearse, unscored
 from conevo.worlds.own_simulator import OwnSimulator
 from conevo.worlds.protocol import Scenarios, Simulator, World
 from conevo.worlds.simulators import device_for, simulator
@@ -52,8 +52,8 @@ class Price:
         evaluations: team evaluations of the first generation; later ones take a few more when the
             size of controllers is in question.
         generations: as many as its settings and its budget allow, at most.
-        team_steps: iterations of a team in all of them, if all take as many evaluations as the
-            first; testing phase left out.
+        team_steps: iterations of a team in all of them, if those after the second take as many
+            evaluations as that; testing phase left out.
     """
 
     evaluations: int
@@ -76,13 +76,16 @@ def price_of(config: RunConfig, ancestor: State | Team | None = None) -> Price:
     check_memory(config, layout)
     state = _first(method, layout, run.seed, ancestor)
     check_budget(method, state, run)
-    first = price(method, state, run)
+    after = unscored(method, state, run)
+    first = after.progress.team_evaluations
+    later = min(first, price(method, after, run))  # a first generation may search more widely
     generations = run.generations
     if run.budget_evaluations:
-        generations = min(generations, run.budget_evaluations // first)
-    of_fittest = run.plays(layout.n_robots)
-    epochs = (first - of_fittest) * run.epochs + of_fittest * run.fittest_epochs
-    return Price(first, generations, generations * epochs * world.params.iterations)
+        generations = min(generations, 1 + (run.budget_evaluations - first) // later)
+    evaluations, of_fittest = first + (generations - 1) * later, run.plays(layout.n_robots)
+    epochs = evaluations * run.epochs
+    epochs += generations * of_fittest * (run.fittest_epochs - run.epochs)
+    return Price(first, generations, epochs * world.params.iterations)
 
 
 def _first(method: Method, layout: Layout, seed: int, ancestor: State | Team | None) -> State:

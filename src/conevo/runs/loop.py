@@ -21,7 +21,7 @@ from conevo.terms import counted
 from conevo.worlds.measures import Measure
 from conevo.worlds.protocol import Outcome
 
-__all__ = ["check_budget", "evolve_generations", "has_reached", "price", "rehearse"]
+__all__ = ["check_budget", "evolve_generations", "has_reached", "price", "rehearse", "unscored"]
 
 Record = dict[str, Any]
 MOST_REQUESTS = 1000  # of one generation: a method that asks for more never ends it
@@ -77,17 +77,23 @@ def evolve_generations(
 
 
 def price(method: Method, state: State, settings: RunSettings) -> int:
-    """Return the team evaluations of the first generation.
+    """Return the team evaluations of the generation that begins with a state."""
+    after = unscored(method, state, settings)
+    return int(after.progress.team_evaluations - state.progress.team_evaluations)
 
-    ask and tell are pure, so it can be priced with empty scores.
+
+def unscored(method: Method, state: State, settings: RunSettings) -> State:
+    """Return what a generation leaves with empty scores; nothing is evaluated.
+
+    ask and tell are pure, so it can be priced like this.
     """
-    requests = 0
-    while state.progress.generation == 0:
+    generation, requests = state.progress.generation, 0
+    while state.progress.generation == generation:
         requests = _counted(requests, method)
         trials = _asked(method, state)
         empty = replace(_scores(trials, np.zeros), plays=settings.plays(trials.teams.shape[1]))
         state = _told(method, state, trials, empty)
-    return int(state.progress.team_evaluations)
+    return state
 
 
 def rehearse(method: Method, first: State) -> State:

@@ -139,6 +139,8 @@ class ConeEsState:
             return "deviations"
         if not self.active.any():
             return "active"
+        if self.best.shape != first.best.shape or self.best.min() < 0:
+            return "best"
         for name, least, most in (
             ("share", 0.0, 1.0),
             ("worth", -1.0, 1.0),
@@ -161,7 +163,8 @@ class ConeEs:
     def init(self, layout: Layout, root: int) -> ConeEsState:
         """Return generation 0, in which random controllers are tried as clones.
 
-        Choice: as many as a generation has teams; the fittest is the first mean.
+        Choice: as many as a generation has teams; the best are tried again in every round, and the
+        fittest of them is the first mean.
         """
         robots, slots, genes = layout.n_robots, layout.max_hidden, layout.n_genes
         return ConeEsState(
