@@ -184,12 +184,15 @@ def threshold(cells: Sequence[tuple[float, float]], near: float = 1.0) -> float:
     """Return the threshold with the fewest wrong signs.
 
     Choice: halfway between two neighbours, below all (minus infinity) or above all (infinity); of
-    equally good ones that nearest to ``near``: for the rule 1, where it sees a gain by itself.
+    equally good ones that nearest to ``near``: for the rule 1, where it sees a gain by itself. NaN
+    without any cell.
 
     Args:
         cells: of each the number that is compared with it, and the difference.
         near: where it is expected.
     """
+    if not cells:
+        return math.nan
     numbers = sorted({number for number, _ in cells})
     between = [(a + b) / 2 for a, b in itertools.pairwise(numbers)]
 

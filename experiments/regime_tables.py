@@ -146,7 +146,7 @@ def rule(cells: Sequence[Cell]) -> str:
 
 def limit_words(threshold: float) -> str:
     """Return a threshold in words where it is below or above everything."""
-    return {math.inf: "above all", -math.inf: "below all"}.get(threshold, f"{threshold:.2f}")
+    return {math.inf: "above all", -math.inf: "below all"}.get(threshold, number(threshold))
 
 
 def listed(cells: Sequence[Cell]) -> str:
@@ -176,17 +176,19 @@ def predicted(cells: Sequence[Cell]) -> str:
     lines = []
     for cell in cells:
         of = cell.value.difference
-        says, seen = cell.incentive > limit, None if of is None else of > 0
+        says = None if math.isnan(limit) else cell.incentive > limit
+        seen = None if of is None else of > 0
         line = [*key(cell), "finding" if cell.is_for_finding else "testing"]
-        line += [f"{cell.incentive:.2f}", better(says), "–" if seen is None else better(seen)]
+        line += [f"{cell.incentive:.2f}", better(says), better(seen)]
         line[-1] += " (clear)" if cell.is_clear else ""
-        lines.append([*line, "–" if seen is None else "yes" if says == seen else "no"])
+        is_known = says is not None and seen is not None
+        lines.append([*line, ("yes" if says == seen else "no") if is_known else "–"])
     return table(head, lines)
 
 
-def better(is_individual: bool) -> str:
-    """Return who is better."""
-    return "CONE-ES" if is_individual else "HomES"
+def better(is_individual: bool | None) -> str:
+    """Return who is better, or a dash if that is not known."""
+    return {True: "CONE-ES", False: "HomES", None: "–"}[is_individual]
 
 
 PAGE_PARTS: dict[str, Callable[[Sequence[Cell]], str]] = {

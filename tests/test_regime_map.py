@@ -85,6 +85,7 @@ def test_a_threshold_by_hand():
     assert threshold([(0.4, -1), (0.8, 2), (1.0, -3), (1.4, 4)]) == pytest.approx(1.2)  # or 0.6
     assert threshold([(0.4, 1), (0.8, 2)]) == -math.inf
     assert threshold([(0.4, -1), (0.8, -2)]) == math.inf
+    assert math.isnan(threshold([]))
 
 
 def test_a_threshold_is_found_without_the_cells_for_testing():
@@ -111,6 +112,8 @@ def test_a_cell_without_runs_of_one_method_predicts_nothing():
     text = "".join(make(cells) for make in PAGE_PARTS.values())
     assert "2, 0" in text
     assert "nan" not in text
+    (line,) = PAGE_PARTS["predicted"](cells_of(runs(1.0, [100], []))).splitlines()[2:]
+    assert line.endswith("| finding | 1.55 | – | – | – |")
 
 
 PLAN = """
