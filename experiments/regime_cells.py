@@ -9,8 +9,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from scipy.stats import t as student
 
-from conevo.analysis.statistics import Comparison, compare, holm
+from conevo.analysis.statistics import Comparison, Estimate, compare, holm
 from incentives import FINDING, Regime, incentive
 from pages import Row
 
@@ -21,11 +22,13 @@ __all__ = [
     "REGIONS",
     "Cell",
     "Judged",
+    "Trend",
     "apart",
     "cells_of",
     "judge",
     "of_region",
     "threshold",
+    "trends_of",
     "used",
 ]
 
@@ -155,6 +158,56 @@ def apart(row: Row) -> float:
     if not len(shares):
         return math.nan
     return float(np.abs(shares - shares.mean(axis=0)).sum(axis=1).mean() / 2)
+
+
+@dataclass(frozen=True)
+class Trend:
+    """What the cells of the same ranges and accuracies have in common.
+
+    Attributes:
+        cells: with two runs of each method at least, mixed first.
+        mean: difference of the methods, mean over cells.
+        slope: how much it grows from segregation 0 to 1, on a line of least squares; None below
+            two cells.
+    """
+
+    cells: list[Cell]
+    mean: Estimate
+    slope: Estimate | None
+
+
+def trends_of(cells: Sequence[Cell]) -> list[Trend]:
+    """Return the trend of each pair of ranges and accuracies that has a cell with an interval."""
+    groups: dict[tuple[str, str], list[Cell]] = {}
+    for cell in cells:
+        if cell.value.low is not None:
+            groups.setdefault((cell.ranges, cell.accuracies), []).append(cell)
+    found = []
+    for some in groups.values():
+        mean = contrast([(1 / len(some), cell) for cell in some])
+        at = np.array([cell.regime.segregation for cell in some])
+        far = at - at.mean()
+        slope = None
+        if len(some) > 1:
+            weights = (far / (far**2).sum()).tolist()
+            slope = contrast(list(zip(weights, some, strict=True)))
+        found.append(Trend(some, mean, slope))
+    return found
+
+
+def contrast(weighted: Sequence[tuple[float, Cell]]) -> Estimate:
+    """Return a weighted sum of the cells' differences, with Welch's interval (Satterthwaite)."""
+    value, parts = 0.0, []
+    for weight, cell in weighted:
+        of = cell.value
+        value += weight * (of.difference or 0.0)
+        for sd, n in ((of.sd_a, of.n_a), (of.sd_b, of.n_b)):
+            parts.append((weight**2 * (sd or 0.0) ** 2 / n, n))
+    variance = sum(part for part, _ in parts)
+    freedom = variance**2 / sum(part**2 / (n - 1) for part, n in parts)
+    reach = float(student.ppf(0.975, freedom)) * math.sqrt(variance)
+    n = sum(n for _, n in parts)
+    return Estimate(value, value - reach, value + reach, n, "Welch's t")
 
 
 # --- what the rule predicts -----------------------------------------------------------------------

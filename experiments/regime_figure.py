@@ -8,15 +8,17 @@ from typing import Any
 
 from conevo.analysis.drawing import grey, is_dark, style
 from conevo.analysis.lettering import SIZE, SMALL
-from conevo.palette import BLUE, FAINT, INK, VERMILION, shade
+from conevo.palette import BLUE, INK, VERMILION, shade
 from pages import Row
 from regime_cells import CLONES, INDIVIDUAL, Cell, apart
 from regime_tables import number, percent
 
 __all__ = ["draw"]
 
-SIZES = (8.0, 5.6)  # inches
+WIDTH = 8.0  # inches
+MAP, SMALL_MAP = (0.55, 0.75), (0.42, 0.65)  # inches of a row, and of what is around the rows
 DPI = 150
+DARKEST = 0.6  # black can be read on it
 LEAST = 0.05  # share of the clones' value that has the full colour, or more if a cell has more
 Write = Callable[[Cell], tuple[str, str, bool]]  # colour, text, whether it is marked
 Numbers = Callable[[Cell], list[float | None]]
@@ -27,8 +29,10 @@ def draw(cells: Sequence[Cell]) -> bytes:
     with style():
         from matplotlib.figure import Figure
 
-        figure = Figure(figsize=SIZES, layout="constrained")
-        above, below = figure.subfigures(2, 1, height_ratios=(1.35, 1))
+        n = len({(cell.ranges, cell.accuracies) for cell in cells})
+        heights = [n * row + around for row, around in (MAP, SMALL_MAP)]
+        figure = Figure(figsize=(WIDTH, sum(heights)), layout="constrained")
+        above, below = figure.subfigures(2, 1, height_ratios=heights)
         most = max([LEAST, *(abs(cell.share(cell.value.difference) or 0) for cell in cells)])
         panel(above.subplots(), cells, lambda cell: difference(cell, most), "")
         above.suptitle(
@@ -74,11 +78,12 @@ def difference(cell: Cell, most: float) -> tuple[str, str, bool]:
     share = cell.share(of.difference)
     runs = f"n {of.n_b}, {of.n_a}"
     if share is None:
-        return FAINT, runs, False
+        return "#ffffff", runs, False
     hue = BLUE if share > 0 else VERMILION
     around = "" if of.low is None else f"\n{number(of.low, '+.0f')} to {number(of.high, '+.0f')}"
     text = f"{number(of.difference, '+.0f')}{around}\n{percent(share)} · {runs}"
-    return shade(hue, 1 - 0.85 * min(abs(share) / most, 1)), text, cell.is_clear
+    strength = (0.85 if around else 0.25) * min(abs(share) / most, 1)  # faint without an interval
+    return shade(hue, 1 - strength), text, cell.is_clear
 
 
 def shaded(of: Numbers, lightest: float, darkest: float) -> Write:
@@ -89,7 +94,7 @@ def shaded(of: Numbers, lightest: float, darkest: float) -> Write:
         text = "\n".join([number(value), *(f"({number(one)})" for one in others)])
         if value is None:
             return "#ffffff", text, False
-        darkness = min(max((value - lightest) / (darkest - lightest), 0), 1)
+        darkness = DARKEST * min(max((value - lightest) / (darkest - lightest), 0), 1)
         part = round(255 * float(grey(darkness)))
         return f"#{part:02x}{part:02x}{part:02x}", text, False
 

@@ -24,6 +24,7 @@ from conevo.campaigns.campaign import Campaign
 from conevo.campaigns.plan import PlannedRun
 from conevo.cli.find import find_campaign, sealed
 from conevo.errors import ConevoError, UsageError
+from conevo.runs.records import own_numbers
 from conevo.runs.run import Run
 from incentives import OF_REGION
 from pages import Row, put, read, table, write
@@ -60,8 +61,14 @@ def regime_of(planned: PlannedRun) -> Row:
     }
 
 
-def rows_of(tables: Tables, planned: Sequence[PlannedRun]) -> list[Row]:
-    """Return a row per finished run of the two methods: its regime, value, cost and castes."""
+def rows_of(tables: Tables, planned: Sequence[PlannedRun], own: Mapping[str, Row]) -> list[Row]:
+    """Return a row per finished run of the two methods: its regime, value, cost and castes.
+
+    Args:
+        tables: of the campaign.
+        planned: its runs.
+        own: what the method says of each finished run, by label.
+    """
     regimes = {one.label: regime_of(one) for one in planned}
     first = {one.run: one.value for one in tables.values(team="generation 0")}
     cost = _keyed(tables, "SELECT run, evaluations, team_steps, core_seconds FROM runs")
@@ -80,9 +87,15 @@ def rows_of(tables: Tables, planned: Sequence[PlannedRun]) -> list[Row]:
         row |= dict(zip(("evaluations", "team_steps", "core_seconds"), cost[one.run], strict=True))
         if one.run in shares:
             row |= dict(zip(("favourite share", "S"), shares[one.run], strict=True))
-        rows.append(row | castes.get(one.run, {}))
+        rows.append(row | castes.get(one.run, {}) | own.get(one.run, {}))
     order = ("ranges", "accuracies", "segregation", "method", "seed")
     return sorted(rows, key=lambda row: tuple(row[name] for name in order))
+
+
+def own_numbers_of(run: Run) -> Row:
+    """Return the method's own numbers of a run's last generation."""
+    last = run.generations()[-1:]
+    return {name: last[0][name] for name in own_numbers(last)}
 
 
 def _keyed(tables: Tables, sql: str) -> dict[str, tuple[Any, ...]]:
@@ -155,7 +168,9 @@ def rows_and_cost(name: str) -> tuple[list[Row], str]:
     campaign = find_campaign(name)
     planned: Mapping[str, PlannedRun] = campaign.planned
     with sealed(campaign) as folder, Tables(folder) as tables:
-        rows = rows_of(tables, list(planned.values()))
+        names = [run for (run,) in tables.query("SELECT run FROM runs")[1]]
+        own = {name: own_numbers_of(Run(campaign.places.run(name))) for name in names}
+        rows = rows_of(tables, list(planned.values()), own)
     if not rows:
         raise UsageError(f"{campaign.path} has no finished run of {INDIVIDUAL} or {CLONES}")
     return rows, made_with(campaign, rows)

@@ -7,9 +7,20 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from conevo.analysis.statistics import compare
+from conevo.analysis.statistics import Estimate, compare
 from pages import table
-from regime_cells import CLONES, INDIVIDUAL, REGIONS, Cell, Judged, apart, judge, of_region, used
+from regime_cells import (
+    CLONES,
+    INDIVIDUAL,
+    REGIONS,
+    Cell,
+    Judged,
+    apart,
+    judge,
+    of_region,
+    trends_of,
+    used,
+)
 
 __all__ = ["PAGE_PARTS", "judged", "regime_words"]
 
@@ -70,6 +81,42 @@ def values(cells: Sequence[Cell]) -> str:
         f"above HomES in {above}, below in {len(clear) - above}. If nothing differed anywhere, "
         f"about {n / 20:.1f} would.\n"
     )
+
+
+def trends(cells: Sequence[Cell]) -> str:
+    """Return what cells of the same ranges and accuracies have in common."""
+    head = ["ranges", "accuracies", "cells", "mean difference", "95 % interval"]
+    head += ["from mixed to apart", "95 % interval"]
+    lines = []
+    for one in trends_of(cells):
+        line = [one.cells[0].ranges, one.cells[0].accuracies, len(one.cells)]
+        for of in (one.mean, one.slope):
+            line += ["–", "–"] if of is None else [estimated(of), interval(of.low, of.high, "+.0f")]
+        lines.append(line)
+    return table(head, lines)
+
+
+def estimated(of: Estimate) -> str:
+    """Return a difference, bold where its interval excludes 0."""
+    is_clear = of.low is not None and of.high is not None and of.low * of.high > 0
+    text = number(of.value, "+.0f")
+    return f"**{text}**" if is_clear else text
+
+
+def deviations(cells: Sequence[Cell]) -> str:
+    """Return what CONE-ES says of its deviations in the last generation, mean over runs."""
+    head = [*KEYS, "team over clones of its mean", "in runs", "signal", "share of pairs"]
+    lines = []
+    for cell in cells:
+        worth = cell.each(INDIVIDUAL, "individual_worth")
+        ratios = [(1 + one) / (1 - one) for one in worth]
+        if ratios:
+            line = [*key(cell), number(float(np.median(ratios)))]
+            line.append(f"{number(min(ratios))} to {number(max(ratios))}")
+            for name in ("individual_signal", "individual_share"):
+                line.append(number(cell.mean(INDIVIDUAL, name)))
+            lines.append(line)
+    return table(head, lines)
 
 
 def castes(cells: Sequence[Cell]) -> str:
@@ -193,8 +240,10 @@ def better(is_individual: bool | None) -> str:
 
 PAGE_PARTS: dict[str, Callable[[Sequence[Cell]], str]] = {
     "values": values,
+    "trends": trends,
     "rule": rule,
     "predicted": predicted,
     "castes": castes,
+    "deviations": deviations,
     "settings": settings,
 }

@@ -18,7 +18,7 @@ sys.path += [str(ROOT / "experiments"), str(ROOT / "docs")]  # scripts import wh
 
 import pages  # noqa: E402
 import regime_map  # noqa: E402
-from regime_cells import apart, cells_of, judge, threshold  # noqa: E402
+from regime_cells import apart, cells_of, judge, threshold, trends_of  # noqa: E402
 from regime_tables import PAGE_PARTS, judged  # noqa: E402
 
 REGIME = {
@@ -70,6 +70,19 @@ def test_what_two_percent_decide():
     assert verdict([1000, 1001], [900, 901]) == "clones"
     assert verdict([1000, 1001], [1019, 1020]) == "open"  # from 13.4 to 24.6 of 1,000
     assert verdict([1000, 1001], [1200]) == "open"
+
+
+def test_what_cells_have_in_common_by_hand():
+    """Every mean has the variance 1, so that of the mean is 1, of the slope 4; t of 4 is 2.776."""
+    cells = cells_of(runs(0, [100, 102], [150, 152]) + runs(1, [200, 202], [290, 292]))
+    alone = runs(0.5, [100, 102], [90])  # has no interval, so does not count
+    (trend,) = trends_of([*cells, *cells_of(alone)])
+    assert (trend.mean.value, trend.slope.value) == pytest.approx((70, 40))
+    assert (trend.mean.low, trend.mean.high) == pytest.approx((70 - 2.7764, 70 + 2.7764), abs=1e-3)
+    assert trend.slope.high - 40 == 40 - trend.slope.low == pytest.approx(2 * 2.7764, abs=1e-3)
+    (line,) = PAGE_PARTS["trends"](cells).splitlines()[2:]
+    assert line == "| medium | low | 2 | **+70** | +67 to +73 | **+40** | +34 to +46 |"
+    assert trends_of(cells[:1])[0].slope is None
 
 
 def test_how_robots_of_different_regions_differ():
@@ -134,7 +147,7 @@ ranges = ["medium"]
 "world.starts" = "by_robot"
 "world.iterations" = 60
 "run.budget_evaluations" = 0
-"run.generations" = 1
+"run.generations" = 2
 "run.n_tests" = 2
 "method.pairs" = 5
 
@@ -172,6 +185,8 @@ def test_the_page_of_a_campaign(campaign, tmp_path, capsys):
         )  # fmt: skip
         tested = Run(campaign.places.run(label)).test_result["champion"]["performance"]["value"]
         assert row["value"] == pytest.approx(np.mean(tested["values"]), rel=1e-5)
+        (*_, last) = Run(campaign.places.run(label)).generations()
+        assert row.get("individual_share") == last.get("individual_share")
         study = json.loads(campaign.places.study(label).read_text())
         of_c = [one["count"] for one in study["actions"]
                 if one["robot"] in (2, 6, 10, 14, 18) and one["action"] == "med"]  # fmt: skip
@@ -186,6 +201,7 @@ def test_the_page_of_a_campaign(campaign, tmp_path, capsys):
     means = [np.mean([row["value"] for row in rows if row["method"] == m])
              for m in ("hom-es", "cone-es")]  # fmt: skip
     text = page.read_text()
+    assert {row["method"] for row in rows if "individual_share" in row} == {"cone-es"}
     assert "| runs finished, of those planned | 4 of 4 |" in text
     assert f"| medium | low | 0.5 | 2, 2 | {means[0]:.0f} (" in text
     assert f"| {means[1]:.0f} (" in text
