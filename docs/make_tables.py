@@ -111,7 +111,7 @@ def construction_environments():
 def rover_environments():
     """Return canal layout and rocks of every multi-rover environment."""
     rows = []
-    for kind in ("simple", "complex"):
+    for kind in ("simple", "complex", "apart"):
         same = {tuple(rocks.mix(f"{kind}-{e}")) for e in range(1, 11)}
         assert len(same) == 1, kind
         rows.append([f"`{kind}-1` to `{kind}-10`", "1 to 10", *same.pop()])
@@ -119,6 +119,13 @@ def rover_environments():
         name = f"extended-{e}"
         rows.append([f"`{name}`", rocks.layout(name), *rocks.mix(name)])
     return table(["environment", "canal layout", *rocks.TYPES], rows)
+
+
+def rover_apart():
+    """Return the defaults of the environments ``apart`` next to those of the others."""
+    others = RoverParams()
+    rows = [[f"`{k}`", f"`{value}`", f"`{getattr(others, k)}`"] for k, value in rocks.APART.items()]
+    return table(["parameter", "in `apart-1..10`", "in the others"], rows)
 
 
 def rover_settings():
@@ -172,6 +179,7 @@ TABLES = {
     "presets gacc": lambda: presets("gacc/complex-1", has_purpose=False),
     "rover card": lambda: card("conevo.worlds.rover.world"),
     "rover environments": rover_environments,
+    "rover apart": rover_apart,
     "rover settings": rover_settings,
     "rover parameters": lambda: parameters(RoverParams),
     "pursuit card": lambda: card("conevo.worlds.pursuit.world"),

@@ -93,7 +93,8 @@ def test_a_scenario_is_that_of_its_key_whatever_is_drawn_with_it(some_world):
 def test_a_world_is_what_its_entry_says(path, some_world):
     entry, environment = resolve(path)
     assert (some_world.name, some_world.environment) == (entry.name, environment)
-    assert some_world.params == entry.params_class(iterations=ITERATIONS)
+    own = entry.defaults.get(environment, {})
+    assert some_world.params == entry.params_class(**{**own, "iterations": ITERATIONS})
     given = (some_world.inputs, some_world.outputs, some_world.actions, some_world.heuristics)
     for names in (*given, measures_of(some_world)):
         assert isinstance(names, tuple)

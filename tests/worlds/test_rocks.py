@@ -1,4 +1,4 @@
-"""The 30 environments of the multi-rover world hold what section 5.1 of the thesis asks for."""
+"""The environments of the multi-rover world hold what section 5.1 of the thesis asks for."""
 
 import pytest
 
@@ -6,11 +6,12 @@ from conevo.errors import UsageError
 from conevo.worlds.rover.canals import load
 from conevo.worlds.rover.rocks import ENVIRONMENTS, VALUES, Mix, layout, mix
 
+FAMILIES = ("simple", "complex", "extended", "apart")  # the last is ours
 VALUE_SHARES = (0.1, 0.2, 0.3, 0.4)  # of A..D at equal counts
 
 
-def test_there_are_three_sets_of_ten() -> None:
-    expected = [f"{s}-{e}" for s in ("simple", "complex", "extended") for e in range(1, 11)]
+def test_there_are_four_sets_of_ten() -> None:
+    expected = [f"{s}-{e}" for s in FAMILIES for e in range(1, 11)]
     assert list(ENVIRONMENTS) == expected
 
 
@@ -23,11 +24,12 @@ def test_the_value_is_5000_and_every_rock_finds_a_site(environment: str) -> None
 
 
 @pytest.mark.parametrize("e", range(1, 11))
-def test_simple_and_complex_use_their_own_layout_and_extended_the_last(e: int) -> None:
+def test_all_but_extended_use_their_own_layout_and_extended_the_last(e: int) -> None:
     assert mix(f"simple-{e}") == (0, 0, 0, 0, 5000)
     assert mix(f"complex-{e}") == (500, 500, 500, 500, 0)
     assert mix(f"extended-{e}").E == 0
-    assert [layout(f"{s}-{e}") for s in ("simple", "complex", "extended")] == [e, e, 10]
+    assert mix(f"apart-{e}") == mix(f"complex-{e}")
+    assert [layout(f"{s}-{e}") for s in FAMILIES] == [e, e, 10, e]
 
 
 def nearest_rocks(shares: list[float], counts: Mix) -> bool:

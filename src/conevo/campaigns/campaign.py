@@ -126,7 +126,7 @@ def _build_worlds(runs: Iterable[PlannedRun]) -> None:
         {(r.world, str(r.overrides.get("controller.name", DEFAULT))) for r in runs}
     ):
         entry, environment = resolve_world(address)
-        built = entry.build(environment, entry.params_class())
+        built = entry.build(environment, entry.params(environment))
         simulator(built, controller(name, world=built))
         refuse_wild_indices(entry, environment, built.params)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 __all__ = ["listing"]
 
-Rows = list[dict[str, str]]
+Rows = list[dict[str, Any]]
 WHAT = ("worlds", "controllers", "methods", "presets", "settings", "runs")
 
 
@@ -66,7 +66,10 @@ def listing(
     if as_json:
         click.echo(json.dumps(rows))
     elif rows:
+        notes = list(_own_defaults(rows)) if what == "worlds" else []
         click.echo(table(list(rows[0]), [list(row.values()) for row in rows]))
+        for line in notes:
+            click.echo(line)
     else:
         click.echo(f"no runs in {subject or 'runs'}/; try: conevo run rover/complex-1")
 
@@ -80,9 +83,21 @@ def _worlds() -> Rows:
             "environments": _ranges(entry.environments),
             "what": entry.summary,
             "source": entry.source,
+            "defaults": entry.defaults,
         }
         for entry in WORLDS.values()
     ]
+
+
+def _own_defaults(rows: Rows) -> Iterator[str]:
+    """Take the defaults out of the rows of worlds; yield a line for environments alike in them."""
+    for row in rows:
+        alike: dict[str, list[str]] = {}
+        for environment, values in row.pop("defaults").items():
+            text = ", ".join(f"{key}={value}" for key, value in values.items())
+            alike.setdefault(text, []).append(environment)
+        for text, names in alike.items():
+            yield f"{row['world']}, by default in {_ranges(tuple(names))}: {text}"
 
 
 def _controllers() -> Rows:

@@ -36,8 +36,9 @@ def test_under(
 ) -> Record:
     """Test a run's champion in its own world and under changed conditions; writes nothing.
 
-    Choice: in the same world the run's settings hold unless they are changed; another world has
-    those of the run's preset. The controllers are the run's. A smaller team is of the first
+    Choice: in the same world the run's settings hold unless they are changed; another environment
+    has its own where the defaults of the two differ, and another world all of the run's preset. The
+    controllers are the run's. A smaller team is of the first
     controllers, a larger one repeats them from the first on.
 
     Returns:
@@ -84,7 +85,12 @@ def _changed(
     known = [field.name for field in fields(there.world_params)]
     settings = {}
     if there.world == config.world:
-        settings = {f"world.{key}": value for key, value in config.tables()["world"].items()}
+        own, other = (one.entry.defaults.get(one.environment, {}) for one in (config, there))
+        settings = {
+            f"world.{key}": value
+            for key, value in config.tables()["world"].items()
+            if (key in own, own.get(key)) == (key in other, other.get(key))
+        }
     given: set[str] = set()
     for key, value in world.items():
         name = key.removeprefix("world.")

@@ -1,7 +1,8 @@
-"""What a run is, settled before it starts: component defaults, preset, TOML file, single settings.
+"""What a run is, settled before it starts: defaults, preset, TOML file, single settings.
 
-Each layer overrides the one before. A default lives in one place only: the field of its component.
-Presets and files hold overrides; every value remembers its place, which errors name.
+Each layer overrides the one before. A default lives in one place only: the field of its component,
+or the world's entry for an environment with another one. Presets and files hold overrides; every
+value remembers its place, which errors name.
 
 A configuration file has four tables. ``[run]`` also holds three names::
 
@@ -87,8 +88,8 @@ class RunConfig:
 
     ``world_params``, ``controller`` and ``method_config`` are the world's, the controller's and the
     method's own frozen dataclasses.
-    ``changed`` names the settings that are not as the preset has them, "run.generations"; the seed
-    is none of them.
+    ``changed`` names the settings that are not as the preset and the environment have them,
+    "run.generations"; the seed is none of them.
     """
 
     entry: WorldEntry
@@ -171,7 +172,8 @@ class RunConfig:
         built = {"run": run, "world": self.world_params, "controller": self.controller}
         built["method"] = self.method_config
         parts = {name: type(part) for name, part in built.items()}
-        base = _read_preset(self.preset, self.entry, self.method_entry, self.controller.name)
+        names = (self.preset, self.entry, self.environment, self.method_entry)
+        base = _read_preset(*names, self.controller.name)
         changed = tuple(_changed(parts, built, base))
         return dataclasses.replace(self, run=run, changed=changed)
 
@@ -318,7 +320,7 @@ def resolve(
     if seed is not None:
         single.setdefault("run", {})["seed"] = _Value(seed, "as the seed")
     with placed("run.preset", places.get("preset")):
-        base = _read_preset(names["preset"], entry, method_entry, controller)
+        base = _read_preset(names["preset"], entry, environment, method_entry, controller)
     if own_preset is not None and names["preset"] != own_preset.value:
         _refuse_label(names["preset"], base, layers[0], own_preset.place)
     built = {name: _build(name, parts, [base, *layers, single]) for name in parts}
@@ -445,10 +447,13 @@ def _section_of(key: str, parts: Mapping[str, type], place: str) -> str:
     return homes[0]
 
 
-def _read_preset(preset: str, world: WorldEntry, method: MethodEntry, controller: str) -> Layer:
-    """Return what a preset says about this world and method, and the world about a controller.
+def _read_preset(
+    preset: str, world: WorldEntry, environment: str, method: MethodEntry, controller: str
+) -> Layer:
+    """Return what a preset says about this world and method, over what the world suggests.
 
-    It says nothing of a method in a file.
+    That is the environment's defaults and settings of a controller. A preset says nothing of a
+    method in a file.
     """
     if preset not in PRESETS:
         raise unknown_name("preset", preset, PRESETS)
@@ -462,10 +467,12 @@ def _read_preset(preset: str, world: WorldEntry, method: MethodEntry, controller
     sizes = {} if method.file else by_method.get(family, {}) | by_method.get(name, {})
     tables = generic | own | {"method": sizes}
     layer = _as_layer(tables, f"in preset {preset!r}")
-    suggestion = {"controller": suggested(controller, world.world_class)}
+    suggestion = {
+        "world": world.defaults.get(environment, {}),
+        "controller": suggested(controller, world.world_class),
+    }
     of_world = _as_layer(suggestion, f"of world {world.name!r}")
-    layer["controller"] = of_world["controller"] | layer.get("controller", {})
-    return layer
+    return layer | {part: of_world[part] | layer.get(part, {}) for part in of_world}
 
 
 def _build(section: str, parts: Mapping[str, Any], layers: Iterable[Layer]) -> Any:

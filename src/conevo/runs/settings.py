@@ -163,6 +163,10 @@ def settings_of(config: RunConfig) -> list[tuple[str, Setting, Any]]:
     }
     found = {section: declared(type(part)) for section, part in parts.items()}
     own = suggested(config.controller.name, config.entry.world_class)
+    of_environment = config.entry.defaults.get(config.environment, {})
+    found["world"] = [
+        replace(one, default=of_environment.get(one.name, one.default)) for one in found["world"]
+    ]
     found["controller"] = [
         Setting("name", DEFAULT, "", ", ".join(CONTROLLERS), "kind of controller"),
         *(replace(one, default=own.get(one.name, one.default)) for one in found["controller"]),

@@ -107,7 +107,7 @@ def _declared(entry: WorldEntry, environment: str) -> Iterator[Finding]:
     if wrong:
         return
     for name in entry.environments:
-        built = entry.build(name, entry.params_class())
+        built = entry.build(name, entry.params(name))
         if name == environment:
             is_own = has_own_simulator(built)
             fine = "names, controller" if is_own else "names, controller, phases, state, scene"
@@ -170,12 +170,12 @@ def _own(entry: WorldEntry, environment: str) -> Iterator[Finding]:
     yield from found
     if all(finding.status == "ok" for finding in found):
         yield from _of_drawing(a_world, teams)
-    yield from _of_random_teams(entry.build(environment, entry.params_class()))
+    yield from _of_random_teams(entry.build(environment, entry.params(environment)))
 
 
 def _drawn(entry: WorldEntry, environment: str) -> Iterator[Finding]:
     """Check how scenarios are drawn."""
-    a_world = entry.build(environment, entry.params_class())
+    a_world = entry.build(environment, entry.params(environment))
     yield Finding("running", "scenarios", "")
     fine = "the same for the same key, different for different keys"
     found = list(_topic("scenarios", _of_scenarios(a_world), fine))
@@ -211,7 +211,7 @@ def _of_environments(entry: WorldEntry) -> Iterator[Finding]:
     """Note environments that nothing tells apart: neither parameters nor a scenario."""
     known: dict[tuple[object, ...], str] = {}
     for name in entry.environments:
-        a_world = entry.build(name, entry.params_class())
+        a_world = entry.build(name, entry.params(name))
         simulation, drawn = a_world.simulation(), a_world.scenarios(KEYS[:1])
         if wrong := list(scenario_faults(simulation.scene, drawn, 1)):
             yield Finding("problem", "environments", f"{name}: {wrong[0]}")
@@ -238,7 +238,7 @@ def random_teams(a_world: World, n: int) -> tuple[npt.NDArray[np.float32], npt.N
 
 
 def _shorter(entry: WorldEntry, environment: str, given: Mapping[str, Any] = {}) -> World:
-    params = entry.params_class(**given)
+    params = entry.params(environment, **given)
     return entry.build(environment, replace(params, iterations=min(ITERATIONS, params.iterations)))
 
 
@@ -275,7 +275,7 @@ def _rolled_out(entry: WorldEntry, environment: str) -> Iterator[Finding]:
     teams = mixed_teams(a_world)
     yield from _topic("record", _of_record(a_world, teams), "equals evaluate, bit for bit")
     yield from _of_drawing(a_world, teams)
-    yield from _of_random_teams(entry.build(environment, entry.params_class()))
+    yield from _of_random_teams(entry.build(environment, entry.params(environment)))
 
 
 def _of_drawing(a_world: World, teams: Teams) -> Iterator[Finding]:

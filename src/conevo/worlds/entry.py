@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -20,14 +21,15 @@ class WorldEntry:
     """What the registry knows of a world without loading it.
 
     ``module`` holds the classes named ``params_name`` (parameters) and ``world_name`` (built from
-    an environment name and parameters). ``drawn`` is the module whose ``playback`` tells what is to
-    be drawn of an epoch, without Warp, and ``CASTES`` the colours of its castes; without it, what
-    the world's class says in its own ``drawn`` is (``playback.drawn``). ``studied`` is the module
-    that tells what robots are seen to do besides their actions (``study.WorldStudy``), its import
-    without Warp. ``product`` is the module that makes a file of a finished shaping in all of its
-    ``TASKS``. An entry in a file outside the package leaves ``module`` out; ``worlds.outside``
-    fills it in, with the file's path, ``files`` (this one first, then the files next to it that it
-    imports) and the digest of their texts.
+    an environment name and parameters). ``defaults`` are those of an environment where they are not
+    those of the class: environment -> parameter -> value. ``drawn`` is the module whose
+    ``playback`` tells what is to be drawn of an epoch, without Warp, and ``CASTES`` the colours of
+    its castes; without it, what the world's class says in its own ``drawn`` is
+    (``playback.drawn``). ``studied`` is the module that tells what robots are seen to do besides
+    their actions (``study.WorldStudy``), its import without Warp. ``product`` is the module that
+    makes a file of a finished shaping in all of its ``TASKS``. An entry in a file outside the
+    package leaves ``module`` out; ``worlds.outside`` fills it in, with the file's path, ``files``
+    (this one first, then the files next to it that it imports) and the digest of their texts.
     """
 
     name: str
@@ -37,6 +39,7 @@ class WorldEntry:
     environments: tuple[str, ...]
     params_name: str
     world_name: str
+    defaults: Mapping[str, Mapping[str, Any]] = field(default_factory=dict, hash=False)
     module: str = ""
     drawn: str = ""
     studied: str = ""
@@ -56,6 +59,14 @@ class WorldEntry:
         from conevo.parameters import checked
 
         return checked(getattr(import_module(self.module), self.params_name), "world")
+
+    def params(self, environment: str, **given: Any) -> Any:
+        """Return the parameters of an environment: those given, and its defaults.
+
+        Raises:
+            UsageError: an unknown parameter, or a value that is not allowed.
+        """
+        return self.params_class(**{**self.defaults.get(environment, {}), **given})
 
     @property
     def world_class(self) -> Any:

@@ -6,12 +6,15 @@ Such a world is named "FILE.py:ENVIRONMENT"; ``conevo.outside`` says what such a
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import is_dataclass
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from conevo.errors import UsageError, unknown_name
 from conevo.outside import entry_of
+from conevo.parameters import WrongValue, checked
 from conevo.worlds.entry import WorldEntry
 
 __all__ = ["load"]
@@ -43,6 +46,26 @@ def _problem(entry: WorldEntry, module: ModuleType) -> str:
         return f"{entry.world_name} has no {', no '.join(missing)}"
     if (name := getattr(made, "name", "")) != entry.name:
         return f"{entry.world_name} is named {name!r}, its entry {entry.name!r}"
+    return _wrong_defaults(entry, params)
+
+
+def _wrong_defaults(entry: WorldEntry, params: Any) -> str:
+    """Return what is wrong with the defaults of an entry's environments, nothing if nothing is."""
+    own: Any = entry.defaults
+    tables = [own, *own.values()] if isinstance(own, Mapping) else [own]
+    if not all(isinstance(one, Mapping) for one in tables):
+        return "its defaults must be a dict of dicts, as in {'dark-1': {'iterations': 500}}"
+    for name, given in own.items():
+        where = f"its defaults of environment {name!r}"
+        if name not in entry.environments:
+            return str(unknown_name("environment", name, entry.environments, "in its defaults"))
+        try:
+            checked(params, "world")(**{str(key): value for key, value in given.items()})
+        except WrongValue as error:
+            if error.key in ("", *given):
+                return f"{where}: {error}"
+        except UsageError as error:
+            return f"{where}: {error}"
     return ""
 
 

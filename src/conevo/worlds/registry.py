@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from conevo.errors import UsageError, unknown_name
 from conevo.worlds.entry import WorldEntry
+from conevo.worlds.rover import rocks
 from conevo.worlds.study import load_study
 
 if TYPE_CHECKING:
@@ -38,9 +39,8 @@ WORLDS: dict[str, WorldEntry] = {
             title="Multi-rover",
             summary="20 rovers detect red rocks that only two of them together can detect",
             source="Nitschke 2009, chapter 5",
-            environments=tuple(
-                f"{kind}-{n}" for kind in ("simple", "complex", "extended") for n in range(1, 11)
-            ),
+            environments=rocks.ENVIRONMENTS,
+            defaults=rocks.DEFAULTS,
             module="conevo.worlds.rover.world",
             drawn="conevo.worlds.rover.drawn",
             params_name="RoverParams",
@@ -209,7 +209,7 @@ def studies() -> dict[str, WorldStudy]:
 
 
 def world(path: str, **params: Any) -> World:
-    """Return the world at a path, with parameters other than its defaults.
+    """Return the world at a path, with parameters other than the defaults of its environment.
 
     The path is one that ``resolve`` knows: "rover/complex-1", or "FILE.py:ENVIRONMENT".
 
@@ -217,4 +217,4 @@ def world(path: str, **params: Any) -> World:
         UsageError: unknown world, environment or parameter, or a value that is not allowed.
     """
     entry, environment = resolve(path)
-    return entry.build(environment, entry.params_class(**params))
+    return entry.build(environment, entry.params(environment, **params))

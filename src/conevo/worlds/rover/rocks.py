@@ -1,4 +1,4 @@
-"""Red rocks: what the five types are worth, and how many of each the 30 environments hold.
+"""Red rocks: what the five types are worth, and how many of each the 40 environments hold.
 
 Nitschke 2009, sections 5.1, 5.4 and table 5.1. The total red rock value of every environment is
 5000 (table 5.4); a simple environment holds only type E, a complex one types A to D. The counts of
@@ -22,15 +22,18 @@ extended-8    no C, the others equal                 714   715     0   714
 extended-9    no D, the others equal                 833   834   833     0
 extended-10   A and D only, equal                   1000     0     0  1000
 ============  ====================================  ====  ====  ====  ====
+
+Choice: ``apart-e`` is not in the thesis. It has the rocks and canals of ``complex-e`` and defaults
+of its own, ``APART``, with which a division of labour pays.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from conevo.errors import unknown_name
 
-__all__ = ["ENVIRONMENTS", "TYPES", "VALUES", "Mix", "layout", "mix"]
+__all__ = ["APART", "DEFAULTS", "ENVIRONMENTS", "TYPES", "VALUES", "Mix", "layout", "mix"]
 
 TYPES = ("A", "B", "C", "D", "E")
 VALUES = (1, 2, 3, 4, 1)  # Nitschke 2009, table 5.1
@@ -64,9 +67,25 @@ _TABLE = (
     {f"simple-{e}": (e, Mix(E=5000)) for e in range(1, 11)}
     | {f"complex-{e}": (e, Mix(500, 500, 500, 500)) for e in range(1, 11)}
     | {f"extended-{e}": (10, counts) for e, counts in enumerate(_EXTENDED, 1)}
+    | {f"apart-{e}": (e, Mix(500, 500, 500, 500)) for e in range(1, 11)}
 )
 
 ENVIRONMENTS = tuple(_TABLE)
+
+# With these settings teams of castes by place pass teams that do everything, before anybody evolves
+# (docs/results/calibration.md); what evolved teams gain there is docs/results/regimes.md.
+APART: dict[str, Any] = {
+    "segregation": 1.0,  # each type has a place: where types are mixed, switchers gain more
+    "starts": "by_robot",  # a population has a place to learn for: from random starts, none
+    "low_range": 0.10,  # the only ranges at which the best blind castes pass the best switchers:
+    "med_range": 0.08,  # with smaller ones nobody finds more than a twentieth of the value, with
+    "hi_range": 0.06,  # larger ones a contact lasts so long that a switcher finds all types in it
+    "low_accuracy": 0.1,  # a contact lasts no longer than a detection takes, so that a specialist
+    "med_accuracy": 0.2,  # is never idle: time with a rock is worth something
+    "hi_accuracy": 0.3,
+    "fitness": "value",  # eq. 5.4 also pays for the area covered, that is, for leaving one's place
+}
+DEFAULTS = {name: APART for name in ENVIRONMENTS if name.startswith("apart-")}
 
 
 def mix(environment: str) -> Mix:

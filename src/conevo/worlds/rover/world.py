@@ -3,7 +3,8 @@
 =============  =========================================================================
 name           ``rover-v2``
 source         Nitschke 2009, chapter 5
-environments   ``simple-1..10``, ``complex-1..10``, ``extended-1..10`` (section 5.1, appendix C)
+environments   ``simple-1..10``, ``complex-1..10``, ``extended-1..10`` (section 5.1, appendix C);
+               ``apart-1..10``, which are ours
 robots         20 rovers, one lander that records what they report
 epoch          2500 iterations
 sensors        8 rover sensors, 8 red rock sensors, one of each for every octant
