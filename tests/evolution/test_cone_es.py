@@ -251,16 +251,33 @@ def test_the_filter_is_that_of_wiener(seed: int) -> None:
         luck=float(rng.uniform(0, 30)),
         age=age,
     )
+    n_genes = 5 * state.active.sum()
     kept, signal = _signal(state, memory)
     measured = likeness / (1 - memory ** (age - 1))
-    lucky = max(0.0, -scipy.linalg.eigvalsh(measured).min())
+    faded = memory**age
+    noise = state.luck / (1 - faded) * 0.1 / 1.9 * (1 + faded) / (1 - faded)
+    lucky = noise * (2 * (n / n_genes) ** 0.5 + n / n_genes) / 2**0.5
     above = measured - lucky * np.eye(n)
     believed = (above + scipy.linalg.sqrtm(above @ above).real) / 2
-    noise = state.luck / (1 - memory**age) * 0.1 / 1.9
     gain = believed @ np.linalg.inv(believed + noise * np.eye(n))
     expected = (gain @ state.directions.reshape(n, -1)).reshape(n, 4, 5)
     np.testing.assert_allclose(kept, expected, atol=1e-6)
     assert signal == pytest.approx(np.linalg.norm(gain, 2), abs=1e-6)
+
+
+@pytest.mark.parametrize("n_robots", [2, 6, 20])
+def test_luck_alone_is_seldom_taken_for_a_signal(n_robots: int) -> None:
+    learner: Any = method("cone-es")
+    state, signals = learner.init(Layout(n_robots, 10, 10, 31), 1), []
+    rng = np.random.default_rng(3)
+    while state.progress.generation < 70:
+        asked, before = learner.ask(state), state.progress.generation
+        fitness = rng.random(asked.teams.shape[:2])
+        state = learner.tell(state, asked, Scores(fitness, fitness))
+        if state.progress.generation > max(before, FIRST):
+            signals.append(state.progress.numbers["individual_signal"])
+    assert np.mean(np.array(signals) > learner.config.signal) < 0.1
+    assert rms(state.deviations) < 0.01
 
 
 # --- the team decides -----------------------------------------------------------------------------

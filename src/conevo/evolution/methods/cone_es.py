@@ -45,7 +45,7 @@ from conevo.rng import stream
 __all__ = ["ConeEs", "ConeEsConfig", "ConeEsState", "HomEsConfig"]
 
 FIRST = 4  # generations of directions before they are compared
-GROWTH = 1.1  # of the share, in a generation with a signal; its inverse without
+GROWTH, DECLINE = 1.1, 0.98  # of the share, in a generation with a signal and without
 TRUST = 0.8  # memory of what deviations are worth to the team
 
 
@@ -178,7 +178,7 @@ class ConeEs:
             likeness=np.zeros((robots, robots)),
             luck=0.0,
             age=0,
-            share=self.config.individual,
+            share=self.config.individual if robots > 1 else 0.0,
             worth=0.0,
             best=np.zeros(2 * self.config.pairs // self.config.rounds, dtype=np.int32),
         )
@@ -255,7 +255,7 @@ class ConeEs:
         centre = state.mean + config.step * direction / _size(direction, state.active)
         state = replace(state, phase="fittest", direction=direction)
         deviations = state.deviations
-        if config.individual:
+        if config.individual and n_robots > 1:
             gains = self._gains(credit)[self._is_own(state)]
             found: FloatArray = np.einsum("nr,nrug->rug", gains, own) / config.pairs
             state = self._remember(state, found - found.mean(axis=0))
@@ -264,7 +264,7 @@ class ConeEs:
             deviations = deviations + config.individual_step * kept / size
             if state.age > FIRST:
                 grows = signal > config.signal
-                share = state.share * GROWTH if grows else state.share / GROWTH
+                share = state.share * (GROWTH if grows else DECLINE)
                 state = replace(state, share=float(np.clip(share, config.individual_least, 1.0)))
             numbers = {"individual_share": state.share, "individual_signal": signal}
             state = replace(state, progress=state.progress.with_numbers(**numbers))
@@ -388,17 +388,21 @@ def _size(directions: FloatArray, active: BoolArray) -> float:
 def _signal(state: ConeEsState, memory: float) -> tuple[FloatArray, float]:
     """Return what of the robots' directions [R, U, G] is signal, and the largest portion of it.
 
-    A Wiener filter over robots. Without any signal the products of different generations are as
-    often negative as positive, and so are their eigenvalues: none above the size of the smallest
-    is believed, and the others count as much as they exceed it.
+    A Wiener filter over robots. Without any signal the eigenvalues of ``likeness`` lie between two
+    edges, which Marchenko and Pastur 1967 give for products of R rows of so many genes; weighted as
+    here, they are narrower by the root of 2. What is above the upper edge is believed, and counts
+    as much as it exceeds it.
     """
     directions = state.directions
     if state.age <= FIRST:
         return np.zeros_like(directions), 0.0
-    full = 1 - memory**state.age
+    faded = memory**state.age  # averages are of few generations at first, and noisier
     values, vectors = np.linalg.eigh(state.likeness / (1 - memory ** (state.age - 1)))
-    believed = np.maximum(values - max(-values[0], 0.0), 0.0)
-    noise = state.luck / full * (1 - memory) / (1 + memory)
+    luck = state.luck / (1 - faded)
+    noise = luck * (1 - memory) / (1 + memory) * (1 + faded) / (1 - faded)
+    rows_per_gene = len(directions) / max(state.active.sum() * directions.shape[2], 1)
+    edge = noise * ((1 + np.sqrt(rows_per_gene)) ** 2 - 1) / np.sqrt(2)
+    believed = np.maximum(values - edge, 0.0)
     portion = believed / (believed + noise + 1e-30)
     kept = np.einsum("rk,k,sk,sug->rug", vectors, portion, vectors, directions)
     return kept, float(portion.max())
