@@ -88,6 +88,6 @@ def test_nothing_is_said_of_castes_before_the_first_generation_has_ended(tables)
 
 def test_castes_are_drawn_from_zero_on_an_axis_that_begins_empty(tables, tmp_path) -> None:
     (scope,) = scopes(tables)
-    figure, _ = castes(scope, read_histories(tables, scope.group)).exhibits
+    figure, *_ = castes(scope, read_histories(tables, scope.group)).exhibits
     assert min(row["evaluations"] for row in figure.rows) >= 10  # the first generation's end
     assert all(np.isfinite(row["share"]) for row in figure.rows)
