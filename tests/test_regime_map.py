@@ -21,6 +21,7 @@ import regime_map  # noqa: E402
 from regime_cells import apart, cells_of, judge, threshold, trends_of  # noqa: E402
 from regime_tables import PAGE_PARTS, judged  # noqa: E402
 
+PAGE = ROOT / "docs" / "results" / "regimes.md"
 REGIME = {
     "ranges": "medium", "accuracies": "low", "starts": "by_robot", "iterations": 1250,
     "low_range": 0.1, "med_range": 0.08, "hi_range": 0.06,
@@ -228,3 +229,10 @@ def test_bad_arguments_are_one_line(arguments, line, capsys, tmp_path, monkeypat
     said = capsys.readouterr().err
     assert line in said.splitlines()[-1]
     assert "Traceback" not in said
+
+
+def test_the_page_s_tables_are_those_of_its_numbers():
+    text = PAGE.read_text()
+    cells = cells_of(pages.read(PAGE.with_suffix(".csv")))
+    for name, make in PAGE_PARTS.items():
+        assert f"<!-- {name} -->\n{make(cells)}<!-- end -->" in text, name
