@@ -47,7 +47,7 @@ def _has_sizes(preset, world, method):
     """Whether a preset says anything about a method, or its family, in a world or in any."""
     tables = tomllib.loads(_preset_text(preset))
     methods = {name for part in (world, "any") for name in tables.get(part, {}).get("method", {})}
-    return method in methods or method.split("-")[0] in methods
+    return method in methods or METHODS[method].family in methods
 
 
 def _preset_text(preset):

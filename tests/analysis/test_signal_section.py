@@ -55,7 +55,7 @@ def test_comparisons_with_a_blind_method_say_so(folder) -> None:
     told = {frozenset((r["first"], r["second"])): r["verdict"] for r in table.rows}
     for pair, verdict in told.items():
         assert verdict.endswith(", no signal") == ("Multi-Agent ESP" in pair)
-    assert "No signal: fitness told a method next to nothing" in table.note
+    assert "No signal: selection among a method's genotypes was nearly blind" in table.note
     assert "(reliability below 0.05 at first" in section.text[-1]
 
 

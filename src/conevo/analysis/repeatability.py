@@ -34,7 +34,7 @@ Mask = npt.NDArray[np.bool_]
 ENOUGH_POPULATIONS = 10
 
 LEAST_RELIABILITY = 0.05
-"""Below it a fitness tells next to nothing about genotypes; see ``has_signal``."""
+"""Below it selection among genotypes is nearly blind; see ``has_signal``."""
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,8 @@ PLACE = "on the command line"
 SETTINGS = (
     click.option(
         "--method", metavar="NAME",
-        help="cone (default), mesp, ccga, hetcne, homcne, cone-1..3, or FILE.py:NAME.",
+        help="cone (default), mesp, ccga, hetcne, homcne, cone-1..3, cone-es, hom-es, or "
+        "FILE.py:NAME.",
     ),
     click.option(
         "--preset", metavar="NAME", help="smoke (seconds), desk (minutes, default), night, thesis."

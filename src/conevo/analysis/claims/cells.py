@@ -8,7 +8,7 @@ thesis, and by Mann-Whitney with Holm's correction over all comparisons of the c
   the range that the claim comes to, is contradicted if it lies outside, and else stays open.
 - Choice: a statement about CONE is not tested by runs in which it hardly exchanged anything between
   its populations: there it is Multi-Agent ESP with type C fitness.
-- Choice: nor is a statement about a method whose fitness told next to nothing about genotypes, so
+- Choice: nor is a statement about a method whose fitness had next to no signal of genotypes, so
   that it selected by luck; where runs have a study of it (``repeatability.has_signal``).
 - Choice: a statement about several environments together says nothing until all have runs.
 """

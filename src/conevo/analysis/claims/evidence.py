@@ -57,7 +57,7 @@ class Gathered:
 
     @property
     def is_blind(self) -> bool:
-        """Whether fitness told a sample's methods next to nothing about their genotypes."""
+        """Whether selection by a sample's methods was nearly blind."""
         return self.reliability is not None and not has_signal(self.reliability)
 
     @property

@@ -272,7 +272,7 @@ ROVER: tuple[Claim, ...] = (
             Part(above("area", EXTENDED[2:3], ("mesp",), ("homcne",))),
             Part(above("area", EXTENDED[6:8], ("mesp",), ("hetcne",))),
         ),
-        caution="left out: CCGA and MESP differ in 1, 3, 5, 7, 10, but which is above is not told; "
+        caution="left out: CCGA and MESP differ in 1, 3, 5, 7, 10, but not which is above; "
         "and a second environment of MESP and HomCNE, which is lost",
     ),
     Claim(

@@ -4,7 +4,7 @@ Nitschke 2009, sections 4.2, 5.3.2 and 6.3.2. A claim about it is judged at each
 levels by itself.
 
 - Choice: unchanged is the middle one of a setting's levels in the campaign, by size; a factor with
-  another number of levels than three, or of levels that are no numbers, has none.
+  another number of levels than three, or of levels that are not numbers, has none.
 - Choice: what a run changes is compared with the run of the same seed at the unchanged levels, as a
   share of the mean of those: the mean of these shares is that by which the means differ.
 - Choice: levels further away than the thesis changed a setting say nothing: a fifth, but in the
@@ -29,7 +29,7 @@ Usual = Mapping[str, float]  # factor -> its unchanged level
 
 
 def changed(tables: Tables) -> dict[str, float]:
-    """Return by which share of the unchanged runs' mean a run differs, of runs that may be told."""
+    """Return by which share of the unchanged runs' mean a run differs, of those that count."""
     groups: dict[tuple[str, ...], list[Value]] = defaultdict(list)
     for one in tables.values():
         groups[one.world, one.preset, one.environment, one.method].append(one)
@@ -51,7 +51,7 @@ def _shares(group: list[Value]) -> dict[str, float]:
     return {
         one.run: (one.value - unchanged[one.seed]) / abs(mean)
         for one in group
-        if mean and one.seed in unchanged and _is_told(levels[one.variant], usual, is_rover)
+        if mean and one.seed in unchanged and _counts(levels[one.variant], usual, is_rover)
     }
 
 
@@ -69,7 +69,7 @@ def _usual(every: list[dict[str, str]]) -> Usual:
     return {name: sorted(of)[1] for name, of in found.items()}
 
 
-def _is_told(levels: Mapping[str, str], usual: Usual, is_rover: bool) -> bool:
+def _counts(levels: Mapping[str, str], usual: Usual, is_rover: bool) -> bool:
     """Whether something is changed, and nothing by more than the thesis changed it."""
     far = {name: _far(level, usual[name]) for name, level in levels.items()}
     return any(far.values()) and all(

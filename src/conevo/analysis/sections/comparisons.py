@@ -36,7 +36,7 @@ __all__ = ["comparisons"]
 NO_EXCHANGE, NO_SIGNAL = "no exchange", "no signal"
 NOTES = {
     NO_EXCHANGE: "No exchange: CONE hardly recombined between populations there.",
-    NO_SIGNAL: "No signal: fitness told a method next to nothing about genotypes there.",
+    NO_SIGNAL: "No signal: selection among a method's genotypes was nearly blind there.",
 }
 MOST_ROWS = 28  # of a drawing: eight methods
 
@@ -77,7 +77,7 @@ def comparisons(scope: Scope) -> Section | None:
     if blind := blind_cells(scope):
         names = " and ".join(sorted({cell.treatment.title for cell in blind}))
         text.append(
-            f"Fitness told {names} next to nothing about genotypes in {counted(len(blind), 'cell')}"
+            f"Selection by {names} was nearly blind in {counted(len(blind), 'cell')}"
             f" (reliability below {LEAST_RELIABILITY} at first, section Signal). Comparisons of "
             "these cells do not test the methods."
         )

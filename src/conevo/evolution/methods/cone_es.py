@@ -7,7 +7,7 @@ perturbed, the other perturbed the opposite way; as Salimans, Ho, Chen, Sidor an
 fitness counts by rank among the teams of a round.
 
 - Shared part: every robot of a team has the same perturbation, and the team's fitness says which
-  way the mean steps. A team of twenty tells it twenty times better than a robot of its own could.
+  way the mean steps.
 - Individual part: in a ``share`` of the pairs every robot has a perturbation of its own on top, and
   its own fitness says which way it would go. That is mostly luck. What is not luck comes again: the
   products of directions of different generations, [R, R], are not biased by it. Their eigenvectors
@@ -51,7 +51,10 @@ TRUST = 0.8  # memory of what deviations are worth to the team
 
 @parameters("method")
 class ConeEsConfig:
-    """Parameters of CONE-ES. Choice: all values are by experiment, none is tuned to a world."""
+    """Parameters of CONE-ES.
+
+    Choice: all values are by a few trials in the multi-rover world, none by a search.
+    """
 
     pairs: Annotated[int, Ge(2), Le(1_000_000)] = 50
     """mirrored pairs of teams in a generation."""
