@@ -58,6 +58,7 @@ READERS: dict[str, tuple[str, ...]] = {
     "tiny/tables/runs.parquet": CAMPAIGN,
     "tiny/ENDED": CAMPAIGN,
     "tiny/STUDY": ("NOTABLES report tiny", *CAMPAIGN),
+    "tiny/SIGNAL": ("NOTABLES report tiny", *CAMPAIGN),
     "tiny/RUN/test.json": ("NOTABLES report tiny", *CAMPAIGN),
     "tiny/RUN/provenance.json": ("NOTABLES report tiny", *CAMPAIGN),
     "tiny/RUN/generations.jsonl": ("NOTABLES report tiny", *CAMPAIGN),
@@ -81,7 +82,7 @@ def build(folder: Path) -> None:
     tasks = [TASK, "rover/complex-2"]
     shaped = start_shaping(tasks, "homcne", "smoke", 1, folder / "shaped", settings, threads=1)
     shaped.resume(threads=1)
-    campaign = tiny_campaign(folder, 'studies = ["teams"]')
+    campaign = tiny_campaign(folder, 'studies = ["teams", "signal"]')
     campaign.carry_on(Serial(1))
     report = campaign.places.report
     report.mkdir()
@@ -100,6 +101,7 @@ def find(folder: Path, name: str) -> Path:
     name = name.replace("RUN/", f"runs/{runs[0].name}/") if name.startswith("tiny/") else name
     for short, pattern in (
         ("CHECKPOINT", "checkpoint-?.npz"), ("ENDED", "ended/*.json"), ("STUDY", "studies/*.json"),
+        ("SIGNAL", "studies/signal/*.json"),
     ):  # fmt: skip
         if name.endswith(short):
             return sorted(folder.glob(name.replace(short, pattern)))[-1]
