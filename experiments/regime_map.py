@@ -20,23 +20,19 @@ import numpy as np
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "docs"))
 from conevo.analysis.frames import Tables
-from conevo.campaigns.campaign import Campaign
 from conevo.campaigns.plan import PlannedRun
 from conevo.cli.find import find_campaign, sealed
 from conevo.errors import ConevoError, UsageError
 from conevo.runs.records import own_numbers
 from conevo.runs.run import Run
 from incentives import OF_REGION
-from pages import Row, put, read, table, write
+from pages import Row, put, read, write
+from provenance import made_with
 from regime_cells import CLONES, INDIVIDUAL, REGIONS, cells_of, used
 from regime_figure import draw
 from regime_tables import PAGE_PARTS
 
 SETTINGS = ("low", "med", "hi")
-PROVENANCE = {
-    "conevo": "conevo", "kernel": "kernel_hash", "Warp": "warp", "numpy": "numpy",
-    "Python": "python", "processor": "cpu",
-}  # fmt: skip
 
 
 def regime_of(planned: PlannedRun) -> Row:
@@ -122,27 +118,6 @@ def _castes(tables: Tables) -> dict[str, Row]:
         | ({"in place": float(np.mean(fits[run]))} if run in fits else {})
         for run, of in counts.items()
     }
-
-
-def made_with(campaign: Campaign, rows: Sequence[Row]) -> str:
-    """Return what was run and what it cost: seeds, budget, versions, machine, time."""
-    standing = campaign.standings()
-    done = [label for label, entry in standing.items() if entry.state == "finished"]
-    about = [Run(campaign.places.run(label)).provenance for label in done]
-    each = {title: sorted({str(one[key]) for one in about}) for title, key in PROVENANCE.items()}
-    worlds = sorted({one["world"]["name"] for one in about})
-    seeds = sorted({int(row["seed"]) for row in rows})
-    spent = [int(row["evaluations"]) for row in rows]
-    lines = [
-        ["runs finished, of those planned", f"{len(done)} of {len(standing)}"],
-        ["seeds", ", ".join(map(str, seeds))],
-        ["team evaluations of a run", f"{min(spent):,} to {max(spent):,}"],
-        ["team-steps", f"{sum(row['team_steps'] for row in rows) / 1e9:.2f} x 10^9"],
-        ["core seconds, tests and studies too", f"{sum(row['core_seconds'] for row in rows):,.0f}"],
-        ["worlds", ", ".join(worlds)],
-        *([key, ", ".join(values)] for key, values in each.items()),
-    ]
-    return table(["", ""], lines)
 
 
 def write_page(rows: list[Row], page: Path) -> None:

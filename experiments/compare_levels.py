@@ -1,0 +1,198 @@
+"""Compare the levels of one factor of a campaign with its baseline, cell by cell.
+
+    python experiments/compare_levels.py CAMPAIGN --baseline credit=equation --write PAGE
+
+Runs whose FACTOR is the baseline's level are what the others are compared with, wherever all other
+factors agree that both have: with ``credit=equation`` each credit within each method and range,
+with ``method=mesp`` each form of exchange of CONE within each world. With ``--write`` a row per run
+goes to the CSV file next to the page and the tables between the page's markers; ``--again`` makes
+the tables from the CSV file. Several ``--baseline`` give a table each, ``<!-- BASELINE -->``.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+sys.path.append(str(Path(__file__).resolve().parents[1] / "docs"))
+from conevo.analysis.frames import Tables
+from conevo.analysis.statistics import compare, holm
+from conevo.cli.find import find_campaign, sealed
+from conevo.errors import ConevoError, UsageError
+from conevo.evolution.methods.registry import title_of
+from pages import Row, put, read, table, write
+from provenance import made_with
+from regime_tables import interval, number, percent
+
+COST = ("evaluations", "team_steps", "core_seconds", "exchanges")
+SIGNAL = ("icc", "reliability")  # of generation 0's units on trial: of a trial, of the scheme
+FACTS = {"seed", "value", "first", *COST, *SIGNAL}
+
+
+def rows_and_cost(name: str) -> tuple[list[Row], str]:
+    """Return a row per finished run of a campaign: its levels, value and cost; and what was run.
+
+    Raises:
+        UsageError: there is no such campaign, or none of its runs is finished.
+    """
+    campaign = find_campaign(name)
+    with sealed(campaign) as folder, Tables(folder) as tables:
+        first = {one.run: one.value for one in tables.values(team="generation 0")}
+        sql = f"SELECT run, {', '.join(COST)} FROM runs"
+        spent = {run: rest for run, *rest in tables.query(sql)[1]}
+        sql = "SELECT run, any_value(icc), any_value(icc_of_scheme) FROM signal"
+        sql += " WHERE generation = 'first' GROUP BY run HAVING count(*) = 1"
+        signal = {run: rest for run, *rest in tables.query(sql)[1]}
+        rows: list[Row] = []
+        for one in tables.values():
+            levels = dict(part.partition("=")[::2] for part in one.variant.split(", ") if part)
+            row: Row = {"task": one.task, "method": one.method, **levels, "seed": one.seed}
+            row |= {"value": one.value, "first": first.get(one.run)}
+            row |= dict(zip(COST, spent[one.run], strict=True))
+            row |= dict(zip(SIGNAL, signal.get(one.run, (None, None)), strict=True))
+            rows.append(row)
+    if not rows:
+        raise UsageError(f"{campaign.path} has no finished run")
+    return rows, made_with(campaign, rows)
+
+
+def factors_of(row: Row) -> dict[str, str]:
+    """Return the levels of a run."""
+    return {key: _level(one) for key, one in row.items() if key not in FACTS}
+
+
+def groups(rows: Sequence[Row], factor: str, level: str) -> Iterator[tuple[Any, ...]]:
+    """Yield what is compared: shared levels, name of the rest, its runs, runs of the baseline."""
+    baseline = [row for row in rows if factors_of(row).get(factor) == level]
+    if not baseline:
+        levels = sorted({_level(row[factor]) for row in rows if factor in row})
+        raise UsageError(f"no run has {factor}={level}; levels: {', '.join(levels) or 'none'}")
+    shared = [key for key in factors_of(baseline[0]) if key != factor]
+    cells: dict[tuple[str, ...], dict[str, list[Row]]] = {}
+    for row in rows:
+        of = factors_of(row)
+        if of.get(factor, level) == level or not set(shared) <= of.keys():
+            continue
+        own = {key: title_of(one) if key == "method" else one for key, one in of.items()}
+        rest = ", ".join(own[key] for key in of if key not in shared)
+        cells.setdefault(tuple(of[key] for key in shared), {}).setdefault(rest, []).append(row)
+    for at, others in cells.items():
+        wanted = dict(zip(shared, at, strict=True))
+        same = [row for row in baseline if wanted.items() <= factors_of(row).items()]
+        if same:
+            yield from ((wanted, rest, runs, same) for rest, runs in others.items())
+
+
+def mean(runs: Sequence[Row], of: str) -> float | None:
+    """Return the mean of what runs have of a column, None if none has it."""
+    found = [float(row[of]) for row in runs if row.get(of) is not None]
+    return float(np.mean(found)) if found else None
+
+
+def comparison_table(rows: Sequence[Row], factor: str, level: str) -> str:
+    """Return every level next to the baseline: values, difference, its interval, seeds above."""
+    found = list(groups(rows, factor, level))
+    values = [
+        ([float(row["value"]) for row in runs], [float(row["value"]) for row in same])
+        for _, _, runs, same in found
+    ]
+    compared = [compare(a, b) for a, b in values]
+    corrected = holm([one.p_welch for one in compared])
+    hidden = {key for key in found[0][0] if len({one[0][key] for one in found}) == 1}
+    keys = [key for key in found[0][0] if key not in hidden]
+    title = title_of(level) if factor == "method" else level
+    head = [*keys, factor if factor != "method" else "compared", "n of both", f"{title} (sd)"]
+    head += ["value (sd)", "difference", "95 % interval", "of the baseline's", "p, Holm"]
+    head += ["seeds above", "exchanges"] if mean(rows, "exchanges") else ["seeds above"]
+    lines = []
+    for (levels, rest, runs, same), one, p in zip(found, compared, corrected, strict=True):
+        by_seed = {row["seed"]: float(row["value"]) for row in same}
+        pairs = [(float(r["value"]), by_seed[r["seed"]]) for r in runs if r["seed"] in by_seed]
+        base = one.mean_b or 1.0
+        line = [title_of(levels[key]) if key == "method" else levels[key] for key in keys]
+        line += [rest, f"{one.n_a}, {one.n_b}", _spread(one.mean_b, one.sd_b)]
+        line += [_spread(one.mean_a, one.sd_a), number(one.difference, "+.0f")]
+        line += [interval(one.low, one.high, "+.0f"), percent((one.difference or 0.0) / base)]
+        line += [number(p, ".3f"), f"{sum(a > b for a, b in pairs)} of {len(pairs)}"]
+        lines.append(line + [number(mean(runs, "exchanges"), ".3g")] * (len(head) > len(line)))
+    clear = [one for one in compared if one.low is not None and one.high is not None]
+    up = sum(one.low > 0 for one in clear if one.low is not None)
+    down = sum(one.high < 0 for one in clear if one.high is not None)
+    tail = (
+        f"{len(compared)} rows, {len(clear)} with an interval; it lies above 0 in {up}, below in "
+        f"{down}. If nothing differed, about {0.05 * len(clear):.1f} would exclude it.\n"
+    )
+    return f"{table(head, lines)}\n{tail}"
+
+
+def signal_table(rows: Sequence[Row]) -> str:
+    """Return the signal of generation 0 in each cell: of one trial, and of a generation's."""
+    cells: dict[tuple[str, ...], list[Row]] = {}
+    each = [factors_of(row) for row in rows]
+    names = [key for key in each[0] if len({of.get(key) for of in each}) > 1]
+    for row, of in zip(rows, each, strict=True):
+        if row.get("icc") is not None:
+            cells.setdefault(tuple(of.get(key, "–") for key in names), []).append(row)
+    lines = [
+        [
+            *(title_of(v) if k == "method" else v for k, v in zip(names, cell, strict=True)),
+            len(runs),
+            number(mean(runs, "icc"), ".4f"),
+            number(mean(runs, "reliability"), ".3f"),
+        ]
+        for cell, runs in cells.items()
+    ]
+    return table([*names, "runs", "of a trial", "of all trials of a generation"], lines)
+
+
+def _level(of: object) -> str:
+    return f"{of:g}" if isinstance(of, float) else str(of)
+
+
+def _spread(centre: float | None, sd: float | None) -> str:
+    return f"{number(centre, '.0f')} ({number(sd, '.0f')})"
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Make the tables."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("campaign", nargs="?", help="directory, or name in campaigns/")
+    parser.add_argument("--baseline", action="append", required=True, metavar="FACTOR=LEVEL")
+    parser.add_argument("--write", type=Path, help="page whose tables are replaced")
+    parser.add_argument("--again", action="store_true", help="from the CSV file, not a campaign")
+    args = parser.parse_args(arguments)
+    page: Path | None = args.write
+    if page and not page.is_file():
+        parser.error(f"--write {page}: there is no such page")
+    if args.again != (args.campaign is None) or (args.again and page is None):
+        parser.error("name a CAMPAIGN, or --again with --write PAGE, whose CSV file is read")
+    try:
+        if args.again:
+            rows = read(page.with_suffix(".csv"))
+        else:
+            rows, cost = rows_and_cost(args.campaign)
+            print(cost)
+            if page:
+                put(cost, page, "cost")
+                write(rows, page.with_suffix(".csv"))
+                rows = read(
+                    page.with_suffix(".csv")
+                )  # rounded as whoever makes them again finds them
+        parts = {one: comparison_table(rows, *one.split("=", 1)) for one in args.baseline}
+    except (ConevoError, OSError) as error:
+        parser.error(str(error))
+    if any(row.get("icc") is not None for row in rows):
+        parts["signal"] = signal_table(rows)
+    for name, text in parts.items():
+        print(f"{name}\n\n{text}")
+        if page:
+            put(text, page, name)
+
+
+if __name__ == "__main__":
+    main()

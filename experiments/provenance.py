@@ -1,0 +1,37 @@
+"""What a campaign's page says of its making: what was run, what it cost, with what."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from conevo.campaigns.campaign import Campaign
+from conevo.runs.run import Run
+from pages import Row, table
+
+__all__ = ["made_with"]
+
+PROVENANCE = {
+    "conevo": "conevo", "kernel": "kernel_hash", "Warp": "warp", "numpy": "numpy",
+    "Python": "python", "processor": "cpu",
+}  # fmt: skip
+
+
+def made_with(campaign: Campaign, rows: Sequence[Row]) -> str:
+    """Return what was run and what it cost: seeds, budget, versions, machine, time."""
+    standing = campaign.standings()
+    done = [label for label, entry in standing.items() if entry.state == "finished"]
+    about = [Run(campaign.places.run(label)).provenance for label in done]
+    each = {title: sorted({str(one[key]) for one in about}) for title, key in PROVENANCE.items()}
+    worlds = sorted({one["world"]["name"] for one in about})
+    seeds = sorted({int(row["seed"]) for row in rows})
+    spent = [int(row["evaluations"]) for row in rows]
+    lines = [
+        ["runs finished, of those planned", f"{len(done)} of {len(standing)}"],
+        ["seeds", ", ".join(map(str, seeds))],
+        ["team evaluations of a run", f"{min(spent):,} to {max(spent):,}"],
+        ["team-steps", f"{sum(row['team_steps'] for row in rows) / 1e9:.2f} x 10^9"],
+        ["core seconds, tests and studies too", f"{sum(row['core_seconds'] for row in rows):,.0f}"],
+        ["worlds", ", ".join(worlds)],
+        *([key, ", ".join(values)] for key, values in each.items()),
+    ]
+    return table(["", ""], lines)

@@ -1,0 +1,73 @@
+"""The tables that compare the levels of a factor: what is next to what, by hand."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path += [str(ROOT / "experiments"), str(ROOT / "docs")]  # scripts import what they share
+
+from compare_levels import comparison_table, groups, main, signal_table  # noqa: E402
+from conevo.errors import UsageError  # noqa: E402
+from pages import write  # noqa: E402
+
+
+def row(method, seed, value, **levels):
+    """Return a run."""
+    cost = {"evaluations": 100, "team_steps": 100, "core_seconds": 1.0, "exchanges": 0.0}
+    facts = {"seed": seed, "value": value, "first": 1.0, "icc": None, "reliability": None}
+    return {"task": "rover-v2/complex-5", "method": method, **levels, **facts, **cost}
+
+
+CREDIT = [
+    row(method, seed, value + seed, credit=credit)
+    for method, credit, value in (
+        ("ccga", "equation", 100.0), ("ccga", "value", 120.0),
+        ("mesp", "equation", 50.0), ("mesp", "value", 40.0),
+    )
+    for seed in (1, 2)
+]  # fmt: skip
+
+
+def lines(text):
+    """Return the cells of a table's rows."""
+    rows = [line for line in text.splitlines() if line.startswith("| ")][1:]
+    return [[cell.strip() for cell in line.split("|")[1:-1]] for line in rows]
+
+
+def test_a_level_is_compared_with_the_baseline_where_all_else_agrees():
+    ccga, mesp = lines(comparison_table(CREDIT, "credit", "equation"))
+    assert ccga[:6] == ["CCGA", "value", "2, 2", "102 (1)", "122 (1)", "+20"]
+    assert mesp[:6] == ["Multi-Agent ESP", "value", "2, 2", "52 (1)", "42 (1)", "−10"]
+    assert (ccga[7], ccga[9]) == ("+19.7 %", "2 of 2")
+    assert (mesp[7], mesp[9]) == ("−19.4 %", "0 of 2")
+
+
+def test_levels_that_the_baseline_lacks_name_what_is_compared():
+    rows = [row("mesp", 1, 10.0, places="mixed"), row("mesp", 1, 20.0, places="apart")]
+    rows += [row("cone", 1, 30.0, places="apart", exchange=one) for one in ("some", "all")]
+    found = list(groups(rows, "method", "mesp"))
+    assert [(at["places"], rest) for at, rest, _, _ in found] == [
+        ("apart", "CONE, some"),
+        ("apart", "CONE, all"),
+    ]
+    assert all([one["value"] for one in same] == [20.0] for _, _, _, same in found)
+
+
+def test_a_level_that_is_not_there_is_one_line():
+    with pytest.raises(UsageError, match=r"no run has credit=vaule; levels: equation, value"):
+        list(groups(CREDIT, "credit", "vaule"))
+
+
+def test_signal_is_a_mean_over_runs():
+    rows = [one | {"icc": 0.1 * one["seed"], "reliability": 0.5} for one in CREDIT]
+    assert lines(signal_table(rows))[0] == ["CCGA", "equation", "2", "0.1500", "0.500"]
+
+
+def test_a_page_is_made_again_from_its_numbers(tmp_path):
+    page = tmp_path / "credit.md"
+    page.write_text("# Page\n\n<!-- credit=equation -->\n<!-- end -->\n")
+    write(CREDIT, page.with_suffix(".csv"))
+    main(["--again", "--baseline", "credit=equation", "--write", str(page)])
+    assert lines(page.read_text()) == lines(comparison_table(CREDIT, "credit", "equation"))
