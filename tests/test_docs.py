@@ -117,11 +117,11 @@ def test_a_run_can_be_drawn_and_shows_the_rocks_it_detected(tmp_path):
     values = run.test_result["champion"]["performance"]["value"]["values"]
     middle = draw_run.median_scenario(run)
     assert values[middle] == sorted(values)[1]
-    scene, x, _, castes, detected, value = draw_run.replay(run, middle)
+    scene, x, _, favourites, detected, value = draw_run.replay(run, middle)
     assert value == values[middle] > 0
     assert scene.rock_value[0, detected].sum() >= value  # the last iteration's are not recorded
-    assert x.shape == (run.config.world_params.iterations, len(castes))
-    draw_run.draw(run, tmp_path / "run.png")
+    assert x.shape == (run.config.world_params.iterations, len(favourites))
+    draw_run.draw([run, run], tmp_path / "run.png")
     with Image.open(tmp_path / "run.png") as picture:
         assert picture.width > picture.height > 500
         assert len(picture.convert("RGB").getcolors(2**20)) > 50
