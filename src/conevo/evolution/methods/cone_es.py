@@ -67,10 +67,10 @@ class ConeEsConfig:
     """root mean square of the mean's step in a generation, in gene units."""
     memory: Annotated[float, Ge(0), Le(0.999)] = 0.8
     """share of the direction before that the next step keeps."""
-    individual: Annotated[float, Ge(0), Le(1)] = 0.5
+    individual: Annotated[float, Ge(0), Le(1)] = 0.75
     """share of the pairs in which robots have perturbations of their own, at the start; it is
     regulated. 0 switches all that is individual off."""
-    individual_least: Annotated[float, Gt(0), Le(1)] = 0.2
+    individual_least: Annotated[float, Gt(0), Le(1)] = 0.5
     """the least that this share shrinks to."""
     individual_step: Annotated[float, Ge(0), Le(1)] = 0.02
     """root mean square of the deviations' step, in gene units, if all of it were signal."""
