@@ -10,7 +10,8 @@ from importlib import import_module, resources
 from pathlib import Path
 
 from conevo import METHODS, WORLDS
-from conevo.runs.config import PRESETS, resolve
+from conevo.runs.config import resolve
+from conevo.runs.layers import PRESETS
 from conevo.runs.settings import declared, preset_purpose
 from conevo.worlds.gacc.plans import TYPES
 from conevo.worlds.gacc.world import GaccParams, GaccWorld

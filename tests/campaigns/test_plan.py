@@ -6,7 +6,7 @@ import pytest
 from campaigns.plans import write_plan
 from conevo.campaigns.plan_file import preset_names, read_plan, read_preset
 from conevo.errors import EnvironmentFailure, UsageError
-from conevo.runs.config import PRESETS
+from conevo.runs.layers import PRESETS
 
 SCALES = ("smoke", "thesis")
 

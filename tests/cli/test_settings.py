@@ -12,7 +12,8 @@ import pytest
 import conevo
 from conevo.controllers.registry import CONTROLLERS
 from conevo.evolution.methods.registry import METHODS
-from conevo.runs.config import PRESETS, resolve
+from conevo.runs.config import resolve
+from conevo.runs.layers import PRESETS
 from conevo.runs.settings import RunSettings, declared
 from runs.tiny import command
 

@@ -29,6 +29,7 @@ NOT_DECIDING = {
     "conevo.reading",
     "conevo.runs",
     "conevo.runs.config",
+    "conevo.runs.layers",
     "conevo.runs.outline",
     "conevo.runs.settings",
     "conevo.terms",

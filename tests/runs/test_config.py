@@ -11,7 +11,8 @@ import pytest
 from conevo.errors import EnvironmentFailure, UsageError
 from conevo.evolution.methods.registry import METHODS
 from conevo.runs.assignments import parse_assignment
-from conevo.runs.config import PRESETS, resolve
+from conevo.runs.config import resolve
+from conevo.runs.layers import PRESETS
 from conevo.runs.settings import RunSettings
 from conevo.worlds.registry import WORLDS
 

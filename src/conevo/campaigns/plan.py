@@ -23,8 +23,9 @@ from conevo.errors import UsageError, unknown_name
 from conevo.evolution.inheritance import refuse_idle
 from conevo.evolution.methods.registry import MethodEntry, name_in
 from conevo.evolution.methods.registry import resolve as resolve_method
-from conevo.runs.config import IN_FILES, PRESETS, RunConfig
+from conevo.runs.config import IN_FILES, RunConfig
 from conevo.runs.first import FIRST, SHARE, resolve_stages, take_first, without_method
+from conevo.runs.layers import PRESETS
 from conevo.runs.shaping import tasks_up_to
 from conevo.worlds.registry import WorldEntry
 from conevo.worlds.registry import resolve as resolve_world

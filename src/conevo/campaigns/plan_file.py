@@ -51,8 +51,8 @@ from conevo.campaigns.plan import MOST_SEEDS, Plan, Where
 from conevo.errors import UsageError, shown, unknown_name
 from conevo.evolution.methods.registry import METHODS
 from conevo.reading import parse_toml, read_toml
-from conevo.runs.config import PRESETS
 from conevo.runs.first import FIRST
+from conevo.runs.layers import PRESETS
 from conevo.worlds.registry import resolve as resolve_world
 
 __all__ = ["STUDIES", "preset_names", "read_plan", "read_preset"]

@@ -16,8 +16,9 @@ import click
 from conevo.cli.summary import title
 from conevo.cli.text import count, table
 from conevo.errors import UsageError
-from conevo.runs.config import PRESETS, RunConfig, resolve
+from conevo.runs.config import RunConfig, resolve
 from conevo.runs.lab import price_of
+from conevo.runs.layers import PRESETS
 from conevo.runs.settings import preset_purpose, settings_of
 from conevo.terms import counted
 

@@ -27,32 +27,31 @@ The world may be one in a file of its own, ``world = "FILE.py:ENVIRONMENT"``, an
 ``method = "FILE.py:NAME"``; ``world_digest`` and ``method_digest`` next to them are checked when
 they are given. A file is named from the folder of the configuration file; a run has copies of its
 own (``runs.inputs``). No preset has sizes for a method in a file: its own defaults hold.
-
-Presets (``presets/*.toml``) hold the same tables, with ``method`` split by method, for any
-world; a world's own table replaces that one. A variant ("cone-1") takes its family's values
-("cone") first, then its own::
-
-    [any.run]
-    [any.method.cone]
-    [rover.world]
 """
 
 from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import tomli_w
 
-from conevo.controllers.registry import DEFAULT, refuse_foreign, suggested
-from conevo.errors import UsageError, placed, shown, unknown_name
-from conevo.parameters import WrongValue, refuse_unknown
-from conevo.reading import parse_toml, read_toml
+from conevo.controllers.registry import DEFAULT
+from conevo.errors import UsageError, placed, shown
+from conevo.runs.layers import (
+    Layer,
+    Value,
+    as_layer,
+    build,
+    read_file,
+    read_preset,
+    section_of,
+    split_keys,
+)
 from conevo.runs.outline import LENGTH, Outline, identify, outline_of
 from conevo.runs.settings import RunSettings, refuse_contradiction
 
@@ -64,13 +63,10 @@ if TYPE_CHECKING:
     from conevo.worlds.registry import WorldEntry
 
 __all__ = [
-    "PRESETS",
     "RunConfig",
     "resolve",
 ]
 
-PRESETS = ("smoke", "desk", "night", "thesis")
-SECTIONS = ("run", "world", "controller", "method")
 NAMES = {
     "world": "",
     "world_digest": "",
@@ -79,7 +75,6 @@ NAMES = {
     "preset": "desk",
 }  # the keys of [run] that choose components
 IN_FILES = ("world", "method")  # of NAMES, what may be in a file outside the package
-ANY = "any"  # the table of a preset for worlds without one of their own
 
 
 @dataclass(frozen=True)
@@ -167,13 +162,13 @@ class RunConfig:
             UsageError: a value that is not allowed; None is allowed for a target.
         """
         values = {k: v for k, v in (_set_fields(self.run) | dict(length)).items() if v is not None}
-        layer = _as_layer({"run": values}, "as the run's length")
-        run = _build("run", {"run": RunSettings}, [layer])
+        layer = as_layer({"run": values}, "as the run's length")
+        run = build("run", {"run": RunSettings}, [layer])
         built = {"run": run, "world": self.world_params, "controller": self.controller}
         built["method"] = self.method_config
         parts = {name: type(part) for name, part in built.items()}
         names = (self.preset, self.entry, self.environment, self.method_entry)
-        base = _read_preset(*names, self.controller.name)
+        base = read_preset(*names, self.controller.name)
         changed = tuple(_changed(parts, built, base))
         return dataclasses.replace(self, run=run, changed=changed)
 
@@ -224,28 +219,6 @@ def _files_of(table: Mapping[str, Any]) -> list[str]:
     return [key.removesuffix("_digest") for key in table if key.endswith("_digest") and table[key]]
 
 
-@dataclass(frozen=True)
-class _Value:
-    """A value and the place it was read from; a file is named from ``folder``."""
-
-    value: Any
-    place: str
-    folder: Path | None = None
-
-    @property
-    def as_file(self) -> Any:
-        """The value if it is the name of a file, "prey.npz" or "FILE.py:ENVIRONMENT"."""
-        text = self.value
-        if self.folder is None or not isinstance(text, str):
-            return text
-        name = text.rpartition(":")[0] if ".py:" in text else text
-        is_file = Path(name).suffix or ("/" in name and (self.folder / name).is_file())
-        return str(self.folder / text) if is_file else text
-
-
-Layer = dict[str, dict[str, _Value]]  # section -> key -> value
-
-
 def resolve(
     world: str | None = None,
     method: str | None = None,
@@ -281,13 +254,13 @@ def resolve(
     from conevo.evolution.methods.registry import resolve as resolve_method
     from conevo.worlds.registry import resolve as resolve_world
 
-    layers: list[Layer] = [_read_file(Path(file))] if file is not None else []
+    layers: list[Layer] = [read_file(Path(file))] if file is not None else []
     given = dict(overrides or {})
-    single, short = _split_keys(given, place, folder)
+    single, short = split_keys(given, place, folder)
     if world is not None:
-        world = _Value(world, place, folder).as_file
+        world = Value(world, place, folder).as_file
     if method is not None:
-        method = _Value(method, place, folder).as_file
+        method = Value(method, place, folder).as_file
     for name, asked in (("world", world), ("method", method), ("preset", preset), ("seed", seed)):
         if asked is not None and (twice := single.get("run", {}).get(name)):
             raise UsageError(
@@ -316,14 +289,14 @@ def resolve(
         "method": method_entry.config_class,
     }
     for key, value in short.items():
-        single.setdefault(_section_of(key, parts, place), {})[key] = value
+        single.setdefault(section_of(key, parts, place), {})[key] = value
     if seed is not None:
-        single.setdefault("run", {})["seed"] = _Value(seed, "as the seed")
+        single.setdefault("run", {})["seed"] = Value(seed, "as the seed")
     with placed("run.preset", places.get("preset")):
-        base = _read_preset(names["preset"], entry, environment, method_entry, controller)
+        base = read_preset(names["preset"], entry, environment, method_entry, controller)
     if own_preset is not None and names["preset"] != own_preset.value:
         _refuse_label(names["preset"], base, layers[0], own_preset.place)
-    built = {name: _build(name, parts, [base, *layers, single]) for name in parts}
+    built = {name: build(name, parts, [base, *layers, single]) for name in parts}
     config = RunConfig(
         entry=entry,
         environment=environment,
@@ -339,40 +312,6 @@ def resolve(
     refuse_misfit(config.controller, built_world)
     refuse_contradiction(config.run, config.method_config, built_world.n_robots)
     return config
-
-
-def _read_file(path: Path) -> Layer:
-    return _as_layer(read_toml(path), f"in {path}", path.resolve().parent)
-
-
-def _as_layer(tables: Mapping[str, Any], place: str, folder: Path | None = None) -> Layer:
-    layer: Layer = {}
-    for section, values in tables.items():
-        if section not in SECTIONS:
-            raise unknown_name("section", section, SECTIONS, place)
-        if not isinstance(values, Mapping):
-            raise UsageError(f"{section} {place} must be a table: [{section}]")
-        layer[section] = {key: _Value(value, place, folder) for key, value in values.items()}
-    return layer
-
-
-def _split_keys(
-    given: Mapping[str, Any], place: str, folder: Path | None
-) -> tuple[Layer, dict[str, _Value]]:
-    """Separate settings with a section from short ones."""
-    dotted: Layer = {}
-    short: dict[str, _Value] = {}
-    for key, value in given.items():
-        section, dot, name = key.partition(".")
-        if not dot:
-            short[key] = _Value(value, place, folder)
-        elif section not in SECTIONS:
-            raise unknown_name("section", section, SECTIONS, f"in {key!r} {place}")
-        elif name in given:
-            raise UsageError(f"{key} {place}: the same setting is given as {name}, too")
-        else:
-            dotted.setdefault(section, {})[name] = _Value(value, place, folder)
-    return dotted, short
 
 
 def _take_names(
@@ -432,67 +371,6 @@ def _changed(parts: Mapping[str, type], built: Mapping[str, Any], base: Layer) -
             is_own = field.name != "seed" and not field.name.endswith("_digest")
             if is_own and getattr(built[section], field.name) != plain:
                 yield f"{section}.{field.name}"
-
-
-def _section_of(key: str, parts: Mapping[str, type], place: str) -> str:
-    """Return the only section that has ``key``."""
-    known = {name: [f.name for f in dataclasses.fields(part)] for name, part in parts.items()}
-    homes = [name for name in known if key in known[name]]
-    if len(homes) > 1:
-        options = " or ".join(f"{home}.{key}" for home in homes)
-        raise UsageError(f"key {key!r} {place} is ambiguous: write {options}")
-    if not homes:
-        refuse_foreign(parts["controller"], key, place)
-        raise unknown_name("key", key, [key for keys in known.values() for key in keys], place)
-    return homes[0]
-
-
-def _read_preset(
-    preset: str, world: WorldEntry, environment: str, method: MethodEntry, controller: str
-) -> Layer:
-    """Return what a preset says about this world and method, over what the world suggests.
-
-    That is the environment's defaults and settings of a controller. A preset says nothing of a
-    method in a file.
-    """
-    if preset not in PRESETS:
-        raise unknown_name("preset", preset, PRESETS)
-    source = resources.files(__package__) / "presets" / f"{preset}.toml"
-    worlds = parse_toml(source.read_text(encoding="utf-8"), f"preset {preset!r}")
-    generic, own = dict(worlds[ANY]), dict(worlds.get(world.short_name, {}))
-    by_method = generic.pop("method") | own.pop("method", {})
-    name, family = method.name, method.family
-    if not (method.file or {family, name} & set(by_method)):
-        raise UsageError(f"preset {preset!r} has no settings for method {name!r} in {world.name!r}")
-    sizes = {} if method.file else by_method.get(family, {}) | by_method.get(name, {})
-    tables = generic | own | {"method": sizes}
-    layer = _as_layer(tables, f"in preset {preset!r}")
-    suggestion = {
-        "world": world.defaults.get(environment, {}),
-        "controller": suggested(controller, world.world_class),
-    }
-    of_world = _as_layer(suggestion, f"of world {world.name!r}")
-    return layer | {part: of_world[part] | layer.get(part, {}) for part in of_world}
-
-
-def _build(section: str, parts: Mapping[str, Any], layers: Iterable[Layer]) -> Any:
-    """Return the component's dataclass with the layers' values over its defaults."""
-    part = parts[section]
-    values: dict[str, Any] = {}
-    places: dict[str, str] = {}
-    for layer in layers:
-        for key, given in layer.get(section, {}).items():
-            also = [f"{one}.{key}" for one in parts if key in parts[one].__dataclass_fields__]
-            if section == "controller":
-                refuse_foreign(part, key, given.place)
-            refuse_unknown(part, section, key, given.place, also)
-            is_file = f"{key}_digest" in part.__dataclass_fields__
-            values[key] = given.as_file if is_file else given.value
-            places[key] = given.place
-    try:
-        return part(**values)
-    except WrongValue as error:
-        raise error.at(places[error.key]) if error.key in places else error from error
 
 
 def _set_fields(part: Any) -> dict[str, Any]:
