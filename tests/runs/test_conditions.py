@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
@@ -52,6 +53,22 @@ def test_fewer_robots_are_the_first_and_more_repeat_them(
     assert len(both["changed"]["labels"]) == both["conditions"]["robots"] == robots
 
 
+def test_controllers_move_on_and_clones_do_not_mind(run: conevo.Run, tmp_path: Path) -> None:
+    champion = run.champion
+    assert champion is not None
+    assert not (champion.genes[0] == champion.genes[1]).all()
+    moved = replace(champion, genes=champion.genes[[2, 0, 1]], active=champion.active[[2, 0, 1]])
+    lab = Lab.equip(run.config, 1, "cpu")
+    both = run.test_under(rotate=1, threads=1)
+    assert both["changed"] == play(lab.simulator, lab.world, moved, n_scenarios=3, seed=1)
+    assert both["changed"]["performance"] != both["own"]["performance"]
+    assert both["conditions"]["rotate"] == 1
+    again = run.test_under(robots=6, rotate=3, threads=1)  # each controller twice: the same team
+    assert again["changed"] == run.test_under(robots=6, threads=1)["changed"]
+    clones = evolve_tiny(tmp_path / "clones", method="homcne").test_under(rotate=1, threads=1)
+    assert clones["changed"] == clones["own"]
+
+
 def test_a_setting_is_given_once(run: conevo.Run) -> None:
     for world, robots in (
         ({"n_robots": 3}, 2),
@@ -76,6 +93,8 @@ def test_what_cannot_be_played_is_one_line(run: conevo.Run) -> None:
         ({"world": {"world.itertions": 3}}, "did you mean 'world.iterations'"),
         ({"world": {"world.iterations": 0}}, "must be"),
         ({"robots": 10_000}, "n_robots = 10000"),
+        ({"rotate": 3}, "rotate = 3: must be a whole number from 0 to 2, there are 3 robots"),
+        ({"rotate": -1}, "rotate = -1: must be"),
     ):
         with pytest.raises(UsageError, match=words) as caught:
             run.test_under(**arguments, threads=1)

@@ -222,6 +222,8 @@ def conditions_text(run: Run, both: dict[str, Any]) -> str:
         rows.append([name, str(len(tested["labels"])), *cells, number(mean_s)])
     rows.append(["change", "", *(number(both["change"].get(one)) for one in measures), ""])
     settings = "".join(f", {key}={value}" for key, value in conditions["settings"].items())
+    if rotate := conditions["rotate"]:
+        settings += f", controllers rotated by {rotate}"
     return "\n".join(
         [
             f"Champion of {run.path} (generation {both['own']['generation']}), "

@@ -47,6 +47,10 @@ __all__ = ["test"]
     "--robots", type=click.IntRange(1, 64),
     help="Also test a team of N robots: the first N, or all of them repeated.",
 )  # fmt: skip
+@click.option(
+    "--rotate", metavar="K", type=click.IntRange(0, 63), default=0,
+    help="Also test with the controller of robot r in robot r + K.",
+)  # fmt: skip
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON value.")
 def test(
     run: str,
@@ -58,12 +62,14 @@ def test(
     on: str | None,
     settings: tuple[str, ...],
     robots: int | None,
+    rotate: int,
     as_json: bool,
 ) -> None:
     """Test the fittest team of RUN (finished or not) in fresh scenarios; nothing is written.
 
     Of a shaping, it tests the team of the last stage that has one, in that stage's environment.
-    With --on, --set or --robots it also tests under changed conditions and prints the difference.
+    With --on, --set, --robots or --rotate it also tests under changed conditions and prints the
+    difference. A team of castes loses by --rotate; one whose robots are alike does not.
 
     Try: conevo test runs/first --set world.iterations=500 --robots 10
     """
@@ -71,10 +77,10 @@ def test(
     from conevo.cli.stages import stages_test_text
     from conevo.cli.summary import test_text
 
-    is_changed = on is not None or bool(settings) or robots is not None
+    is_changed = on is not None or bool(settings) or robots is not None or rotate > 0
     if stages:
         if is_changed:
-            raise UsageError("--stages and --on, --set or --robots are mutually exclusive")
+            raise UsageError("--stages and --on, --set, --robots or --rotate exclude each other")
         shaping = find_shaping(run)
         for stage in shaping.stages[-1:]:
             note_other_code(stage)
@@ -88,7 +94,9 @@ def test(
         from conevo.runs.assignments import parse_assignments
 
         world = parse_assignments(settings)
-        both = found.test_under(on, world, robots, scenarios, seed, threads=threads, device=device)
+        both = found.test_under(
+            on, world, robots, scenarios, seed, rotate=rotate, threads=threads, device=device
+        )
         click.echo(json.dumps(both) if as_json else conditions_text(found, both))
         return
     result = found.test(scenarios, seed, threads=threads, device=device)

@@ -1,4 +1,9 @@
-"""A champion under other conditions: another environment, other settings, more or fewer robots."""
+"""A champion under other conditions: another environment, other settings, more or fewer robots.
+
+Or with each controller in another robot: robots of one caste can take each other's place, those of
+different castes cannot. This also finds castes that do the same actions at different places, which
+the degree of specialization does not.
+"""
 
 from __future__ import annotations
 
@@ -29,6 +34,7 @@ def test_under(
     on: str | None,
     world: Mapping[str, Any],
     robots: int | None,
+    rotate: int,
     scenarios: int | None,
     seed: int | None,
     threads: int | None,
@@ -39,31 +45,38 @@ def test_under(
     Choice: in the same world the run's settings hold unless they are changed; another environment
     has its own where the defaults of the two differ, and another world all of the run's preset. The
     controllers are the run's. A smaller team is of the first
-    controllers, a larger one repeats them from the first on.
+    controllers, a larger one repeats them from the first on. After that robot r has the
+    controller of robot r - ``rotate``, the first ones those of the last.
 
     Returns:
         The results of both, "own" and "changed", as ``Run.test`` gives them; "conditions": the
-        task, the robots and the settings that were changed; "change": the difference of the means
-        of each measure that both have, None if one is not finite.
+        task, the robots, the settings that were changed, and ``rotate``; "change": the difference
+        of the means of each measure that both have, None if one is not finite.
 
     Raises:
         UsageError: a name or value that is not allowed, or the team cannot play there.
     """
-    own = run.test(scenarios, seed, threads=threads, device=device)
     config = _changed(run.config, on, world, robots)
     refuse_other_controllers(str(run.path), run.config, config)
     lab = Lab.equip(config, threads, device_of(run.provenance, device))
+    _refuse_rotation(rotate, lab.world.n_robots)
+    own = run.test(scenarios, seed, threads=threads, device=device)
     champion = run.champion
     if champion is None:
         raise RuntimeError("a tested run has a champion")
     changed = test_team(
         lab.simulator,
         lab.world,
-        _resized(champion, lab.world.n_robots),
+        _placed(champion, lab.world.n_robots, rotate),
         n_scenarios=own["scenarios"],
         seed=own["seed"],
     )
-    conditions = {"task": config.task, "robots": lab.world.n_robots, "settings": dict(world)}
+    conditions = {
+        "task": config.task,
+        "robots": lab.world.n_robots,
+        "settings": dict(world),
+        "rotate": rotate,
+    }
     means = {name: value["mean"] for name, value in own["performance"].items()}
     now = {name: value["mean"] for name, value in changed["performance"].items()}
     change = {
@@ -124,9 +137,17 @@ def _changed(
     return replace(changed, controller=config.controller)
 
 
-def _resized(team: Team, n_robots: int) -> Team:
-    """Return a team of so many robots: the first controllers, or all of them again and again."""
-    robot = np.arange(n_robots) % len(team.genes)
+def _refuse_rotation(rotate: int, n_robots: int) -> None:
+    if not 0 <= rotate < n_robots:
+        raise UsageError(
+            f"rotate = {rotate}: must be a whole number from 0 to {n_robots - 1}, there are "
+            f"{n_robots} robots"
+        )
+
+
+def _placed(team: Team, n_robots: int, rotate: int) -> Team:
+    """Return a team of so many robots: the first controllers, or all again and again, moved on."""
+    robot = np.roll(np.arange(n_robots) % len(team.genes), rotate)
     return replace(
         team,
         genes=team.genes[robot],

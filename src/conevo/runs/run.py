@@ -428,6 +428,7 @@ class Run:
         scenarios: int | None = None,
         seed: int | None = None,
         *,
+        rotate: int = 0,
         threads: int | None = None,
         device: str | None = None,
     ) -> Record:
@@ -437,11 +438,12 @@ class Run:
             on: another environment, of this world or of one with controllers of the same sizes.
             world: settings of the world, for example ``{"world.iterations": 500}``.
             robots: in the team.
+            rotate: places that controllers move on: robot r has that of robot r - rotate.
             scenarios, seed, threads, device: as for ``test``.
         """
         from conevo.runs.conditions import test_under
 
-        return test_under(self, on, world or {}, robots, scenarios, seed, threads, device)
+        return test_under(self, on, world or {}, robots, rotate, scenarios, seed, threads, device)
 
     def _test(
         self, lab: Lab, team: Team, scenarios: int | None = None, seed: int | None = None
