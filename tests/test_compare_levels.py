@@ -11,6 +11,7 @@ sys.path += [str(ROOT / "experiments"), str(ROOT / "docs")]  # scripts import wh
 from compare_levels import comparison_table, groups, main, signal_table  # noqa: E402
 from conevo.errors import UsageError  # noqa: E402
 from pages import write  # noqa: E402
+from rotations import OTHER, SAME, rotation_table  # noqa: E402
 
 
 def row(method, seed, value, **levels):
@@ -63,6 +64,16 @@ def test_a_level_that_is_not_there_is_one_line():
 def test_signal_is_a_mean_over_runs():
     rows = [one | {"icc": 0.1 * one["seed"], "reliability": 0.5} for one in CREDIT]
     assert lines(signal_table(rows))[0] == ["CCGA", "equation", "2", "0.1500", "0.500"]
+
+
+def test_places_of_the_same_region_and_of_others_are_told_apart():
+    assert (SAME, OTHER) == ((4, 8, 12), (1, 2, 3))
+    rows = [
+        {"method": "cone-es", "seed": 1, "own": 100.0, "same region": 90.0, "other region": 20.0},
+        {"method": "cone-es", "seed": 2, "own": 200.0, "same region": 220.0, "other region": 20.0},
+    ]
+    expected = ["CONE-ES", "2", "150", "100 % (90 to 110)", "15 % (10 to 20)"]
+    assert lines(rotation_table(rows)) == [expected]
 
 
 def test_a_page_is_made_again_from_its_numbers(tmp_path):
