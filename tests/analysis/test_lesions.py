@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import conevo
-from conevo.analysis.lesions import clone, lesion, replacement
+from conevo.analysis.lesions import clone, lesion, replacement, rotate
 from conevo.runs.champions import Team
 from conevo.worlds.rollout import Rollout
 
@@ -118,3 +119,25 @@ def test_all_castes_of_the_thesis_have_a_heuristic_of_their_own(task: str) -> No
     world = conevo.world(task)
     castes = [caste for caste in world.castes if caste != "move"]
     assert [world.heuristics[replacement(world, caste)] for caste in castes] == castes
+
+
+def test_controllers_change_places_with_all_others_in_turn(rollout, team) -> None:
+    scenarios = rollout.world.scenarios(range(3))
+    found = rotate(rollout, team, scenarios)
+    assert found.teams == ("whole", "moved")
+    assert of(found, "whole") == play(rollout, team, scenarios)
+    moved = []
+    for k in range(1, 6):
+        order = [(robot - k) % 6 for robot in range(6)]
+        one = replace(team, genes=team.genes[order], active=team.active[order])
+        moved.append(play(rollout, one, scenarios)["area"])
+    assert of(found, "moved")["area"] == pytest.approx(np.mean(moved, axis=0), rel=1e-6)
+    assert of(found, "moved")["area"] != of(found, "whole")["area"]
+
+
+def test_clones_lose_nothing_by_it(rollout, team) -> None:
+    first = [0] * 6
+    clones = replace(team, genes=team.genes[first], active=team.active[first])
+    found = rotate(rollout, clones, rollout.world.scenarios(range(3)))
+    for measure, values in of(found, "moved").items():
+        assert values == pytest.approx(of(found, "whole")[measure], rel=1e-6)

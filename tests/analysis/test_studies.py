@@ -199,7 +199,7 @@ def test_a_study_is_plain_data_that_nothing_changes(task, runs, found) -> None:
     assert json.loads(json.dumps(again, allow_nan=False)) == again
     assert sorted((p, p.stat().st_mtime_ns) for p in runs[task].path.rglob("*")) == before
     assert list(again) == ["scores", "robots", "actions", "metrics", "behaviours"]
-    assert {row["study"] for row in again["scores"]} == {"lesion", "clones"}
+    assert {row["study"] for row in again["scores"]} == {"lesion", "clones", "rotated"}
 
 
 def test_more_scenarios_begin_with_the_same(runs, found) -> None:
@@ -321,7 +321,7 @@ def test_only_specialized_predators_are_replaced_and_the_idle_not_cloned(runs, s
     teams = {kind: [key[0] for key in values(rows, kind)][::4] for kind in ("lesion", "clones")}
     assert teams["lesion"] == ["whole", "pursuer", "knocker", "idle"]
     assert teams["clones"] == ["whole", "pursuer", "knocker"]
-    _, (_, _, modes), (cloned, _, _) = staged
+    _, (_, _, modes), _, (cloned, _, _) = staged
     assert modes.tolist() == [
         [-1, -1, -1, -1, -1],
         [-1, -1, 0, -1, 0],

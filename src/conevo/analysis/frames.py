@@ -289,9 +289,9 @@ class Tables:
 
         Args:
             measure: one of the world's task performance measures; None: each world's main one.
-            study: "test" (of the finished run), "lesion", "clones" or "composed".
+            study: "test" (of the finished run), "lesion", "clones", "rotated" or "composed".
             team: test: "champion" or "generation 0"; lesion and clones: "whole" or a caste;
-                composed: a collective behaviour.
+                rotated: "whole" or "moved"; composed: a collective behaviour.
         """
         rows = self._connection.execute(
             """

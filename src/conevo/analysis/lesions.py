@@ -1,7 +1,8 @@
-"""Teams with one caste replaced, and teams of one robot's clones: what a caste is good for.
+"""Teams with one caste replaced, of one robot's clones, or whose controllers change places.
 
-Nitschke 2009, sections 4.6.5, 4.6.6, 5.5.3, 5.5.4, 6.5.4 and 6.5.5. Nothing is adapted: the teams
-that are compared meet the same scenarios, and differ in whose controllers their robots have.
+Nitschke 2009, sections 4.6.5, 4.6.6, 5.5.3, 5.5.4, 6.5.4 and 6.5.5; the last is ours. Nothing is
+adapted: the teams that are compared meet the same scenarios, and differ in whose controllers their
+robots have.
 """
 
 from __future__ import annotations
@@ -16,9 +17,10 @@ from conevo.runs.champions import Team
 from conevo.specialization.individual import NON_SPECIALIZED
 from conevo.worlds.protocol import Scenarios, Simulator, World
 
-__all__ = ["WHOLE", "Compared", "clone", "fittest_of", "lesion", "replacement"]
+__all__ = ["WHOLE", "Compared", "clone", "fittest_of", "lesion", "replacement", "rotate"]
 
 WHOLE = "whole"  # the team as it was evolved
+MOVED = "moved"  # the same controllers, each in another robot
 
 
 @dataclass(frozen=True)
@@ -26,7 +28,7 @@ class Compared:
     """Teams in the same scenarios.
 
     Attributes:
-        teams: N names, "whole" first, then castes.
+        teams: N names, "whole" first, then castes, or "moved".
         performance: task performance measures, each [N, E].
     """
 
@@ -85,6 +87,30 @@ def clone(
         cloned.append(np.repeat(teams[:, [fittest]], len(labels), axis=1))
     outcome = simulator.evaluate(genes, np.concatenate(cloned), scenarios)
     return Compared((WHOLE, *castes), outcome.performance)
+
+
+def rotate(simulator: Simulator, team: Team, scenarios: Scenarios) -> Compared:
+    """Play a team, and it with controllers moved on by 1, 2, ... robots, which counts as one team.
+
+    What is lost tells how far robots have roles of their own, whatever they are: clones lose
+    nothing. S and favourites do not see roles of robots that do the same at different places.
+
+    Args:
+        simulator: of the team's world.
+        team: R controllers, two or more.
+        scenarios: E scenarios for all the teams.
+
+    Returns:
+        Two teams, "whole" and "moved": in each scenario the mean over all R - 1 rotations.
+    """
+    genes, teams = team.as_trial()
+    moved = [np.roll(teams, k, axis=1) for k in range(teams.shape[1])]
+    outcome = simulator.evaluate(genes, np.concatenate(moved), scenarios)
+    performance = {
+        name: np.stack([values[0], values[1:].mean(axis=0, dtype=np.float32)])
+        for name, values in outcome.performance.items()
+    }
+    return Compared((WHOLE, MOVED), performance)
 
 
 def fittest_of(caste: str, labels: Sequence[str], fitness: npt.ArrayLike) -> int:

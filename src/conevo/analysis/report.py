@@ -39,7 +39,7 @@ from conevo.analysis.sections.champions import champions
 from conevo.analysis.sections.claims import claims
 from conevo.analysis.sections.comparisons import comparisons
 from conevo.analysis.sections.composed import composed
-from conevo.analysis.sections.interventions import clones, lesions
+from conevo.analysis.sections.interventions import clones, lesions, rotations
 from conevo.analysis.sections.learning import learning
 from conevo.analysis.sections.metrics import definitions, metrics
 from conevo.analysis.sections.overview import Campaign, overview, read_campaign, repetition
@@ -126,6 +126,7 @@ def _about(scope: Scope, title: str, spent: Spent) -> Section:
         castes(scope, histories),
         lesions(scope),
         clones(scope),
+        rotations(scope),
         composed(scope),
         metrics(scope),
         behaviours(scope),

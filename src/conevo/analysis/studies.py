@@ -24,7 +24,7 @@ import numpy.typing as npt
 
 from conevo.analysis.composed import compose
 from conevo.analysis.fittest import equip
-from conevo.analysis.lesions import Compared, clone, lesion
+from conevo.analysis.lesions import Compared, clone, lesion, rotate
 from conevo.analysis.observed import Observed, watch
 from conevo.rng import fold
 from conevo.runs.champions import Team
@@ -80,8 +80,8 @@ def study(
 
     Returns:
         Plain data. scores: rows {study, team, measure, scenario, value} of the studies "lesion" and
-        "clones", teams "whole" and castes, and "composed", collective behaviours; the testing phase
-        is the run's own (``test_result``).
+        "clones", teams "whole" and castes, "rotated", teams "whole" and "moved", and "composed",
+        collective behaviours; the testing phase is the run's own (``test_result``).
         robots: robot, caste, specialization (S), fitness, hidden, and what S cannot see:
         favourite_setting and setting_share (its share of the settings used, 1 = always the same),
         affinity, favourite_action and action_share (of its time), independent (the S of
@@ -105,6 +105,7 @@ def study(
     clones = [fold(seed, "clones", k) for k in range(scenarios)]
     others = lab.world.scenarios([fold(seed, "lesion", k) for k in range(scenarios)])
     lesioned = lesion(lab.simulator, team, portrait.labels, altered, others)
+    moved = [rotate(lab.simulator, team, others)] if len(team.genes) > 1 else []
     cloned = clone(
         lab.simulator,
         team,
@@ -119,6 +120,7 @@ def study(
         "scores": [
             *_rows("lesion", lesioned),
             *_rows("clones", cloned),
+            *(row for one in moved for row in _rows("rotated", one)),
             *(row for one in composed for row in _rows("composed", one)),
         ],
         "robots": _robots(team, portrait),

@@ -16,6 +16,7 @@ NAMES = {
     ("test", "generation 0"): "the test of generation 0",
     ("lesion", ""): "lesions of castes",
     ("clones", ""): "teams of clones",
+    ("rotated", ""): "teams whose controllers changed places",
 }
 """What a study, and where it matters its team, is called in a sentence."""
 

@@ -1,4 +1,4 @@
-"""What teams of a group lose without a caste, and what clones of its fittest specialist do.
+"""What teams lose without a caste or in changed places, and what clones of a specialist do.
 
 Nitschke 2009, sections 4.6.5, 4.6.6, 5.5.3, 5.5.4, 6.5.4, 6.5.5. Choice: what a run loses is told
 in percent of the larger of the two performances, as in the claims, so that a team that reached
@@ -29,7 +29,7 @@ from conevo.analysis.exhibits import (
 from conevo.analysis.sections.scope import KEYS, Scope, named, sizes
 from conevo.analysis.statistics import Estimate, compare, holm, mean_interval
 
-__all__ = ["clones", "lesions"]
+__all__ = ["clones", "lesions", "rotations"]
 
 MOST = 100.0  # percent that can be lost, and gained: of the larger of two performances
 ENDS = "which ends at ±100 %, where losses do"
@@ -62,7 +62,7 @@ def lesions(scope: Scope) -> Section:
         scope,
         "lesion",
         "Lesions",
-        "replaced by heuristic robots",
+        "a caste replaced by heuristic robots",
         "All robots of a caste replaced by the heuristic controller that matches it; compared with "
         "the same team unlesioned in the same fresh scenarios.",
     )
@@ -74,9 +74,24 @@ def clones(scope: Scope) -> Section:
         scope,
         "clones",
         "Behavioural validation: clones",
-        "cloned",
+        "a caste cloned",
         "A team of clones of the caste's fittest robot; compared with the evolved team in the same "
         "fresh scenarios.",
+    )
+
+
+def rotations(scope: Scope) -> Section | None:
+    """Return what is left when controllers change places; None if no run was studied so."""
+    if not _teams(scope, "rotated")[0]:
+        return None
+    return _section(
+        scope,
+        "rotated",
+        "Roles: controllers that change places",
+        "controllers moved to other robots",
+        "Every robot with the controller of the one K before it, mean over all K from 1 to R - 1; "
+        "compared with the evolved team in the same fresh scenarios. Nothing is lost where robots "
+        "are alike; much where each has a role, also one that S and favourites do not see.",
     )
 
 
@@ -139,7 +154,7 @@ def _figure(
         for cell, teams in cells.items()
         for team in teams
     ]
-    title = f"Task performance ({scope.unit}) that is lost with a caste {what}"
+    title = f"Task performance ({scope.unit}) that is lost with {what}"
     at = scope.arranged(means)
     if not at.is_drawable:
         columns = [
@@ -217,7 +232,7 @@ def _table(scope: Scope, study: str, what: str, note: str, rows: list[dict[str, 
         Column("caste", "caste", plain),
         Column("n", "n"),
         Column("whole", "unchanged"),
-        Column("changed", what.split()[0]),
+        Column("changed", "changed"),
         Column("percent", "% of unchanged"),
         Column("lost", "lost, %"),
         Column("interval", "95 % interval", interval),
@@ -233,7 +248,7 @@ def _table(scope: Scope, study: str, what: str, note: str, rows: list[dict[str, 
     )
     return Table(
         f"{scope.stem}-{study}-castes",
-        f"Task performance ({scope.unit}) with a caste {what}",
+        f"Task performance ({scope.unit}) with {what}",
         f"{note} n: runs that have the caste; % of unchanged: of the means; lost: percent of the "
         f"larger of the two, mean over runs{tests if is_tested else '.'}",
         shown,
