@@ -73,7 +73,7 @@ _TABLE = (
 ENVIRONMENTS = tuple(_TABLE)
 
 # With these settings teams of castes by place pass teams that do everything, before anybody evolves
-# (docs/results/calibration.md); what evolved teams gain there is docs/results/regimes.md.
+# (docs/results/calibration.md); what evolved teams gain there is docs/results/specialists.md.
 APART: dict[str, Any] = {
     "segregation": 1.0,  # each type has a place: where types are mixed, switchers gain more
     "starts": "by_robot",  # a population has a place to learn for: from random starts, none
