@@ -118,7 +118,10 @@ def comparison_table(rows: Sequence[Row], factor: str, level: str) -> str:
         line += [rest, f"{one.n_a}, {one.n_b}", _spread(one.mean_b, one.sd_b)]
         line += [_spread(one.mean_a, one.sd_a), number(one.difference, "+.0f")]
         line += [interval(one.low, one.high, "+.0f"), percent((one.difference or 0.0) / base)]
-        line += [number(p, ".3f"), f"{sum(a > b for a, b in pairs)} of {len(pairs)}"]
+        line += [
+            "< 0.001" if p is not None and p < 0.001 else number(p, ".3f"),
+            f"{sum(a > b for a, b in pairs)} of {len(pairs)}",
+        ]
         lines.append(line + [number(mean(runs, "exchanges"), ".3g")] * (len(head) > len(line)))
     clear = [one for one in compared if one.low is not None and one.high is not None]
     up = sum(one.low > 0 for one in clear if one.low is not None)
