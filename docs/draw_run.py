@@ -5,7 +5,7 @@
 Left: the task performance of each generation's fittest team, and which settings the champion's
 rovers use in the testing phase, by the region where they begin. Right: the champion in one
 scenario of that phase, the one whose value is nearest to the median: canals, rocks, the rovers'
-paths. The default place is ``docs/pictures/run-WORLD-METHOD-PRESET.png``.
+paths. The default place is ``docs/pictures/run-WORLD-METHOD-PRESET-sSEED.png``.
 """
 
 import argparse
@@ -21,6 +21,7 @@ import matplotlib.pyplot as plt
 from matplotlib.ticker import MaxNLocator
 
 from conevo import Rollout, Run
+from conevo.errors import ConevoError
 from conevo.evolution.methods.registry import title_of
 from conevo.rng import fold
 from conevo.specialization.favourite import favourite
@@ -181,7 +182,7 @@ def draw_world(ax, run):
     ax.set(xlim=(0, 1), ylim=(0, 1), xticks=(0, 0.5, 1), yticks=(0, 0.5, 1), aspect="equal")
     ax.legend(loc="upper left", bbox_to_anchor=(1.01, 1), frameon=False, markerscale=1.2)
     method = title_of(run.config.method)
-    ax.set_title(f"{method}'s champion in a fresh scenario: {value:.0f} of 5000", loc="left")
+    ax.set_title(f"Champion of {method} in a fresh scenario: {value:.0f} of 5000", loc="left")
 
 
 def title(runs):
@@ -227,12 +228,20 @@ def main():
     parser.add_argument("--next-to", type=Path, help="another run, for the left side")
     parser.add_argument("--out", type=Path, help="the picture to write")
     chosen = parser.parse_args()
-    runs = [Run(path) for path in (chosen.run, chosen.next_to) if path]
+    try:
+        runs = [Run(path) for path in (chosen.run, chosen.next_to) if path]
+    except ConevoError as error:
+        parser.error(str(error))
     for run in runs:
-        if run.test_result is None or not run.config.world.startswith("rover-"):
-            parser.error(f"{run.path} is no finished run of the multi-rover world")
+        if not run.config.world.startswith("rover-"):
+            parser.error(f"{run.path} is a run in {run.config.world}, not in the multi-rover world")
+        if run.test_result is None:
+            parser.error(f"{run.path} is not finished")
+    if chosen.out and chosen.out.suffix != ".png":
+        parser.error(f"--out {chosen.out}: must end in .png")
     config = runs[0].config
-    name = f"run-{config.task.replace('/', '-')}-{config.method}-{config.preset}.png"
+    about = (config.task.replace("/", "-"), config.method, config.preset, f"s{config.run.seed}")
+    name = f"run-{'-'.join(about)}.png"
     picture = chosen.out or PICTURES / name
     draw(runs, picture)
     print(picture)

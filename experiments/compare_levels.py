@@ -97,6 +97,8 @@ def mean(runs: Sequence[Row], of: str) -> float | None:
 def comparison_table(rows: Sequence[Row], factor: str, level: str) -> str:
     """Return every level next to the baseline: values, difference, its interval, seeds above."""
     found = list(groups(rows, factor, level))
+    if not found:
+        raise UsageError(f"{factor}={level}: no other run agrees with one of these in all else")
     values = [
         ([float(row["value"]) for row in runs], [float(row["value"]) for row in same])
         for _, _, runs, same in found
@@ -186,6 +188,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
                 rows = read(
                     page.with_suffix(".csv")
                 )  # rounded as whoever makes them again finds them
+        if wrong := [one for one in args.baseline if "=" not in one]:
+            parser.error(f"--baseline {wrong[0]}: must be FACTOR=LEVEL, for example method=hom-es")
         parts = {one: comparison_table(rows, *one.split("=", 1)) for one in args.baseline}
     except (ConevoError, OSError) as error:
         parser.error(str(error))

@@ -48,7 +48,7 @@ __all__ = ["test"]
     help="Also test a team of N robots: the first N, or all of them repeated.",
 )  # fmt: skip
 @click.option(
-    "--rotate", metavar="K", type=click.IntRange(0, 63), default=0,
+    "--rotate", metavar="K", type=click.IntRange(1, 63), default=None,
     help="Also test with the controller of robot r in robot r + K.",
 )  # fmt: skip
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON value.")
@@ -62,7 +62,7 @@ def test(
     on: str | None,
     settings: tuple[str, ...],
     robots: int | None,
-    rotate: int,
+    rotate: int | None,
     as_json: bool,
 ) -> None:
     """Test the fittest team of RUN (finished or not) in fresh scenarios; nothing is written.
@@ -77,7 +77,7 @@ def test(
     from conevo.cli.stages import stages_test_text
     from conevo.cli.summary import test_text
 
-    is_changed = on is not None or bool(settings) or robots is not None or rotate > 0
+    is_changed = on is not None or bool(settings) or robots is not None or rotate is not None
     if stages:
         if is_changed:
             raise UsageError("--stages and --on, --set, --robots or --rotate exclude each other")
@@ -95,7 +95,7 @@ def test(
 
         world = parse_assignments(settings)
         both = found.test_under(
-            on, world, robots, scenarios, seed, rotate=rotate, threads=threads, device=device
+            on, world, robots, scenarios, seed, rotate=rotate or 0, threads=threads, device=device
         )
         click.echo(json.dumps(both) if as_json else conditions_text(found, both))
         return

@@ -138,10 +138,10 @@ def _changed(
 
 
 def _refuse_rotation(rotate: int, n_robots: int) -> None:
-    if not 0 <= rotate < n_robots:
+    if type(rotate) is not int or not 0 <= rotate < n_robots:
         raise UsageError(
-            f"rotate = {rotate}: must be a whole number from 0 to {n_robots - 1}, there are "
-            f"{n_robots} robots"
+            f"rotate = {rotate!r}: must be a whole number from 0 to {n_robots - 1}, less than the "
+            f"robots, of which there {'is' if n_robots == 1 else 'are'} {n_robots}"
         )
 
 

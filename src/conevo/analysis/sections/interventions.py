@@ -32,6 +32,8 @@ from conevo.analysis.statistics import Estimate, compare, holm, mean_interval
 __all__ = ["clones", "lesions", "rotations"]
 
 MOST = 100.0  # percent that can be lost, and gained: of the larger of two performances
+ROTATED = "rotated"  # the study without castes
+OVER_CASTES = ": the mean over its castes"
 ENDS = "which ends at ±100 %, where losses do"
 
 
@@ -82,16 +84,17 @@ def clones(scope: Scope) -> Section:
 
 def rotations(scope: Scope) -> Section | None:
     """Return what is left when controllers change places; None if no run was studied so."""
-    if not _teams(scope, "rotated")[0]:
+    if not _teams(scope, ROTATED)[0]:
         return None
     return _section(
         scope,
-        "rotated",
+        ROTATED,
         "Roles: controllers that change places",
         "controllers moved to other robots",
-        "Every robot with the controller of the one K before it, mean over all K from 1 to R - 1; "
-        "compared with the evolved team in the same fresh scenarios. Nothing is lost where robots "
-        "are alike; much where each has a role, also one that S and favourites do not see.",
+        "Every robot with the controller of the one K before it (conevo test RUN --rotate K), mean "
+        "over all K from 1 to R - 1, so also over moves to robots of the same caste; compared with "
+        "the evolved team in the same fresh scenarios. Nothing is lost where robots are alike, "
+        "much where each has a role, also one that S and favourites do not see.",
     )
 
 
@@ -160,7 +163,7 @@ def _figure(
         columns = [
             *KEYS,
             Column("run", "run", plain),
-            Column("caste", "caste", plain),
+            *_by_caste(study),
             Column("lost", "lost, %"),
         ]
         return Table(f"{scope.stem}-{study}", title, note, columns, rows, is_open=False)
@@ -170,7 +173,7 @@ def _figure(
         f"{scope.stem}-{study}",
         title,
         f"{note} Percent of the larger of the two; below 0 the changed team was better "
-        f"({scope.main.direction}). A point per run: the mean over its castes"
+        f"({scope.main.direction}). A point per run{'' if study == ROTATED else OVER_CASTES}"
         + (f"; next to them the mean with Student's 95 % interval, {ENDS}" if several else "")
         + f". {size} per cell.",
         (),
@@ -221,6 +224,10 @@ def _rows(scope: Scope, cells: dict[Cell, list[_Team]]) -> list[dict[str, Any]]:
     return [row | {"p_holm": p} for row, p in zip(rows, corrected, strict=True)]
 
 
+def _by_caste(study: str) -> list[Column]:
+    return [] if study == ROTATED else [Column("caste", "caste", plain)]
+
+
 def _percent(changed: float | None, whole: float | None) -> float | None:
     """Return what is left of the whole, None where there is none."""
     return 100 * changed / whole if changed is not None and whole else None
@@ -229,7 +236,7 @@ def _percent(changed: float | None, whole: float | None) -> float | None:
 def _table(scope: Scope, study: str, what: str, note: str, rows: list[dict[str, Any]]) -> Table:
     columns = [
         *KEYS,
-        Column("caste", "caste", plain),
+        *_by_caste(study),
         Column("n", "n"),
         Column("whole", "unchanged"),
         Column("changed", "changed"),
@@ -249,7 +256,8 @@ def _table(scope: Scope, study: str, what: str, note: str, rows: list[dict[str, 
     return Table(
         f"{scope.stem}-{study}-castes",
         f"Task performance ({scope.unit}) with {what}",
-        f"{note} n: runs that have the caste; % of unchanged: of the means; lost: percent of the "
+        f"{note} n: runs{'' if study == ROTATED else ' that have the caste'}; % of unchanged: of "
+        "the means; lost: percent of the "
         f"larger of the two, mean over runs{tests if is_tested else '.'}",
         shown,
         rows,
