@@ -108,8 +108,8 @@ def comparison_table(rows: Sequence[Row], factor: str, level: str) -> str:
     hidden = {key for key in found[0][0] if len({one[0][key] for one in found}) == 1}
     keys = [key for key in found[0][0] if key not in hidden]
     title = title_of(level) if factor == "method" else level
-    head = [*keys, factor if factor != "method" else "compared", "n of both", f"{title} (sd)"]
-    head += ["value (sd)", "difference", "95 % interval", "of the baseline's", "p, Holm"]
+    head = [*keys, factor if factor != "method" else "compared", "runs of both", f"{title} (sd)"]
+    head += ["value (sd)", "difference", "95 % interval", "relative", "p, Holm"]
     head += ["seeds above", "exchanges"] if mean(rows, "exchanges") else ["seeds above"]
     lines = []
     for (levels, rest, runs, same), one, p in zip(found, compared, corrected, strict=True):
@@ -130,7 +130,7 @@ def comparison_table(rows: Sequence[Row], factor: str, level: str) -> str:
     down = sum(one.high < 0 for one in clear if one.high is not None)
     tail = (
         f"{len(compared)} rows, {len(clear)} with an interval; it lies above 0 in {up}, below in "
-        f"{down}. If nothing differed, about {0.05 * len(clear):.1f} would exclude it.\n"
+        f"{down}. By chance alone about {0.05 * len(clear):.1f} of them would exclude 0.\n"
     )
     return f"{table(head, lines)}\n{tail}"
 

@@ -67,6 +67,7 @@ def test_controllers_move_on_and_clones_do_not_mind(run: conevo.Run, tmp_path: P
     assert again["changed"] == run.test_under(robots=6, threads=1)["changed"]
     clones = evolve_tiny(tmp_path / "clones", method="homcne").test_under(rotate=1, threads=1)
     assert clones["changed"] == clones["own"]
+    assert [one["conditions"]["clones"] for one in (both, clones)] == [False, True]
 
 
 def test_a_setting_is_given_once(run: conevo.Run) -> None:

@@ -191,8 +191,8 @@ def _subject(lab: Lab, generation: str, state: State, units: int | None) -> _Sub
     if not isinstance(state, Populations):
         raise Unmeasured(
             f"{title} has no populations whose genotypes could be tried one by one (its state is "
-            f"not a {Populations.__module__}.{Populations.__name__}), so its signal "
-            f"cannot be measured"
+            f"not a {Populations.__module__}.{Populations.__name__}), so its signal cannot be "
+            f"measured; what it says of itself, if anything, is in 'conevo show RUN'"
         )
     of, there = state.genes.shape[2], {field.name for field in dataclasses.fields(config)}
     is_alone = "evaluation" in there and getattr(state, "partners", np.empty(0)).size > 0

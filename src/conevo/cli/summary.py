@@ -223,7 +223,8 @@ def conditions_text(run: Run, both: dict[str, Any]) -> str:
     rows.append(["change", "", *(number(both["change"].get(one)) for one in measures), ""])
     settings = "".join(f", {key}={value}" for key, value in conditions["settings"].items())
     if rotate := conditions["rotate"]:
-        settings += f", controllers rotated by {rotate}"
+        equal = ", which are all equal" if conditions["clones"] else ""
+        settings += f", controllers rotated by {rotate}{equal}"
     return "\n".join(
         [
             f"Champion of {run.path} (generation {both['own']['generation']}), "

@@ -50,8 +50,9 @@ def test_under(
 
     Returns:
         The results of both, "own" and "changed", as ``Run.test`` gives them; "conditions": the
-        task, the robots, the settings that were changed, and ``rotate``; "change": the difference
-        of the means of each measure that both have, None if one is not finite.
+        task, the robots, the settings that were changed, ``rotate``, and whether all controllers
+        are equal ("clones"); "change": the difference of the means of each measure that both have,
+        None if one is not finite.
 
     Raises:
         UsageError: a name or value that is not allowed, or the team cannot play there.
@@ -76,6 +77,7 @@ def test_under(
         "robots": lab.world.n_robots,
         "settings": dict(world),
         "rotate": rotate,
+        "clones": bool((champion.genes == champion.genes[0]).all()),
     }
     means = {name: value["mean"] for name, value in own["performance"].items()}
     now = {name: value["mean"] for name, value in changed["performance"].items()}
