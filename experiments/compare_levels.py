@@ -11,7 +11,6 @@ the tables from the CSV file. Several ``--baseline`` give a table each, ``<!-- B
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -25,6 +24,7 @@ from conevo.analysis.statistics import compare, holm
 from conevo.cli.find import find_campaign, sealed
 from conevo.errors import ConevoError, UsageError
 from conevo.evolution.methods.registry import title_of
+from page_arguments import PageParser
 from pages import Row, put, read, table, write
 from provenance import made_with
 from regime_tables import interval, number, percent
@@ -63,14 +63,14 @@ def rows_and_cost(name: str) -> tuple[list[Row], str]:
 
 def factors_of(row: Row) -> dict[str, str]:
     """Return the levels of a run."""
-    return {key: _level(one) for key, one in row.items() if key not in FACTS}
+    return {key: level_name(one) for key, one in row.items() if key not in FACTS}
 
 
 def groups(rows: Sequence[Row], factor: str, level: str) -> Iterator[tuple[Any, ...]]:
     """Yield what is compared: shared levels, name of the rest, its runs, runs of the baseline."""
     baseline = [row for row in rows if factors_of(row).get(factor) == level]
     if not baseline:
-        levels = sorted({_level(row[factor]) for row in rows if factor in row})
+        levels = sorted({level_name(row[factor]) for row in rows if factor in row})
         raise UsageError(f"no run has {factor}={level}; levels: {', '.join(levels) or 'none'}")
     shared = [key for key in factors_of(baseline[0]) if key != factor]
     cells: dict[tuple[str, ...], dict[str, list[Row]]] = {}
@@ -155,8 +155,9 @@ def signal_table(rows: Sequence[Row]) -> str:
     return table([*names, "runs", "of a trial", "of all trials of a generation"], lines)
 
 
-def _level(of: object) -> str:
-    return f"{of:g}" if isinstance(of, float) else str(of)
+def level_name(of: object) -> str:
+    """Return a level as it is named in a plan; a dash for none."""
+    return f"{of:g}" if isinstance(of, float) else "–" if of is None else str(of)
 
 
 def _spread(centre: float | None, sd: float | None) -> str:
@@ -165,17 +166,10 @@ def _spread(centre: float | None, sd: float | None) -> str:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Make the tables."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("campaign", nargs="?", help="directory, or name in campaigns/")
+    parser = PageParser(__doc__)
     parser.add_argument("--baseline", action="append", required=True, metavar="FACTOR=LEVEL")
-    parser.add_argument("--write", type=Path, help="page whose tables are replaced")
-    parser.add_argument("--again", action="store_true", help="from the CSV file, not a campaign")
-    args = parser.parse_args(arguments)
+    args = parser.parse(arguments)
     page: Path | None = args.write
-    if page and not page.is_file():
-        parser.error(f"--write {page}: there is no such page")
-    if args.again != (args.campaign is None) or (args.again and page is None):
-        parser.error("name a CAMPAIGN, or --again with --write PAGE, whose CSV file is read")
     try:
         if args.again:
             rows = read(page.with_suffix(".csv"))
@@ -185,9 +179,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             if page:
                 put(cost, page, "cost")
                 write(rows, page.with_suffix(".csv"))
-                rows = read(
-                    page.with_suffix(".csv")
-                )  # rounded as whoever makes them again finds them
+                rows = read(page.with_suffix(".csv"))  # rounded, as with --again
         if wrong := [one for one in args.baseline if "=" not in one]:
             parser.error(f"--baseline {wrong[0]}: must be FACTOR=LEVEL, for example method=hom-es")
         parts = {one: comparison_table(rows, *one.split("=", 1)) for one in args.baseline}

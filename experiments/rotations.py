@@ -13,7 +13,6 @@ else. Also: where robots are in the second half of an epoch, by the region where
 
 from __future__ import annotations
 
-import argparse
 import itertools
 import sys
 from collections.abc import Sequence
@@ -22,6 +21,7 @@ from pathlib import Path
 import numpy as np
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "docs"))
+from compare_levels import level_name
 from conevo.cli.find import find_campaign
 from conevo.errors import ConevoError, UsageError
 from conevo.evolution.methods.registry import title_of
@@ -31,6 +31,7 @@ from conevo.runs.lab import Lab
 from conevo.runs.run import Run
 from conevo.worlds.rover.rocks import layout
 from conevo.worlds.rover.sites import N_REGIONS, rock_sites
+from page_arguments import PageParser
 from pages import Row, put, read, table, write
 from regime_tables import number
 
@@ -124,7 +125,7 @@ def _cells(rows: Sequence[Row]) -> tuple[list[str], dict[tuple[str, ...], list[R
     names = list(dict.fromkeys(key for row in rows for key in row if key not in FACTS))
     cells: dict[tuple[str, ...], list[Row]] = {}
     for row in rows:
-        at = {key: _level(row.get(key)) for key in names}
+        at = {key: level_name(row.get(key)) for key in names}
         at["method"] = title_of(at["method"])
         cells.setdefault(tuple(at.values()), []).append(row)
     return names, cells
@@ -175,23 +176,12 @@ def place_table(rows: Sequence[Row]) -> str:
 PARTS = {"rotations": rotation_table, "swaps": swap_table, "places": place_table}
 
 
-def _level(of: object) -> str:
-    return f"{of:g}" if isinstance(of, float) else "–" if of is None else str(of)
-
-
 def main(arguments: Sequence[str] | None = None) -> None:
     """Make the table."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("campaign", nargs="?", help="directory, or name in campaigns/")
+    parser = PageParser(__doc__)
     parser.add_argument("--methods", default="cone-es", help="of these methods: A,B (%(default)s)")
-    parser.add_argument("--write", type=Path, help="page whose table is replaced")
-    parser.add_argument("--again", action="store_true", help="from the CSV file, not a campaign")
-    args = parser.parse_args(arguments)
+    args = parser.parse(arguments)
     page: Path | None = args.write
-    if page and not page.is_file():
-        parser.error(f"--write {page}: there is no such page")
-    if args.again != (args.campaign is None) or (args.again and page is None):
-        parser.error("name a CAMPAIGN, or --again with --write PAGE, whose CSV file is read")
     try:
         numbers = page and page.with_name(f"{page.stem}-rotations.csv")
         if page and not any(f"<!-- {name} -->" in page.read_text() for name in PARTS):

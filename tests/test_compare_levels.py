@@ -11,7 +11,7 @@ sys.path += [str(ROOT / "experiments"), str(ROOT / "docs")]  # scripts import wh
 from compare_levels import comparison_table, groups, main, signal_table  # noqa: E402
 from conevo.errors import UsageError  # noqa: E402
 from pages import write  # noqa: E402
-from rotations import OTHER, SAME, rotation_table  # noqa: E402
+from rotations import OTHER, SAME, orders, rotation_table  # noqa: E402
 
 
 def row(method, seed, value, **levels):
@@ -74,6 +74,16 @@ def test_places_of_the_same_region_and_of_others_are_told_apart():
     ]
     expected = ["CONE-ES", "2", "150", "100 % (90 to 110)", "15 % (10 to 20)"]
     assert lines(rotation_table(rows)) == [expected]
+
+
+def test_two_regions_are_swapped_and_the_others_left_alone():
+    """Robots 0 to 7 begin in A, B, C, D, A, B, C, D."""
+    changed = orders(8)
+    assert changed["A and C"][0].tolist() == [2, 1, 0, 3, 6, 5, 4, 7]
+    assert changed["B and D"][0].tolist() == [0, 3, 2, 1, 4, 7, 6, 5]
+    assert len(changed) == 3 + 6
+    regions = [order % 4 for order in changed["same region"]]
+    assert all(one.tolist() == [0, 1, 2, 3] * 2 for one in regions)
 
 
 def test_a_page_is_made_again_from_its_numbers(tmp_path):
