@@ -24,8 +24,8 @@ from conevo.analysis.statistics import compare, holm
 from conevo.cli.find import find_campaign, sealed
 from conevo.errors import ConevoError, UsageError
 from conevo.evolution.methods.registry import title_of
-from page_arguments import PageParser
-from pages import Row, put, read, table, write
+from page_arguments import PageParser, rows_for
+from pages import Row, put, table
 from provenance import made_with
 from regime_tables import interval, number, percent
 
@@ -171,15 +171,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     args = parser.parse(arguments)
     page: Path | None = args.write
     try:
-        if args.again:
-            rows = read(page.with_suffix(".csv"))
-        else:
-            rows, cost = rows_and_cost(args.campaign)
-            print(cost)
-            if page:
-                put(cost, page, "cost")
-                write(rows, page.with_suffix(".csv"))
-                rows = read(page.with_suffix(".csv"))  # rounded, as with --again
+        rows = rows_for(args, rows_and_cost)
         if wrong := [one for one in args.baseline if "=" not in one]:
             parser.error(f"--baseline {wrong[0]}: must be FACTOR=LEVEL, for example method=hom-es")
         parts = {one: comparison_table(rows, *one.split("=", 1)) for one in args.baseline}

@@ -1,10 +1,14 @@
-"""The arguments of scripts that make a page's tables from a campaign, or again from its numbers."""
+"""Arguments and rows of scripts that make tables from a campaign, or again from its numbers."""
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+import sys
+from collections.abc import Callable, Sequence
 from pathlib import Path
+
+sys.path.append(str(Path(__file__).resolve().parents[1] / "docs"))
+from pages import Row, put, read, write
 
 __all__ = ["PageParser"]
 
@@ -27,3 +31,26 @@ class PageParser(argparse.ArgumentParser):
         if args.again != (args.campaign is None) or (args.again and args.write is None):
             self.error("name a CAMPAIGN, or --again with --write PAGE, whose CSV file is read")
         return args
+
+
+def rows_for(
+    args: argparse.Namespace, rows_and_cost: Callable[[str], tuple[list[Row], str]]
+) -> list[Row]:
+    """Return a row per run, rounded as in the page's CSV file, which is written unless read.
+
+    Args:
+        args: of a `PageParser`. What the runs cost is printed, and put into the page.
+        rows_and_cost: makes both from a campaign's name.
+
+    Raises:
+        OSError: the CSV file cannot be read or written.
+    """
+    page: Path | None = args.write
+    if not args.again:
+        rows, cost = rows_and_cost(args.campaign)
+        print(cost)
+        if page is None:
+            return rows
+        put(cost, page, "cost")
+        write(rows, page.with_suffix(".csv"))
+    return read(args.write.with_suffix(".csv"))

@@ -9,7 +9,6 @@ markers; ``--again`` makes tables and figure from the CSV file.
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -26,7 +25,8 @@ from conevo.errors import ConevoError, UsageError
 from conevo.runs.records import own_numbers
 from conevo.runs.run import Run
 from incentives import OF_REGION
-from pages import Row, put, read, write
+from page_arguments import PageParser, rows_for
+from pages import Row, put
 from provenance import made_with
 from regime_cells import CLONES, INDIVIDUAL, REGIONS, cells_of, used
 from regime_figure import draw
@@ -153,31 +153,13 @@ def rows_and_cost(name: str) -> tuple[list[Row], str]:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Make the map."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("campaign", nargs="?", help="directory, or name in campaigns/")
-    parser.add_argument("--write", type=Path, help="page whose tables are replaced")
-    parser.add_argument("--again", action="store_true", help="from the CSV file, not a campaign")
-    args = parser.parse_args(arguments)
+    parser = PageParser(__doc__)
+    args = parser.parse(arguments)
     page: Path | None = args.write
-    if page and not page.is_file():
-        parser.error(f"--write {page}: there is no such page")
-    if args.again != (args.campaign is None):
-        parser.error("name a CAMPAIGN, or --again with the page whose CSV file is to be read")
-    numbers = page and page.with_suffix(".csv")
-    if args.again:
-        if not (page and numbers and numbers.is_file()):
-            parser.error("--again needs --write PAGE with a CSV file next to it")
-        rows = read(numbers)
-    else:
-        try:
-            rows, cost = rows_and_cost(args.campaign)
-        except ConevoError as error:
-            parser.error(str(error))
-        print(cost)
-        if page and numbers:
-            put(cost, page, "cost")
-            write(rows, numbers)
-            rows = read(numbers)  # rounded as whoever makes them again finds them
+    try:
+        rows = rows_for(args, rows_and_cost)
+    except (ConevoError, OSError) as error:
+        parser.error(str(error))
     if page:
         write_page(rows, page)
     show(cells_of(rows))

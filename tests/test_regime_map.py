@@ -218,7 +218,7 @@ def test_the_page_of_a_campaign(campaign, tmp_path, capsys):
         ([], "name a CAMPAIGN, or --again"),
         (["nowhere"], "nowhere"),
         (["nowhere", "--write", "no.md"], "no.md: there is no such page"),
-        (["--again"], "--again needs --write PAGE"),
+        (["--again"], "--again with --write PAGE"),
     ],
 )
 def test_bad_arguments_are_one_line(arguments, line, capsys, tmp_path, monkeypatch):
