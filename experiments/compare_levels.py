@@ -116,10 +116,11 @@ def comparison_table(rows: Sequence[Row], factor: str, level: str) -> str:
         by_seed = {row["seed"]: float(row["value"]) for row in same}
         pairs = [(float(r["value"]), by_seed[r["seed"]]) for r in runs if r["seed"] in by_seed]
         base = one.mean_b or 1.0
+        form = ".0f" if max(one.mean_a or 0.0, one.mean_b or 0.0) >= 20 else ".2f"
         line = [title_of(levels[key]) if key == "method" else levels[key] for key in keys]
-        line += [rest, f"{one.n_a}, {one.n_b}", _spread(one.mean_b, one.sd_b)]
-        line += [_spread(one.mean_a, one.sd_a), number(one.difference, "+.0f")]
-        line += [interval(one.low, one.high, "+.0f"), percent((one.difference or 0.0) / base)]
+        line += [rest, f"{one.n_a}, {one.n_b}", _spread(one.mean_b, one.sd_b, form)]
+        line += [_spread(one.mean_a, one.sd_a, form), number(one.difference, f"+{form}")]
+        line += [interval(one.low, one.high, f"+{form}"), percent((one.difference or 0.0) / base)]
         line += [
             "< 0.001" if p is not None and p < 0.001 else number(p, ".3f"),
             f"{sum(a > b for a, b in pairs)} of {len(pairs)}",
@@ -160,8 +161,8 @@ def level_name(of: object) -> str:
     return f"{of:g}" if isinstance(of, float) else "–" if of is None else str(of)
 
 
-def _spread(centre: float | None, sd: float | None) -> str:
-    return f"{number(centre, '.0f')} ({number(sd, '.0f')})"
+def _spread(centre: float | None, sd: float | None, form: str) -> str:
+    return f"{number(centre, form)} ({number(sd, form)})"
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
