@@ -153,7 +153,9 @@ def test_record_equals_evaluate_bit_for_bit(some_world):
     rollout = played(some_world)
     out = rollout.evaluate(genes, teams, scenarios, heuristic)
     for n in range(2):
-        seen = rollout.record(genes, teams[n], scenarios, heuristic[n])
+        seen, outcome = rollout.record_with_outcome(genes, teams[n], scenarios, heuristic[n])
+        for name, values in outcome_arrays(outcome).items():
+            assert values.tobytes() == outcome_arrays(out)[name][n : n + 1].tobytes(), name
         assert seen["fitness"].shape == (ITERATIONS, some_world.n_robots)
         for name in ("inputs", "outputs"):
             width = len(getattr(some_world, name))

@@ -104,6 +104,18 @@ class OwnSimulator:
             raise UsageError(f"world {self.world.name}: record: {fault}")
         return dict(found)
 
+    def record_with_outcome(
+        self,
+        genes: npt.NDArray[np.float32],
+        team: npt.NDArray[np.int32],
+        scenarios: Any,
+        heuristic: npt.NDArray[np.int32] | None = None,
+    ) -> tuple[dict[str, npt.NDArray[Any]], Outcome]:
+        """Return what ``record`` and ``evaluate`` do; a world's own simulator has only these."""
+        seen = self.record(genes, team, scenarios, heuristic)
+        modes = None if heuristic is None else heuristic[None]
+        return seen, self.evaluate(genes, team[None], scenarios, modes)
+
     def _faults_of_outcome(self, out: Any, n: int, e: int) -> Iterator[str]:
         world, names = self.world, [one.name for one in measures_of(self.world)]
         if not isinstance(out, Outcome):

@@ -196,6 +196,18 @@ class Simulator(Protocol):
             ``evaluate`` gives.
         """
 
+    def record_with_outcome(
+        self,
+        genes: npt.NDArray[np.float32],
+        team: npt.NDArray[np.int32],
+        scenarios: Any,
+        heuristic: npt.NDArray[np.int32] | None = None,
+    ) -> tuple[dict[str, npt.NDArray[Any]], Outcome]:
+        """Return what ``record`` and what ``evaluate`` give of one team in one scenario.
+
+        A simulator that a world brings need not have it: ``worlds.own_simulator`` adds it.
+        """
+
     def is_shared(self, name: str) -> bool:
         """Return whether all scenarios have a field of theirs in common."""
 

@@ -43,8 +43,7 @@ def recorded(
     """
     world = simulator.world
     scenes = world.scenarios([scenario])
-    seen = simulator.record(genes, team, scenes, modes)
-    outcome = simulator.evaluate(genes, team[None], scenes, modes[None])
+    seen, outcome = simulator.record_with_outcome(genes, team, scenes, modes)
     inputs, outputs, hidden = (seen.pop(name) for name in ("inputs", "outputs", "hidden"))
     measured = seen.pop("performance")
     seen.pop("counts", None)

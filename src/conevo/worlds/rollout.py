@@ -181,11 +181,10 @@ class Rollout:
         """
         self._refuse_faulty(scenarios)
         genes, teams, heuristic = self._checked(genes, teams, heuristic)
-        n_teams, r = len(teams), self.world.n_robots
+        n_teams = len(teams)
         e, odd = divmod(len(scenarios), rounds)
         if odd or n_teams % rounds:
             raise ValueError(f"{n_teams} teams, {len(scenarios)} scenarios: not {rounds} rounds")
-        n_castes = len(self.world.castes)
         parts = []
         scene = self._scene(scenarios)
         job = self._job(len(scenarios), e, n_teams // rounds)
@@ -201,15 +200,7 @@ class Rollout:
             parts.append(self._collect(batch, n, e))
             first += n
         joined = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-        return Outcome(
-            fitness=joined["fitness"].reshape(n_teams, e, r),
-            counts=joined["counts"].reshape(n_teams, e, r, n_castes),
-            switches=joined["switches"].reshape(n_teams, e, r),
-            performance={
-                name: joined["performance"].reshape(n_teams, e, -1)[:, :, k]
-                for k, name in enumerate(one.name for one in measures_of(self.world))
-            },
-        )
+        return self._outcome(joined, n_teams, e)
 
     def record(
         self,
@@ -234,6 +225,16 @@ class Rollout:
             activation of the part in each slot; ``performance`` [T, measures], each as if the epoch
             ended there.
         """
+        return self.record_with_outcome(genes, team, scenarios, heuristic)[0]
+
+    def record_with_outcome(
+        self,
+        genes: npt.NDArray[np.float32],
+        team: npt.NDArray[np.int32],
+        scenarios: Scenarios,
+        heuristic: npt.NDArray[np.int32] | None = None,
+    ) -> tuple[dict[str, npt.NDArray[Any]], Outcome]:
+        """Return what ``record`` does, and the outcome of the same epoch, played once."""
         self._refuse_faulty(scenarios)
         if len(scenarios) != 1:
             raise ValueError(f"record takes one scenario, got {len(scenarios)}")
@@ -256,7 +257,8 @@ class Rollout:
             seen = _first(getattr(batch.memory, mind.probe), 1, probe)[0]
             steps["hidden"].append(seen[:, : self.genome.max_parts])
         final = {n: self._read(batch, n, 1)[0] for n in self._simulation.recorded_at_end}
-        return {name: np.stack(values) for name, values in steps.items()} | final
+        seen = {name: np.stack(values) for name, values in steps.items()} | final
+        return seen, self._outcome(self._collect(batch, 1, 1), 1, 1)
 
     def _refuse_faulty(self, scenarios: Scenarios) -> None:
         """Raise UsageError for scenarios that are not those of the world's scene."""
@@ -390,6 +392,17 @@ class Rollout:
     def _collect(self, batch: _Workspace, n_teams: int, e: int) -> dict[str, npt.NDArray[Any]]:
         names = ("fitness", "counts", "switches", "performance")
         return {name: self._read(batch, name, n_teams * e) for name in names}
+
+    def _outcome(self, arrays: dict[str, npt.NDArray[Any]], n: int, e: int) -> Outcome:
+        """Return what ``_collect`` has read of n teams in e scenarios as their outcome."""
+        r, measures = self.world.n_robots, measures_of(self.world)
+        performance = arrays["performance"].reshape(n, e, -1)
+        return Outcome(
+            fitness=arrays["fitness"].reshape(n, e, r),
+            counts=arrays["counts"].reshape(n, e, r, len(self.world.castes)),
+            switches=arrays["switches"].reshape(n, e, r),
+            performance={one.name: performance[:, :, k] for k, one in enumerate(measures)},
+        )
 
 
 def _first(array: Any, n: int, shape: tuple[int, ...]) -> npt.NDArray[Any]:
