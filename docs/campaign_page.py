@@ -15,10 +15,10 @@ from typing import Any
 
 import pages
 from conevo.analysis.claims import verdicts
-from conevo.analysis.frames import Tables, Value
 from conevo.analysis.report import write_report
 from conevo.analysis.statistics import compare, holm
 from conevo.campaigns.campaign import Campaign
+from conevo.campaigns.tables import Tables, Value
 from conevo.cli.find import sealed
 from conevo.evolution.methods.registry import METHODS
 from conevo.runs.run import Run

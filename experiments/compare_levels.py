@@ -19,8 +19,8 @@ from typing import Any
 import numpy as np
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "docs"))
-from conevo.analysis.frames import Tables
 from conevo.analysis.statistics import compare, holm
+from conevo.campaigns.tables import Tables
 from conevo.cli.find import find_campaign, sealed
 from conevo.errors import ConevoError, UsageError
 from conevo.evolution.methods.registry import title_of

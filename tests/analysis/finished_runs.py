@@ -11,7 +11,7 @@ from zlib import crc32
 import duckdb
 import numpy as np
 
-from conevo.analysis.frames import SCHEMA
+from conevo.campaigns.schema import SCHEMA
 from conevo.evolution.methods.registry import title_of
 
 METHODS = ("homcne", "hetcne", "ccga", "mesp", "cone")

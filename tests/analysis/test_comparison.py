@@ -16,7 +16,7 @@ from conevo.analysis.comparison import (
     summarize,
     treatments_of,
 )
-from conevo.analysis.frames import Value
+from conevo.campaigns.tables import Value
 from conevo.worlds.measures import Measure
 
 CONE, MESP, HOM = Treatment("cone", ""), Treatment("mesp", ""), Treatment("homcne", "")

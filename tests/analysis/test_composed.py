@@ -10,9 +10,9 @@ import pytest
 import conevo
 from analysis.claims.known_truth import pursuit, write_tables
 from conevo.analysis.composed import compose
-from conevo.analysis.frames import Tables
 from conevo.analysis.sections.composed import composed
 from conevo.analysis.sections.scope import scopes
+from conevo.campaigns.tables import Tables
 from conevo.runs.champions import Team
 from conevo.worlds.pursuit.study.behaviours import BEHAVIOURS
 from conevo.worlds.pursuit.study.captures import COMPOSITIONS

@@ -12,9 +12,10 @@ from scipy import stats
 from analysis.finished_runs import cells, write_campaign
 from conevo.analysis.comparison import Cell, Treatment, group_values
 from conevo.analysis.courses import caste_courses, courses, read_histories
-from conevo.analysis.frames import SCHEMA, Tables
 from conevo.analysis.sections.castes import castes
 from conevo.analysis.sections.scope import scopes
+from conevo.campaigns.schema import SCHEMA
+from conevo.campaigns.tables import Tables
 
 CONE = Cell("complex-1", Treatment("cone", ""))
 

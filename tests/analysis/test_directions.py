@@ -10,11 +10,12 @@ import pytest
 
 from analysis.claims.known_truth import Cell, write_tables
 from conevo.analysis.exhibits import Exhibit, Section
-from conevo.analysis.frames import SCHEMA, Tables
 from conevo.analysis.sections.comparisons import comparisons
 from conevo.analysis.sections.interventions import lesions
 from conevo.analysis.sections.performance import performance
 from conevo.analysis.sections.scope import scopes
+from conevo.campaigns.schema import SCHEMA
+from conevo.campaigns.tables import Tables
 
 TRUTH = {("complex-1", "mesp"): Cell(100.0), ("complex-1", "cone"): Cell(200.0)}
 

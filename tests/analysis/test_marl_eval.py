@@ -9,8 +9,9 @@ from pathlib import Path
 import duckdb
 import pytest
 
-from conevo.analysis.frames import SCHEMA, Tables
 from conevo.analysis.marl_eval import STEPS, export, left_out
+from conevo.campaigns.schema import SCHEMA
+from conevo.campaigns.tables import Tables
 
 GENERATIONS = 8
 BUDGET = 800  # team-steps

@@ -15,7 +15,6 @@ import pytest
 
 from analysis.finished_runs import Cell, cells, mean_of, write_campaign
 from conevo.analysis.courses import read_histories
-from conevo.analysis.frames import Tables
 from conevo.analysis.report import sections_of, write_report
 from conevo.analysis.sections.behaviours import behaviours
 from conevo.analysis.sections.castes import castes
@@ -23,6 +22,7 @@ from conevo.analysis.sections.champions import champions
 from conevo.analysis.sections.interventions import lesions
 from conevo.analysis.sections.overview import read_campaign
 from conevo.analysis.sections.scope import scopes
+from conevo.campaigns.tables import Tables
 from conevo.errors import UsageError
 
 pytestmark = pytest.mark.filterwarnings("error")

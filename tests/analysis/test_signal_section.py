@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 
 from analysis.finished_runs import Cell, write_campaign
-from conevo.analysis.frames import Tables
 from conevo.analysis.report import write_report
 from conevo.analysis.sections.comparisons import comparisons
 from conevo.analysis.sections.scope import scopes
 from conevo.analysis.sections.signal import blind_cells, signal
+from conevo.campaigns.tables import Tables
 
 OF = [
     Cell("rover", "complex-1", "homcne", reliability=0.6),

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pytest
 
-from conevo.analysis.frames import Tables
 from conevo.analysis.report import write_report
 from conevo.analysis.studies import study
 from conevo.campaigns.campaign import Campaign, create
@@ -15,6 +14,7 @@ from conevo.campaigns.executors.local import Serial
 from conevo.campaigns.plan import Plan
 from conevo.campaigns.plan_file import read_plan
 from conevo.campaigns.progress import progress_of
+from conevo.campaigns.tables import Tables
 from conevo.campaigns.work import planned_runs
 from conevo.errors import UsageError
 from conevo.reading import read_json

@@ -15,7 +15,6 @@ from typing import NamedTuple
 import numpy as np
 
 from conevo.analysis.bootstrap import iqm_interval, probability_of_improvement
-from conevo.analysis.frames import Value
 from conevo.analysis.statistics import (
     ALPHA,
     Comparison,
@@ -27,6 +26,7 @@ from conevo.analysis.statistics import (
     mean_interval,
     normality,
 )
+from conevo.campaigns.tables import Value
 from conevo.evolution.methods.registry import METHODS, title_of
 
 __all__ = [

@@ -16,8 +16,8 @@ import numpy as np
 import numpy.typing as npt
 
 from conevo.analysis.comparison import Cell, Group, Treatment
-from conevo.analysis.frames import Tables
 from conevo.analysis.statistics import ALPHA
+from conevo.campaigns.tables import Tables
 
 __all__ = ["COURSES", "Course", "Histories", "caste_courses", "courses", "read_histories"]
 

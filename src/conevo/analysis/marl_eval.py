@@ -33,7 +33,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from conevo.analysis.frames import Tables
+from conevo.campaigns.tables import Tables
 
 __all__ = ["STEPS", "export", "left_out"]
 

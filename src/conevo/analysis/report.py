@@ -29,7 +29,6 @@ from typing_extensions import TypedDict
 
 from conevo.analysis.courses import read_histories
 from conevo.analysis.exhibits import Exhibit, Figure, Section, Table
-from conevo.analysis.frames import Tables
 from conevo.analysis.latex import document, figures_to_latex, to_latex
 from conevo.analysis.marl_eval import export
 from conevo.analysis.sections.behaviours import behaviours
@@ -46,6 +45,7 @@ from conevo.analysis.sections.overview import Campaign, overview, read_campaign,
 from conevo.analysis.sections.performance import performance
 from conevo.analysis.sections.scope import Scope, scopes
 from conevo.analysis.sections.signal import signal
+from conevo.campaigns.tables import Tables
 from conevo.errors import UsageError
 from conevo.reading import DamagedFile, read_bytes, read_json
 from conevo.runs.drafts import draft_of

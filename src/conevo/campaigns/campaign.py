@@ -12,7 +12,7 @@
     studies/signal/       the signal of its populations, as LABEL.json
     ended/LABEL.json      how the last worker of a run ended
     logs/LABEL.txt        what its workers said
-    tables/*.parquet      what analysis reads, made of all that is finished
+    tables/*.parquet      what reports read, made of all that is finished
     lock                  held (flock) by the coordinator
 
 Runs, not the ledger, are the truth: whatever is killed, starting the campaign again finishes what
@@ -305,7 +305,7 @@ class Campaign:
     @property
     def is_sealed(self) -> bool:
         """Whether its tables are those of all that is finished."""
-        from conevo.campaigns.tables import is_sealed
+        from conevo.campaigns.sealing import is_sealed
 
         return is_sealed(self.places, self._finished)
 
@@ -320,7 +320,7 @@ class Campaign:
             into: a folder to make them in, if not the campaign's own.
         """
         if finished := self._finished:
-            from conevo.campaigns.tables import seal_tables  # loads numpy
+            from conevo.campaigns.sealing import seal_tables  # loads numpy
 
             spent = {entry.label: entry.core_seconds for entry in self.ledger.entries()}
             seal_tables(self.places, finished, spent, into)

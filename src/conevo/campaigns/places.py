@@ -48,7 +48,7 @@ class Places:
 
     @property
     def tables(self) -> Path:
-        """Parquet files for analysis."""
+        """Parquet files for questions and reports."""
         return self.root / "tables"
 
     @property

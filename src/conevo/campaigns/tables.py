@@ -1,272 +1,267 @@
-"""The tables that analysis reads: everything that is finished, as Parquet.
-
-One row per run, score, generation and so on, made by DuckDB from the files of the runs and their
-studies; their columns are ``analysis.frames.SCHEMA``. All are made anew when more is finished.
-"""
+"""The tables of a campaign, opened for questions: DuckDB over sealed Parquet."""
 
 from __future__ import annotations
 
-import json
-import shutil
-from collections.abc import Iterator, Mapping, Sequence
+from collections import defaultdict
 from pathlib import Path
-from typing import Any
+from types import TracebackType
+from typing import Any, NamedTuple
 
-from conevo.analysis.exchange import exchanged
-from conevo.analysis.frames import SCHEMA
-from conevo.analysis.study_record import SignalStudy, Study
-from conevo.campaigns.ended import read_ended
-from conevo.campaigns.places import Places
-from conevo.campaigns.plan import PlannedRun
-from conevo.errors import ConevoError
-from conevo.evolution.methods.registry import title_of
-from conevo.reading import DamagedFile, read_json
-from conevo.runs.code import changes_text, sessions_of
-from conevo.runs.directory import as_json
-from conevo.runs.drafts import draft_of
-from conevo.runs.durable import replace_file, sync_directory, writing
-from conevo.runs.outline import Outline
-from conevo.runs.provenance import describe_world
-from conevo.runs.run import Run
-from conevo.runs.shrinkage import shrinkage
-from conevo.runs.store import Store
+import numpy as np
+import numpy.typing as npt
 
-__all__ = ["is_sealed", "seal_tables"]
+from conevo.campaigns.schema import SCHEMA
+from conevo.errors import UsageError
+from conevo.evolution.methods.registry import remember_title
+from conevo.worlds.measures import Measure
 
-MANIFEST = "tables.json"
-Row = dict[str, Any]
+__all__ = ["Tables", "Value"]
+
+QUERY = '"SELECT method, count(*) FROM runs GROUP BY ALL"'
+QUERIES = ("SELECT", "EXPLAIN", "MULTI")  # as DuckDB names them: VALUES is a SELECT, PIVOT MULTI
+NEAR = 0.2  # budgets that differ by no more are one
 
 
-def is_sealed(places: Places, finished: Sequence[PlannedRun]) -> bool:
-    """Whether the tables are those of exactly these runs."""
-    path = places.tables / MANIFEST
-    if not all((places.tables / f"{table}.parquet").is_file() for table in SCHEMA):
-        return False
-    try:
-        return path.is_file() and read_json(path) == _manifest(finished) | {"left_out": {}}
-    except DamagedFile:
-        return False
+class Value(NamedTuple):
+    """What one run reached: the unit of all statistics.
+
+    budget: of the group of runs that may be compared with it, see ``Tables``.
+    measure: which task performance measure ``value`` is, with its unit and direction.
+    optimum: its largest possible value, known for a world's main measure only.
+    value: mean over the scenarios of a study.
+    """
+
+    run: str
+    task: str
+    world: str
+    environment: str
+    family: str
+    number: int
+    method: str
+    preset: str
+    variant: str
+    seed: int
+    budget: str
+    measure: Measure
+    optimum: float | None
+    value: float
 
 
-def seal_tables(
-    places: Places,
-    finished: Sequence[PlannedRun],
-    spent: Mapping[str, float],
-    into: Path | None = None,
-) -> None:
-    """Make the tables of these runs, unless they are there.
+class Tables:
+    """The tables of a campaign: one connection, the tables of ``SCHEMA``, and ``budgets``.
 
-    A run whose files are damaged, or are not those that it was sealed with, is left out, and the
-    manifest shows which and why; it is looked at again the next time. A kill leaves the tables that
-    were there before, or none.
+    Read into memory once: whatever is asked, no file is written or read any more. A table without
+    a file is empty. Runs that are one and the same (the first stages of two
+    shapings that differ later only) count once: the first by name stays in ``runs``.
+
+    ``budgets`` (run, budget) tells which runs may be compared: those of one world, one preset, and
+    about equal numbers of team evaluations and of team-steps per evaluation; stages of shapings
+    apart. Choice: "about equal" is within 20 %, as methods do not divide a budget evenly and CONE
+    spends some on type C. A run that ended because the next generation would have exceeded its
+    budget counts with that budget, whatever it spent of it, and so does one that ended at its
+    target before. Without a budget, the latter counts with those it saved evaluations to.
+
+    Use as a context, or ``close`` it.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        """Open the Parquet files of a folder.
+
+        Raises:
+            UsageError: no runs.parquet there, or a file without one of the columns.
+        """
+        import duckdb
+
+        self.folder = Path(folder)
+        if not (self.folder / "runs.parquet").is_file():
+            raise UsageError(f"no table of runs in {self.folder} (runs.parquet)")
+        # One thread: sums of floats then have one order, so that a report has one text.
+        self._connection = duckdb.connect(":memory:", config={"threads": 1})
+        for table, columns in SCHEMA.items():
+            self._open(table, columns)
+        for name, title in self.query("SELECT DISTINCT method, title FROM runs ORDER BY ALL")[1]:
+            remember_title(name, title or name)
+        self._connection.execute("CREATE TABLE budgets (run VARCHAR, budget VARCHAR)")
+        rows = self.query(
+            "SELECT run, world, preset, contains(run, '/stage-'), stopped_by, planned_evaluations,"
+            " evaluations, team_steps FROM runs ORDER BY ALL"
+        )[1]
+        named = sorted(_budgets(rows).items())
+        self._connection.executemany("INSERT INTO budgets VALUES (?, ?)", named or [("", "")])
+        self._connection.execute("SET enable_external_access = false")
+        self._connection.execute("SET lock_configuration = true")
+
+    def ask(self, sql: str) -> tuple[list[str], list[tuple[Any, ...]]]:
+        """Return what ``query`` does of a text that must only ask: anybody's.
+
+        Raises:
+            UsageError: a statement that is not a query, or as ``query``.
+        """
+        import duckdb
+
+        try:
+            statements = self._connection.extract_statements(sql)
+        except duckdb.Error as error:
+            raise _refused(error) from error
+        for one in statements:
+            if one.type.name not in QUERIES:
+                raise UsageError(f"{one.type.name} is not a query; ask as in {QUERY}")
+        return self.query(sql)
+
+    def query(self, sql: str) -> tuple[list[str], list[tuple[Any, ...]]]:
+        """Return the column names and the rows that one SQL statement gives.
+
+        Raises:
+            UsageError: no statement, or DuckDB's reason for refusing it.
+        """
+        import duckdb
+
+        try:
+            result = self._connection.execute(sql)
+            if result is None or not result.description:
+                raise UsageError(f"no SQL statement, as in {QUERY}")
+            return [str(column[0]) for column in result.description], result.fetchall()
+        except duckdb.Error as error:
+            raise _refused(error) from error
+
+    def arrays(self, sql: str) -> dict[str, npt.NDArray[np.float64]]:
+        """Return the columns of numbers that one SQL statement gives, as arrays: NULL is NaN.
+
+        For many rows, where ``query`` would make a Python object of each number.
+
+        Raises:
+            UsageError: as ``query``.
+        """
+        import duckdb
+
+        try:
+            columns = self._connection.execute(sql).fetchnumpy()
+        except duckdb.Error as error:
+            raise _refused(error) from error
+        return {
+            name: np.ma.filled(np.ma.asarray(column).astype(np.float64), np.nan)
+            for name, column in columns.items()
+        }
+
+    def values(
+        self, measure: str | None = None, study: str = "test", team: str | None = "champion"
+    ) -> list[Value]:
+        """Return the mean over scenarios of a measure, a row per run that has it.
+
+        Ordered by task, budget, variant, method, seed and run. Runs whose mean is not a finite
+        number are left out.
+
+        Args:
+            measure: one of the world's task performance measures; None: each world's main one.
+            study: "test" (of the finished run), "lesion", "clones", "rotated" or "composed".
+            team: test: "champion" or "generation 0"; lesion and clones: "whole" or a caste;
+                rotated: "whole" or "moved"; composed: a collective behaviour.
+        """
+        rows = self._connection.execute(
+            """
+            SELECT r.run, r.task, r.world, r.environment, r.family, r.number, r.method, r.preset,
+                   r.variant, r.seed, b.budget, s.measure, coalesce(m.unit, ''),
+                   coalesce(m.larger_is_better, true), m.low, m.high,
+                   if(s.measure = r.measure, r.optimum, NULL) AS optimum, avg(s.value) AS value
+            FROM runs r JOIN budgets b USING (run) JOIN scores s USING (run)
+                 LEFT JOIN measures m ON m.run = s.run AND m.measure = s.measure
+            WHERE s.study = $study AND s.team = $team AND s.measure = coalesce($measure, r.measure)
+            GROUP BY ALL
+            HAVING isfinite(avg(s.value))
+            ORDER BY r.world, r.family, r.number, r.task, b.budget, r.variant, r.method, r.seed,
+                     r.run
+            """,
+            {"study": study, "team": team, "measure": measure},
+        ).fetchall()
+        return [
+            Value._make((*about, Measure(name, unit, is_larger, low, high), optimum, value))
+            for *about, name, unit, is_larger, low, high, optimum, value in rows
+        ]
+
+    def close(self) -> None:
+        """Let go of the connection."""
+        self._connection.close()
+
+    def __enter__(self) -> Tables:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def _open(self, table: str, columns: dict[str, str]) -> None:
+        """Read one table."""
+        import duckdb
+
+        file = self.folder / f"{table}.parquet"
+        if file.is_file():
+            listed = ", ".join(
+                f'CAST("{name}" AS {kind}) AS "{name}"' for name, kind in columns.items()
+            )
+            quoted = str(file).replace("'", "''")
+            source = f"SELECT {listed} FROM read_parquet('{quoted}')"
+        else:
+            listed = ", ".join(f'NULL::{kind} AS "{name}"' for name, kind in columns.items())
+            source = f"SELECT {listed} WHERE false"
+        if table == "runs":
+            source += (
+                " QUALIFY row_number() OVER (PARTITION BY run_id, task, method, preset, variant,"
+                " seed ORDER BY run) = 1"
+            )
+        try:
+            self._connection.execute(f"CREATE TABLE {table} AS {source}")
+        except duckdb.Error as error:
+            line = " ".join(str(error).split("\n")[0].split())
+            raise UsageError(f"{file} is not a table of {table}: {line}") from error
+
+
+def _refused(error: Exception) -> UsageError:
+    """Return what DuckDB says about a statement, in one line."""
+    return UsageError(f"query: {' '.join(str(error).split('LINE 1:')[0].split())}")
+
+
+def _budgets(rows: list[tuple[Any, ...]]) -> dict[str, str]:
+    """Return the budget of each run in words.
 
     Args:
-        places: of the campaign.
-        finished: its finished runs.
-        spent: core seconds by label, as far as the ledger knows them.
-        into: the folder to make, by default that of the campaign.
-
-    Raises:
-        UsageError: every run is damaged.
-        EnvironmentFailure: they cannot be written.
+        rows: run, world, preset, whether a stage of a shaping, stopped_by, planned evaluations,
+            evaluations, team_steps.
     """
-    folder = into or places.tables
-    if into is None and is_sealed(places, finished):
-        return
-    import duckdb
-
-    with writing(folder), draft_of(folder) as draft:
-        draft.mkdir()
-        files = {name: (draft / f"{name}.jsonl").open("w", encoding="utf-8") for name in SCHEMA}
-        left_out: dict[str, str] = {}
-        for planned in finished:
-            cost = max(spent.get(planned.label, 0.0), _last_cost(places, planned.label))
-            try:
-                rows = list(_rows(places, planned, cost))
-            except ConevoError as error:
-                left_out[planned.label] = str(error)
-                continue
-            for table, row in rows:
-                files[table].write(json.dumps(row, allow_nan=False) + "\n")
-        if len(left_out) == len(finished) > 0:
-            raise DamagedFile(next(iter(left_out.values())))
-        for file in files.values():
-            file.close()
-        for table, columns in SCHEMA.items():
-            source, target = draft / f"{table}.jsonl", draft / f"{table}.parquet"
-            duckdb.sql(
-                f"COPY (SELECT * FROM read_json({_quoted(source)}, format='newline_delimited', "
-                f"columns={columns})) TO {_quoted(target)} (FORMAT parquet, COMPRESSION zstd)"
-            )
-            source.unlink()
-        replace_file(draft / MANIFEST, as_json(_manifest(finished) | {"left_out": left_out}))
-        shutil.rmtree(folder, ignore_errors=True)
-        draft.rename(folder)
-        sync_directory(folder.parent)
+    scales = defaultdict(list)
+    for run, world, preset, is_stage, stopped_by, planned, evaluations, steps in rows:
+        counted = (stopped_by in ("budget", "target") and planned) or evaluations
+        is_saver = stopped_by == "target" and not planned
+        one = (is_saver, counted, steps / max(evaluations, 1), run)
+        scales[world, preset, is_stage].append(one)
+    budgets = {}
+    for (_, preset, is_stage), runs in scales.items():
+        for alike in _apart(runs, 2):
+            steps = _rounded(min(one[2] for one in alike))
+            groups = _apart([one for one in alike if not one[0]] or alike, 1)
+            for one in alike:
+                group = next((g for g in groups if one[1] <= g[-1][1]), groups[-1])
+                budgets[one[3]] = (
+                    f"{preset}, about {_rounded(group[0][1]):,} team evaluations"
+                    f"{' a stage' if is_stage else ''} of {steps:,} team-steps"
+                )
+    return budgets
 
 
-def _manifest(finished: Sequence[PlannedRun]) -> Row:
-    return {
-        "columns": SCHEMA,
-        "runs": {run.label: list(run.run_ids) for run in finished},
-        "studies": {run.label: list(run.studies) for run in finished},
-    }
+def _apart(runs: list[tuple[Any, ...]], column: int) -> list[list[tuple[Any, ...]]]:
+    """Return runs in groups, ascending in a column; neighbours in a group are within 20 %."""
+    ordered = sorted(runs, key=lambda one: (one[column], one))
+    groups = [ordered[:1]]
+    for one in ordered[1:]:
+        if one[column] > (1 + NEAR) * groups[-1][-1][column]:
+            groups.append([])
+        groups[-1].append(one)
+    return groups
 
 
-def _quoted(path: Path) -> str:
-    return "'" + str(path).replace("'", "''") + "'"
-
-
-def _last_cost(places: Places, label: str) -> float:
-    """Return the core seconds of a run's last worker, which may have known no coordinator."""
-    ended = read_ended(places.ended(label))
-    return ended["core_seconds"] if ended is not None else 0.0
-
-
-def _rows(places: Places, planned: PlannedRun, cost: float) -> Iterator[tuple[str, Row]]:
-    """Yield every row that a finished run has in any table."""
-    for name, parts in planned.courses.items():
-        runs = [Run(places.run(part)) for part in parts]
-        tests = [_tested(run) for run in runs]
-        run, provenance = runs[-1], runs[-1].provenance
-        records, sessions, before = _joined(runs)
-        test = tests[-1] | {"generation_0": tests[0]["generation_0"]}
-        world = provenance.get("world") or describe_world(run.config.build_world())  # 0.1.0: none
-        measures = world["measures"]
-        exchanges, share = exchanged(run.generations())
-        budgets = [one.outline.budget_evaluations for one in runs]
-        yield (
-            "runs",
-            _run_row(planned, run.outline, world["name"], provenance, records, sessions)
-            | {
-                "run": name,
-                "planned_evaluations": sum(budgets) if all(budgets) else None,
-                "measure": measures[0]["name"],
-                "optimum": world["optimum"],
-                "n_robots": world["n_robots"],
-                "core_seconds": cost / len(planned.courses),
-                "exchanges": exchanges,
-                "exchange_share": share,
-            },
-        )
-        for one in measures:
-            about = {key: one.get(key) for key in ("unit", "larger_is_better", "low", "high")}
-            yield "measures", {"run": name, "measure": one["name"]} | about
-        for team, title in (("champion", "champion"), ("generation_0", "generation 0")):
-            for measure, values in test[team]["performance"].items():
-                about = {"run": name, "study": "test", "team": title, "measure": measure}
-                for scenario, value in enumerate(values["values"]):
-                    yield "scores", about | {"scenario": scenario, "value": value}
-        for row in shrinkage(test) if "validation" in test else ():
-            yield "champions", _champion_row(name, test["validation"], row, before)
-        for record in records:
-            yield from _generation_rows(name, record)
-        if places.study(name).is_file():
-            yield from _study_rows(name, read_json(places.study(name), Study))
-        if places.study(name, "signal").is_file():
-            for row in read_json(places.study(name, "signal"), SignalStudy)["signal"]:
-                yield "signal", {"run": name} | {k: row[k] for k in SCHEMA["signal"] if k in row}
-
-
-def _tested(run: Run) -> Row:
-    """Return the testing phase of a run, after checking that it is as it was sealed."""
-    test = run.test_result
-    if test is None or not run.generations():
-        raise DamagedFile(f"{run.path} is sealed, but lacks its generations or its testing phase")
-    Store(run.path).refuse_changed()
-    return test
-
-
-def _joined(runs: Sequence[Run]) -> tuple[list[Row], list[Row], int]:
-    """Return the generations and sessions of a run, or of its stages as those of one run.
-
-    Generations, team evaluations and team-steps are counted through the stages.
-
-    Returns:
-        Both, and the number of generations before the last stage.
-    """
-    records: list[Row] = []
-    sessions: list[Row] = []
-    before = 0
-    for run in runs:
-        before, last = len(records), records[-1] if records else {}
-        sessions += map(dict, sessions_of(run.provenance, before))
-        for record in run.generations():
-            summed = {k: record[k] + last.get(k, 0) for k in ("team_evaluations", "team_steps")}
-            records.append(record | summed | {"generation": before + record["generation"]})
-    return records, sessions, before
-
-
-def _run_row(
-    planned: PlannedRun,
-    run: Outline,
-    world: str,
-    provenance: Row,
-    records: Sequence[Row],
-    sessions: Sequence[Row],
-) -> Row:
-    environment = run.environment
-    family, _, number = environment.rpartition("-")
-    is_numbered = bool(family) and number.isdecimal()
-    return {
-        "task": f"{world}/{environment}",
-        "world": world,
-        "environment": environment,
-        "family": family if is_numbered else environment,
-        "number": int(number) if is_numbered else 0,
-        "method": run.method,
-        "title": title_of(run.method),
-        "preset": run.preset,
-        "seed": run.seed,
-        "variant": planned.variant,
-        "generations": len(records),
-        "evaluations": records[-1]["team_evaluations"],
-        "team_steps": records[-1]["team_steps"],
-        "seconds": sum(record["seconds"] for record in records),
-        "stopped_by": provenance["stopped_by"],
-        "run_id": provenance["run_id"],
-        "conevo": provenance["conevo"],
-        "code": ", ".join(dict.fromkeys(one.get("code", "") for one in sessions)),
-        "changes": "; ".join(changes_text(sessions)),
-        "numpy": provenance["numpy"],
-        "warp": provenance["warp"],
-        "kernel_hash": provenance["kernel_hash"],
-    }
-
-
-def _generation_rows(name: str, record: Row) -> Iterator[tuple[str, Row]]:
-    generation = record["generation"]
-    yield (
-        "generations",
-        {
-            "run": name,
-            "generation": generation,
-            "evaluations": record["team_evaluations"],
-            "team_steps": record["team_steps"],
-            "value": next(iter(record["performance"].values())),
-            "fitness": record["team_fitness"],
-            "specialization": record["specialization"],
-            "sst": record["sst"],
-            "gst": record["gst"],
-            "recombinations": record["recombinations"],
-            "type_c_evaluations": record.get("type_c_evaluations"),  # since conevo 0.2
-            "hidden": sum(record["n_hidden"]) / len(record["n_hidden"]),
-        },
-    )
-    for caste, robots in record["castes"].items():
-        about = {"run": name, "generation": generation}
-        yield "castes", about | {"caste": caste, "robots": robots}
-
-
-def _champion_row(name: str, validation: Row, row: Row, before: int) -> Row:
-    means = {key: row[key]["mean"] for key in ("validation", "test")}
-    about = {"run": name, "generation": before + validation["chosen"]}
-    return about | {"finalists": len(validation["finalists"])} | row | means
-
-
-def _study_rows(name: str, study: Row) -> Iterator[tuple[str, Row]]:
-    for metric, value in study["metrics"].items():
-        yield "metrics", {"run": name, "metric": metric, "value": value}
-    for table in ("scores", "robots", "actions", "behaviours"):
-        for row in study[table]:
-            yield table, {"run": name} | row
+def _rounded(number: float) -> int:
+    """Return a number with two significant digits."""
+    return int(float(f"{number:.2g}"))

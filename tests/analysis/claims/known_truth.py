@@ -14,7 +14,7 @@ from typing import Any
 
 import duckdb
 
-from conevo.analysis.frames import SCHEMA
+from conevo.campaigns.schema import SCHEMA
 
 METHODS = ("homcne", "hetcne", "ccga", "mesp", "cone")
 VARIANTS = ("cone-1", "cone-2", "cone-3")

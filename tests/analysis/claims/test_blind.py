@@ -10,7 +10,8 @@ import pytest
 
 from analysis.claims.known_truth import rover, write_tables
 from conevo.analysis.claims import CLAIMS, Verdict, verdicts
-from conevo.analysis.frames import SCHEMA, Tables
+from conevo.campaigns.schema import SCHEMA
+from conevo.campaigns.tables import Tables
 
 BY_ID = {claim.id: claim for claim in CLAIMS}
 

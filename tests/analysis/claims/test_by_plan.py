@@ -10,8 +10,8 @@ import pytest
 
 from analysis.claims.known_truth import METHODS, TRUTHS, Cell, Truth, write_tables
 from conevo.analysis.claims import CLAIMS, Verdict, verdicts
-from conevo.analysis.frames import Tables
 from conevo.campaigns.plan_file import read_preset
+from conevo.campaigns.tables import Tables
 
 BY_ID = {claim.id: claim for claim in CLAIMS}
 SETTINGS = {

@@ -10,7 +10,7 @@ import pytest
 
 from analysis.claims.known_truth import METHODS, TRUTHS, Truth, of_robots, write_tables
 from conevo.analysis.claims import CLAIMS, Claim, Verdict, verdicts
-from conevo.analysis.frames import Tables
+from conevo.campaigns.tables import Tables
 
 BY_ID = {claim.id: claim for claim in CLAIMS}
 CONTRADICTORY = {"R6", "R20", "P11", "P16", "P17", "G8", "G15"}  # by the thesis itself

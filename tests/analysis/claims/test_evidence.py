@@ -15,7 +15,8 @@ from conevo.analysis.claims import CLAIMS, verdicts
 from conevo.analysis.claims.evidence import read_evidence
 from conevo.analysis.claims.quantities import QUANTITIES
 from conevo.analysis.claims.statements import Compare, Sample, Within
-from conevo.analysis.frames import SCHEMA, Tables
+from conevo.campaigns.schema import SCHEMA
+from conevo.campaigns.tables import Tables
 
 RUN = {
     "run": "a",

@@ -9,8 +9,8 @@ import duckdb
 
 from analysis.claims.known_truth import rover, write_tables
 from conevo.analysis.claims import CLAIMS
-from conevo.analysis.frames import Tables
 from conevo.analysis.sections.claims import claims
+from conevo.campaigns.tables import Tables
 
 
 def test_two_methods_have_the_claims_about_them_and_one_line_for_the_rest(tmp_path: Path) -> None:

@@ -12,8 +12,8 @@ from conevo.analysis.claims.quantities import QUANTITIES
 from conevo.analysis.claims.statements import Compare, Sample, Within
 from conevo.analysis.comparison import levels_of
 from conevo.analysis.exchange import is_idle
-from conevo.analysis.frames import Tables
 from conevo.analysis.repeatability import has_signal
+from conevo.campaigns.tables import Tables
 
 __all__ = ["Evidence", "Gathered", "RunOf", "read_evidence"]
 

@@ -26,8 +26,8 @@ from conevo.analysis.claims.cells import Cell, Outcome, measure
 from conevo.analysis.claims.evidence import Evidence, read_evidence
 from conevo.analysis.claims.quantities import QUANTITIES
 from conevo.analysis.claims.statements import Claim, Compare, Part, Sample
-from conevo.analysis.frames import Tables
 from conevo.analysis.power import CAMPAIGNS, Drawn, draw, found_alike
+from conevo.campaigns.tables import Tables
 
 __all__ = ["Verdict", "judge", "verdicts"]
 

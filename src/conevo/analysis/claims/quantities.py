@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from conevo.analysis.claims.sensitivity import changed
-from conevo.analysis.frames import Tables
+from conevo.campaigns.tables import Tables
 
 __all__ = ["QUANTITIES", "Quantity", "Reading"]
 

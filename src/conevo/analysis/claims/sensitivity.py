@@ -18,7 +18,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from conevo.analysis.comparison import levels_of
-from conevo.analysis.frames import Tables, Value
+from conevo.campaigns.tables import Tables, Value
 
 __all__ = ["changed"]
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from conevo.analysis.comparison import Group
-from conevo.analysis.frames import Tables
+from conevo.campaigns.tables import Tables
 
 __all__ = ["Spent", "headings", "spent_by"]
 

@@ -9,8 +9,8 @@ from conevo.analysis.claims import Verdict, verdicts
 from conevo.analysis.claims.wording import place_of, what_of
 from conevo.analysis.exchange import per_generation
 from conevo.analysis.exhibits import Column, Section, Table, interval, number, p_value, plain
-from conevo.analysis.frames import Tables
 from conevo.analysis.repeatability import LEAST_RELIABILITY
+from conevo.campaigns.tables import Tables
 
 __all__ = ["claims"]
 

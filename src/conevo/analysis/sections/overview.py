@@ -9,7 +9,7 @@ from typing import Any
 from typing_extensions import TypedDict
 
 from conevo.analysis.exhibits import Column, Section, Table, number, plain
-from conevo.analysis.frames import Tables
+from conevo.campaigns.tables import Tables
 from conevo.errors import ConevoError
 from conevo.evolution.methods.registry import name_in
 from conevo.reading import parse_toml, read_json, read_json_lines, read_text

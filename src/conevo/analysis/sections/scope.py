@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 from conevo.analysis.comparison import Cell, Group, Treatment, group_values, treatments_of
 from conevo.analysis.exhibits import Column, number, plain, slug
-from conevo.analysis.frames import Tables, Value
 from conevo.analysis.sections.arrangement import Arrangement, arrange
+from conevo.campaigns.tables import Tables, Value
 from conevo.worlds.measures import Measure
 
 __all__ = ["KEYS", "Scope", "named", "place_names", "scopes", "sizes", "span"]

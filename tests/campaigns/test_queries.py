@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from analysis.finished_runs import Cell, cells, write_campaign
-from conevo.analysis.frames import SCHEMA, Tables
+from conevo.campaigns.schema import SCHEMA
+from conevo.campaigns.tables import Tables
 from conevo.errors import UsageError
 
 

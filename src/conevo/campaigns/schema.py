@@ -1,0 +1,139 @@
+"""The tables of a campaign: their columns, for who writes them and for who asks."""
+
+__all__ = ["SCHEMA"]
+
+SCHEMA: dict[str, dict[str, str]] = {
+    "runs": {
+        "run": "VARCHAR",
+        "task": "VARCHAR",
+        "world": "VARCHAR",
+        "environment": "VARCHAR",
+        "family": "VARCHAR",
+        "number": "INTEGER",
+        "method": "VARCHAR",
+        "title": "VARCHAR",
+        "preset": "VARCHAR",
+        "seed": "BIGINT",
+        "variant": "VARCHAR",
+        "generations": "INTEGER",
+        "planned_evaluations": "BIGINT",
+        "evaluations": "BIGINT",
+        "team_steps": "BIGINT",
+        "seconds": "DOUBLE",
+        "core_seconds": "DOUBLE",
+        "stopped_by": "VARCHAR",
+        "measure": "VARCHAR",
+        "optimum": "DOUBLE",
+        "n_robots": "INTEGER",
+        "exchanges": "DOUBLE",
+        "exchange_share": "DOUBLE",
+        "run_id": "VARCHAR",
+        "conevo": "VARCHAR",
+        "code": "VARCHAR",
+        "changes": "VARCHAR",
+        "numpy": "VARCHAR",
+        "warp": "VARCHAR",
+        "kernel_hash": "VARCHAR",
+    },
+    "measures": {
+        "run": "VARCHAR",
+        "measure": "VARCHAR",
+        "unit": "VARCHAR",
+        "larger_is_better": "BOOLEAN",
+        "low": "DOUBLE",
+        "high": "DOUBLE",
+    },
+    "scores": {
+        "run": "VARCHAR",
+        "study": "VARCHAR",
+        "team": "VARCHAR",
+        "measure": "VARCHAR",
+        "scenario": "INTEGER",
+        "value": "DOUBLE",
+    },
+    "champions": {
+        "run": "VARCHAR",
+        "generation": "INTEGER",
+        "finalists": "INTEGER",
+        "measure": "VARCHAR",
+        "selection": "DOUBLE",
+        "validation": "DOUBLE",
+        "test": "DOUBLE",
+        "ratio": "DOUBLE",
+    },
+    "generations": {
+        "run": "VARCHAR",
+        "generation": "INTEGER",
+        "evaluations": "BIGINT",
+        "team_steps": "BIGINT",
+        "value": "DOUBLE",
+        "fitness": "DOUBLE",
+        "specialization": "DOUBLE",
+        "sst": "DOUBLE",
+        "gst": "DOUBLE",
+        "recombinations": "INTEGER",
+        "type_c_evaluations": "INTEGER",
+        "hidden": "DOUBLE",
+    },
+    "castes": {
+        "run": "VARCHAR",
+        "generation": "INTEGER",
+        "caste": "VARCHAR",
+        "robots": "INTEGER",
+    },
+    "robots": {
+        "run": "VARCHAR",
+        "robot": "INTEGER",
+        "caste": "VARCHAR",
+        "specialization": "DOUBLE",
+        "fitness": "DOUBLE",
+        "hidden": "INTEGER",
+        "favourite_setting": "VARCHAR",
+        "setting_share": "DOUBLE",
+        "affinity": "DOUBLE",
+        "favourite_action": "VARCHAR",
+        "action_share": "DOUBLE",
+        "independent": "DOUBLE",
+        "relative": "DOUBLE",
+    },
+    "actions": {"run": "VARCHAR", "robot": "INTEGER", "action": "VARCHAR", "count": "BIGINT"},
+    "metrics": {"run": "VARCHAR", "metric": "VARCHAR", "value": "DOUBLE"},
+    "signal": {
+        "run": "VARCHAR",
+        "unit": "VARCHAR",
+        "generation": "VARCHAR",
+        "genotypes": "INTEGER",
+        "trials": "INTEGER",
+        "icc": "DOUBLE",
+        "standard_error": "DOUBLE",
+        "low": "DOUBLE",
+        "high": "DOUBLE",
+        "scheme": "INTEGER",
+        "icc_of_scheme": "DOUBLE",
+        "low_of_scheme": "DOUBLE",
+        "high_of_scheme": "DOUBLE",
+        "rounds_for_half": "DOUBLE",
+    },
+    "behaviours": {
+        "run": "VARCHAR",
+        "kind": "VARCHAR",
+        "behaviour": "VARCHAR",
+        "count": "INTEGER",
+    },
+}
+"""Columns of each table and their DuckDB types, as written to and read from NAME.parquet.
+
+``runs``: one row for each run or stage of a shaping. Two stages of one task, of which another
+method evolves the first, are one run: generations, evaluations and team_steps are counted through
+both, here and in ``generations``; method and champion are the second's, generation 0 is the
+first's. title is the method's name as published; planned_evaluations is the budget of team
+evaluations that a run was given, NULL without one; evaluations is what it spent; exchanges is the
+number of pairs of sub-populations that recombined between populations, in the mean of the
+generations, exchange_share that of the pairs that could have; both are NULL for methods that never
+do. ``robots``: specialization is S, independent the S of independent draws from the robot's shares,
+relative S over that; a share is 1 if it is always the same; columns from favourite_setting on are
+NULL of studies that earlier versions made. ``signal``: as ``analysis.signal.signal_of_run`` has it;
+icc is of one trial, scheme is the number of trials that the method gives each genotype; NULL where
+all fitness was the same. ``measures``: the world's, as it declares them; of one that is not listed
+larger is better.
+"""

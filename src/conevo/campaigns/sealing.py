@@ -1,0 +1,272 @@
+"""The tables that reports read: everything that is finished, as Parquet.
+
+One row per run, score, generation and so on, made by DuckDB from the files of the runs and their
+studies; their columns are ``campaigns.schema.SCHEMA``. All are made anew when more is finished.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from conevo.analysis.exchange import exchanged
+from conevo.analysis.study_record import SignalStudy, Study
+from conevo.campaigns.ended import read_ended
+from conevo.campaigns.places import Places
+from conevo.campaigns.plan import PlannedRun
+from conevo.campaigns.schema import SCHEMA
+from conevo.errors import ConevoError
+from conevo.evolution.methods.registry import title_of
+from conevo.reading import DamagedFile, read_json
+from conevo.runs.code import changes_text, sessions_of
+from conevo.runs.directory import as_json
+from conevo.runs.drafts import draft_of
+from conevo.runs.durable import replace_file, sync_directory, writing
+from conevo.runs.outline import Outline
+from conevo.runs.provenance import describe_world
+from conevo.runs.run import Run
+from conevo.runs.shrinkage import shrinkage
+from conevo.runs.store import Store
+
+__all__ = ["is_sealed", "seal_tables"]
+
+MANIFEST = "tables.json"
+Row = dict[str, Any]
+
+
+def is_sealed(places: Places, finished: Sequence[PlannedRun]) -> bool:
+    """Whether the tables are those of exactly these runs."""
+    path = places.tables / MANIFEST
+    if not all((places.tables / f"{table}.parquet").is_file() for table in SCHEMA):
+        return False
+    try:
+        return path.is_file() and read_json(path) == _manifest(finished) | {"left_out": {}}
+    except DamagedFile:
+        return False
+
+
+def seal_tables(
+    places: Places,
+    finished: Sequence[PlannedRun],
+    spent: Mapping[str, float],
+    into: Path | None = None,
+) -> None:
+    """Make the tables of these runs, unless they are there.
+
+    A run whose files are damaged, or are not those that it was sealed with, is left out, and the
+    manifest shows which and why; it is looked at again the next time. A kill leaves the tables that
+    were there before, or none.
+
+    Args:
+        places: of the campaign.
+        finished: its finished runs.
+        spent: core seconds by label, as far as the ledger knows them.
+        into: the folder to make, by default that of the campaign.
+
+    Raises:
+        UsageError: every run is damaged.
+        EnvironmentFailure: they cannot be written.
+    """
+    folder = into or places.tables
+    if into is None and is_sealed(places, finished):
+        return
+    import duckdb
+
+    with writing(folder), draft_of(folder) as draft:
+        draft.mkdir()
+        files = {name: (draft / f"{name}.jsonl").open("w", encoding="utf-8") for name in SCHEMA}
+        left_out: dict[str, str] = {}
+        for planned in finished:
+            cost = max(spent.get(planned.label, 0.0), _last_cost(places, planned.label))
+            try:
+                rows = list(_rows(places, planned, cost))
+            except ConevoError as error:
+                left_out[planned.label] = str(error)
+                continue
+            for table, row in rows:
+                files[table].write(json.dumps(row, allow_nan=False) + "\n")
+        if len(left_out) == len(finished) > 0:
+            raise DamagedFile(next(iter(left_out.values())))
+        for file in files.values():
+            file.close()
+        for table, columns in SCHEMA.items():
+            source, target = draft / f"{table}.jsonl", draft / f"{table}.parquet"
+            duckdb.sql(
+                f"COPY (SELECT * FROM read_json({_quoted(source)}, format='newline_delimited', "
+                f"columns={columns})) TO {_quoted(target)} (FORMAT parquet, COMPRESSION zstd)"
+            )
+            source.unlink()
+        replace_file(draft / MANIFEST, as_json(_manifest(finished) | {"left_out": left_out}))
+        shutil.rmtree(folder, ignore_errors=True)
+        draft.rename(folder)
+        sync_directory(folder.parent)
+
+
+def _manifest(finished: Sequence[PlannedRun]) -> Row:
+    return {
+        "columns": SCHEMA,
+        "runs": {run.label: list(run.run_ids) for run in finished},
+        "studies": {run.label: list(run.studies) for run in finished},
+    }
+
+
+def _quoted(path: Path) -> str:
+    return "'" + str(path).replace("'", "''") + "'"
+
+
+def _last_cost(places: Places, label: str) -> float:
+    """Return the core seconds of a run's last worker, which may have known no coordinator."""
+    ended = read_ended(places.ended(label))
+    return ended["core_seconds"] if ended is not None else 0.0
+
+
+def _rows(places: Places, planned: PlannedRun, cost: float) -> Iterator[tuple[str, Row]]:
+    """Yield every row that a finished run has in any table."""
+    for name, parts in planned.courses.items():
+        runs = [Run(places.run(part)) for part in parts]
+        tests = [_tested(run) for run in runs]
+        run, provenance = runs[-1], runs[-1].provenance
+        records, sessions, before = _joined(runs)
+        test = tests[-1] | {"generation_0": tests[0]["generation_0"]}
+        world = provenance.get("world") or describe_world(run.config.build_world())  # 0.1.0: none
+        measures = world["measures"]
+        exchanges, share = exchanged(run.generations())
+        budgets = [one.outline.budget_evaluations for one in runs]
+        yield (
+            "runs",
+            _run_row(planned, run.outline, world["name"], provenance, records, sessions)
+            | {
+                "run": name,
+                "planned_evaluations": sum(budgets) if all(budgets) else None,
+                "measure": measures[0]["name"],
+                "optimum": world["optimum"],
+                "n_robots": world["n_robots"],
+                "core_seconds": cost / len(planned.courses),
+                "exchanges": exchanges,
+                "exchange_share": share,
+            },
+        )
+        for one in measures:
+            about = {key: one.get(key) for key in ("unit", "larger_is_better", "low", "high")}
+            yield "measures", {"run": name, "measure": one["name"]} | about
+        for team, title in (("champion", "champion"), ("generation_0", "generation 0")):
+            for measure, values in test[team]["performance"].items():
+                about = {"run": name, "study": "test", "team": title, "measure": measure}
+                for scenario, value in enumerate(values["values"]):
+                    yield "scores", about | {"scenario": scenario, "value": value}
+        for row in shrinkage(test) if "validation" in test else ():
+            yield "champions", _champion_row(name, test["validation"], row, before)
+        for record in records:
+            yield from _generation_rows(name, record)
+        if places.study(name).is_file():
+            yield from _study_rows(name, read_json(places.study(name), Study))
+        if places.study(name, "signal").is_file():
+            for row in read_json(places.study(name, "signal"), SignalStudy)["signal"]:
+                yield "signal", {"run": name} | {k: row[k] for k in SCHEMA["signal"] if k in row}
+
+
+def _tested(run: Run) -> Row:
+    """Return the testing phase of a run, after checking that it is as it was sealed."""
+    test = run.test_result
+    if test is None or not run.generations():
+        raise DamagedFile(f"{run.path} is sealed, but lacks its generations or its testing phase")
+    Store(run.path).refuse_changed()
+    return test
+
+
+def _joined(runs: Sequence[Run]) -> tuple[list[Row], list[Row], int]:
+    """Return the generations and sessions of a run, or of its stages as those of one run.
+
+    Generations, team evaluations and team-steps are counted through the stages.
+
+    Returns:
+        Both, and the number of generations before the last stage.
+    """
+    records: list[Row] = []
+    sessions: list[Row] = []
+    before = 0
+    for run in runs:
+        before, last = len(records), records[-1] if records else {}
+        sessions += map(dict, sessions_of(run.provenance, before))
+        for record in run.generations():
+            summed = {k: record[k] + last.get(k, 0) for k in ("team_evaluations", "team_steps")}
+            records.append(record | summed | {"generation": before + record["generation"]})
+    return records, sessions, before
+
+
+def _run_row(
+    planned: PlannedRun,
+    run: Outline,
+    world: str,
+    provenance: Row,
+    records: Sequence[Row],
+    sessions: Sequence[Row],
+) -> Row:
+    environment = run.environment
+    family, _, number = environment.rpartition("-")
+    is_numbered = bool(family) and number.isdecimal()
+    return {
+        "task": f"{world}/{environment}",
+        "world": world,
+        "environment": environment,
+        "family": family if is_numbered else environment,
+        "number": int(number) if is_numbered else 0,
+        "method": run.method,
+        "title": title_of(run.method),
+        "preset": run.preset,
+        "seed": run.seed,
+        "variant": planned.variant,
+        "generations": len(records),
+        "evaluations": records[-1]["team_evaluations"],
+        "team_steps": records[-1]["team_steps"],
+        "seconds": sum(record["seconds"] for record in records),
+        "stopped_by": provenance["stopped_by"],
+        "run_id": provenance["run_id"],
+        "conevo": provenance["conevo"],
+        "code": ", ".join(dict.fromkeys(one.get("code", "") for one in sessions)),
+        "changes": "; ".join(changes_text(sessions)),
+        "numpy": provenance["numpy"],
+        "warp": provenance["warp"],
+        "kernel_hash": provenance["kernel_hash"],
+    }
+
+
+def _generation_rows(name: str, record: Row) -> Iterator[tuple[str, Row]]:
+    generation = record["generation"]
+    yield (
+        "generations",
+        {
+            "run": name,
+            "generation": generation,
+            "evaluations": record["team_evaluations"],
+            "team_steps": record["team_steps"],
+            "value": next(iter(record["performance"].values())),
+            "fitness": record["team_fitness"],
+            "specialization": record["specialization"],
+            "sst": record["sst"],
+            "gst": record["gst"],
+            "recombinations": record["recombinations"],
+            "type_c_evaluations": record.get("type_c_evaluations"),  # since conevo 0.2
+            "hidden": sum(record["n_hidden"]) / len(record["n_hidden"]),
+        },
+    )
+    for caste, robots in record["castes"].items():
+        about = {"run": name, "generation": generation}
+        yield "castes", about | {"caste": caste, "robots": robots}
+
+
+def _champion_row(name: str, validation: Row, row: Row, before: int) -> Row:
+    means = {key: row[key]["mean"] for key in ("validation", "test")}
+    about = {"run": name, "generation": before + validation["chosen"]}
+    return about | {"finalists": len(validation["finalists"])} | row | means
+
+
+def _study_rows(name: str, study: Row) -> Iterator[tuple[str, Row]]:
+    for metric, value in study["metrics"].items():
+        yield "metrics", {"run": name, "metric": metric, "value": value}
+    for table in ("scores", "robots", "actions", "behaviours"):
+        for row in study[table]:
+            yield table, {"run": name} | row
