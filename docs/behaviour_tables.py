@@ -8,9 +8,9 @@ from typing import Any
 
 import conevo
 import pages
-from conevo.analysis.caste_tables import composition_table, lesion_table
-from conevo.analysis.observed import observe
 from conevo.specialization.individual import NON_SPECIALIZED
+from conevo.studies.caste_tables import composition_table, lesion_table
+from conevo.studies.observation import observe
 from conevo.worlds.pursuit.study.behaviours import BEHAVIOURS
 from conevo.worlds.pursuit.study.captures import COLLECTIVES
 from pages import Row

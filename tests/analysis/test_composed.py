@@ -9,11 +9,11 @@ import pytest
 
 import conevo
 from analysis.claims.known_truth import pursuit, write_tables
-from conevo.analysis.composed import compose
 from conevo.analysis.sections.composed import composed
 from conevo.analysis.sections.scope import scopes
 from conevo.campaigns.tables import Tables
 from conevo.runs.champions import Team
+from conevo.studies.composition import compose
 from conevo.worlds.pursuit.study.behaviours import BEHAVIOURS
 from conevo.worlds.pursuit.study.captures import COMPOSITIONS
 from conevo.worlds.pursuit.study.composed import COMPOSED, roles_of

@@ -8,7 +8,6 @@ from pathlib import Path
 import pytest
 
 from conevo.analysis.report import write_report
-from conevo.analysis.studies import study
 from conevo.campaigns.campaign import Campaign, create
 from conevo.campaigns.executors.local import Serial
 from conevo.campaigns.plan import Plan
@@ -21,6 +20,7 @@ from conevo.reading import read_json
 from conevo.runs.directory import as_json
 from conevo.runs.run import Run
 from conevo.runs.shaping import Shaping
+from conevo.studies.team_study import study
 
 TEXT = """
 [campaign]

@@ -10,7 +10,6 @@ import pytest
 from campaigns.plans import tiny_campaign, write_plan
 from conevo.analysis.report import sections_of
 from conevo.analysis.sections.overview import read_campaign
-from conevo.analysis.signal import signal_of_run
 from conevo.campaigns.campaign import Campaign, create
 from conevo.campaigns.executors.local import Serial
 from conevo.campaigns.plan_file import read_plan
@@ -18,6 +17,7 @@ from conevo.campaigns.schema import SCHEMA
 from conevo.campaigns.tables import Tables
 from conevo.reading import read_json
 from conevo.runs.run import Run
+from conevo.studies.signal import signal_of_run
 
 OWN = Path(__file__).resolve().parents[2] / "examples" / "own_method.py"
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from conevo.analysis.lifetimes import lifetimes as of_executed
+from conevo.studies.lifetimes import lifetimes as of_executed
 from conevo.worlds.pursuit.study.behaviours import (
     BEHAVIOURS,
     NONE,

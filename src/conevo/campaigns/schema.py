@@ -132,7 +132,7 @@ number of pairs of sub-populations that recombined between populations, in the m
 generations, exchange_share that of the pairs that could have; both are NULL for methods that never
 do. ``robots``: specialization is S, independent the S of independent draws from the robot's shares,
 relative S over that; a share is 1 if it is always the same; columns from favourite_setting on are
-NULL of studies that earlier versions made. ``signal``: as ``analysis.signal.signal_of_run`` has it;
+NULL of studies that earlier versions made. ``signal``: as ``studies.signal.signal_of_run`` has it;
 icc is of one trial, scheme is the number of trials that the method gives each genotype; NULL where
 all fitness was the same. ``measures``: the world's, as it declares them; of one that is not listed
 larger is better.

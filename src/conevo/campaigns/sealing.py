@@ -12,8 +12,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from conevo.analysis.exchange import exchanged
-from conevo.analysis.study_record import SignalStudy, Study
 from conevo.campaigns.ended import read_ended
 from conevo.campaigns.places import Places
 from conevo.campaigns.plan import PlannedRun
@@ -30,6 +28,8 @@ from conevo.runs.provenance import describe_world
 from conevo.runs.run import Run
 from conevo.runs.shrinkage import shrinkage
 from conevo.runs.store import Store
+from conevo.studies.exchange import exchanged
+from conevo.studies.records import SignalStudy, Study
 
 __all__ = ["is_sealed", "seal_tables"]
 

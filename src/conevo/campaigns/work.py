@@ -172,8 +172,8 @@ def _study(places: Places, planned: PlannedRun, found: Run | Shaping, threads: i
 
     Of a run whose first stage another method evolves, they are those of the second.
     """
-    from conevo.analysis.signal import signal_study
-    from conevo.analysis.studies import study
+    from conevo.studies.signal import signal_study
+    from conevo.studies.team_study import study
 
     make: dict[str, Callable[..., Any]] = {"teams": study, "signal": signal_study}
     runs = [found] if isinstance(found, Run) else found.stages[-len(planned.names) :]

@@ -54,9 +54,9 @@ def behaviours(
     as_json: bool,
 ) -> None:
     """Classify what the fittest team of a run does."""
-    from conevo.analysis.behaviour_report import behaviour_report
-    from conevo.analysis.observed import studied
     from conevo.cli.find import find_run
+    from conevo.studies.behaviour_report import behaviour_report
+    from conevo.studies.observation import studied
 
     of = find_run(run)
     found = behaviour_report(of, scenarios, seed, threads=threads, device=device)

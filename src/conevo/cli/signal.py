@@ -63,7 +63,7 @@ def signal(
 
     Try: conevo signal rover/complex-5 --method ccga
     """
-    from conevo.analysis.signal import measure_signal, signal_of_run
+    from conevo.studies.signal import measure_signal, signal_of_run
 
     def announce(price: str) -> None:
         click.echo(price, err=as_json)
@@ -129,9 +129,9 @@ def _order(
 
 
 def _text(found: dict[str, Any]) -> str:
-    from conevo.analysis.repeatability import has_signal
     from conevo.cli.text import number, table
     from conevo.evolution.methods.registry import title_of
+    from conevo.studies.repeatability import has_signal
     from conevo.terms import counted
 
     rows = found["signal"]

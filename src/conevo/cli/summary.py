@@ -9,7 +9,6 @@ from typing import Any
 
 import click
 
-from conevo.analysis.exchange import exchanged, per_generation
 from conevo.cli.text import (
     castes,
     count,
@@ -31,6 +30,7 @@ from conevo.runs.outline import Outline
 from conevo.runs.records import own_numbers
 from conevo.runs.run import Run
 from conevo.runs.shrinkage import shrinkage
+from conevo.studies.exchange import exchanged, per_generation
 from conevo.terms import S_SCALE, SHARE_SCALE, counted, quoted
 from conevo.worlds.measures import Measure
 

@@ -9,7 +9,6 @@ from typing import Any, cast
 import numpy as np
 import numpy.typing as npt
 
-from conevo.analysis.fittest import equip
 from conevo.errors import UsageError
 from conevo.playback.about import About
 from conevo.playback.channel import Channel
@@ -17,6 +16,7 @@ from conevo.replay.trajectory import FORMAT, Trajectory
 from conevo.rng import fold
 from conevo.runs.evaluation import describe
 from conevo.runs.run import Run
+from conevo.studies.fittest import equip
 from conevo.worlds.protocol import Simulator, World
 from conevo.worlds.recorded import params_of, recorded
 

@@ -2,7 +2,7 @@
 
 The entry of a world names a module that has what ``WorldStudy`` lists; ``registry.study_of`` finds
 it. It tells behaviours from recorded epochs. S, castes, lesions, clones and tables are made of them
-for any world (``analysis.observed``).
+for any world (``studies.observation``).
 """
 
 from __future__ import annotations
@@ -99,7 +99,7 @@ class Seen(Protocol):
         """Return everything else about what was seen, as plain data.
 
         Args:
-            lifetimes: of each robot, ``analysis.lifetimes.Lifetime`` as plain data.
+            lifetimes: of each robot, ``studies.lifetimes.Lifetime`` as plain data.
         """
 
 

@@ -11,9 +11,9 @@ from typing import NamedTuple
 from conevo.analysis.claims.quantities import QUANTITIES
 from conevo.analysis.claims.statements import Compare, Sample, Within
 from conevo.analysis.comparison import levels_of
-from conevo.analysis.exchange import is_idle
-from conevo.analysis.repeatability import has_signal
 from conevo.campaigns.tables import Tables
+from conevo.studies.exchange import is_idle
+from conevo.studies.repeatability import has_signal
 
 __all__ = ["Evidence", "Gathered", "RunOf", "read_evidence"]
 

@@ -7,10 +7,10 @@ from typing import Any
 
 from conevo.analysis.claims import Verdict, verdicts
 from conevo.analysis.claims.wording import place_of, what_of
-from conevo.analysis.exchange import per_generation
 from conevo.analysis.exhibits import Column, Section, Table, interval, number, p_value, plain
-from conevo.analysis.repeatability import LEAST_RELIABILITY
 from conevo.campaigns.tables import Tables
+from conevo.studies.exchange import per_generation
+from conevo.studies.repeatability import LEAST_RELIABILITY
 
 __all__ = ["claims"]
 

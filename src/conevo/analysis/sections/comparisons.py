@@ -11,7 +11,6 @@ from conevo.analysis.comparison import (
     Pair,
     compare_all,
 )
-from conevo.analysis.exchange import is_idle, per_generation
 from conevo.analysis.exhibits import (
     Column,
     Exhibit,
@@ -24,10 +23,11 @@ from conevo.analysis.exhibits import (
 )
 from conevo.analysis.power import power_of_pair
 from conevo.analysis.ranks import EXACT_RUNS
-from conevo.analysis.repeatability import LEAST_RELIABILITY
 from conevo.analysis.sections.scope import Scope, place_names, sizes
 from conevo.analysis.sections.signal import blind_cells
 from conevo.analysis.statistics import ALPHA
+from conevo.studies.exchange import is_idle, per_generation
+from conevo.studies.repeatability import LEAST_RELIABILITY
 from conevo.terms import counted
 from conevo.worlds.measures import Measure
 

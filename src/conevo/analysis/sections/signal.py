@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 
 from conevo.analysis.comparison import Cell
 from conevo.analysis.exhibits import Column, Section, Table, plain
-from conevo.analysis.repeatability import LEAST_RELIABILITY, has_signal
 from conevo.analysis.sections.scope import KEYS, Scope
+from conevo.studies.repeatability import LEAST_RELIABILITY, has_signal
 
 __all__ = ["blind_cells", "signal"]
 

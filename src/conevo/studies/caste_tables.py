@@ -11,12 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from conevo.analysis.lesions import WHOLE, lesion
-from conevo.analysis.observed import observe
 from conevo.errors import UsageError, without_team
 from conevo.rng import fold
 from conevo.runs.run import Run
 from conevo.runs.shrinkage import shrinkage
+from conevo.studies.lesions import WHOLE, lesion
+from conevo.studies.observation import observe
 from conevo.worlds.measures import measures_of
 
 __all__ = ["composition_table", "fittest_runs", "lesion_table"]

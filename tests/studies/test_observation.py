@@ -13,16 +13,16 @@ import numpy as np
 import pytest
 
 import conevo
-from conevo.analysis.behaviour_report import behaviour_report
-from conevo.analysis.caste_tables import composition_table, fittest_runs, lesion_table
-from conevo.analysis.lifetimes import lifetimes
-from conevo.analysis.observed import Observed, observe
-from conevo.analysis.studies import study
 from conevo.cli.main import main
 from conevo.errors import UsageError
 from conevo.rng import fold, stream
 from conevo.runs.champions import Team
 from conevo.runs.shrinkage import shrinkage
+from conevo.studies.behaviour_report import behaviour_report
+from conevo.studies.caste_tables import composition_table, fittest_runs, lesion_table
+from conevo.studies.lifetimes import lifetimes
+from conevo.studies.observation import Observed, observe
+from conevo.studies.team_study import study
 from conevo.worlds.pursuit.study.behaviours import BEHAVIOURS
 from conevo.worlds.pursuit.study.captures import COLLECTIVES
 from conevo.worlds.pursuit.study.observation import Observation, record_team

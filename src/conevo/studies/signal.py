@@ -24,8 +24,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from conevo.analysis.fittest import lab_of
-from conevo.analysis.repeatability import Repeatability, repeatability, spearman_brown, trials_for
 from conevo.errors import UsageError
 from conevo.evolution.generation import Populations
 from conevo.evolution.protocol import Method, Scores, State, Trials
@@ -35,6 +33,8 @@ from conevo.runs.evaluation import play
 from conevo.runs.lab import Lab
 from conevo.runs.run import Run
 from conevo.runs.store import Store
+from conevo.studies.fittest import lab_of
+from conevo.studies.repeatability import Repeatability, repeatability, spearman_brown, trials_for
 from conevo.terms import counted
 
 __all__ = ["TRIALS", "Unmeasured", "measure_signal", "signal_of_run", "signal_study"]

@@ -3,7 +3,7 @@
 Nitschke 2009, sections 4.6.4 to 4.6.6, 5.5.2 to 5.5.4, 6.5.4 and 6.5.5. One study holds it all as
 plain data: each robot's caste, S and fitness, measures of the team's specialization, caste lesions
 and teams of clones scenario by scenario, and what robots are seen to do where their world has more
-than actions to see (``analysis.observed``).
+than actions to see (``studies.observation``).
 
 - Choice: castes are told in the scenarios of the testing phase, lesions and clones are played in
   others, and all teams of a comparison meet the same ones: so that no caste is told by the luck
@@ -22,10 +22,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from conevo.analysis.composed import compose
-from conevo.analysis.fittest import equip
-from conevo.analysis.lesions import Compared, clone, lesion, rotate
-from conevo.analysis.observed import Observed, watch
 from conevo.rng import fold
 from conevo.runs.champions import Team
 from conevo.runs.evaluation import describe
@@ -34,6 +30,10 @@ from conevo.runs.run import Run
 from conevo.specialization.favourite import affinity, favourite, favourite_share
 from conevo.specialization.individual import NON_SPECIALIZED, relative_degree
 from conevo.specialization.team import Activity, measure
+from conevo.studies.composition import compose
+from conevo.studies.fittest import equip
+from conevo.studies.lesions import Compared, clone, lesion, rotate
+from conevo.studies.observation import Observed, watch
 from conevo.worlds.protocol import Outcome, setting_columns
 
 __all__ = ["study"]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from conevo.analysis.repeatability import (
+from conevo.studies.repeatability import (
     LEAST_RELIABILITY,
     has_signal,
     repeatability,

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import conevo
-from conevo.analysis.lesions import clone, lesion, replacement, rotate
 from conevo.runs.champions import Team
+from conevo.studies.lesions import clone, lesion, replacement, rotate
 from conevo.worlds.rollout import Rollout
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "light.py"

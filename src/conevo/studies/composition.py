@@ -12,8 +12,8 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from conevo.analysis.lesions import Compared, fittest_of
 from conevo.runs.champions import Team
+from conevo.studies.lesions import Compared, fittest_of
 from conevo.worlds.protocol import Simulator
 from conevo.worlds.study import Composed
 

@@ -13,8 +13,6 @@ from typing import Any
 
 import numpy as np
 
-from conevo.analysis.fittest import equip
-from conevo.analysis.lifetimes import Lifetime, lifetimes
 from conevo.errors import UsageError
 from conevo.rng import fold
 from conevo.runs.champions import Team
@@ -22,6 +20,8 @@ from conevo.runs.lab import Lab
 from conevo.runs.run import Run
 from conevo.specialization.individual import NON_SPECIALIZED, independent_degree
 from conevo.specialization.team import Activity
+from conevo.studies.fittest import equip
+from conevo.studies.lifetimes import Lifetime, lifetimes
 from conevo.worlds.registry import WORLDS, studies, study_of
 from conevo.worlds.study import Seen, WorldStudy
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Any
 
-from conevo.analysis.observed import observe
 from conevo.runs.run import Run
+from conevo.studies.observation import observe
 
 __all__ = ["behaviour_report"]
 

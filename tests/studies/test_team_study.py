@@ -12,9 +12,6 @@ import numpy as np
 import pytest
 
 import conevo
-from conevo.analysis import observed
-from conevo.analysis.lesions import replacement
-from conevo.analysis.studies import study
 from conevo.errors import UsageError
 from conevo.rng import fold
 from conevo.runs.config import resolve
@@ -23,6 +20,9 @@ from conevo.runs.run import start
 from conevo.specialization import degree
 from conevo.specialization.individual import independent_degree
 from conevo.specialization.team import METRICS, Activity, measure
+from conevo.studies import observation as observed
+from conevo.studies.lesions import replacement
+from conevo.studies.team_study import study
 from conevo.worlds.measures import measures_of
 from conevo.worlds.protocol import setting_columns
 from conevo.worlds.pursuit.study import observation

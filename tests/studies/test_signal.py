@@ -10,9 +10,6 @@ import numpy as np
 import pytest
 
 import conevo
-from conevo.analysis import signal
-from conevo.analysis.repeatability import repeatability, spearman_brown
-from conevo.analysis.signal import measure_signal, signal_of_run
 from conevo.cli.main import main
 from conevo.errors import UsageError
 from conevo.evolution.assembly import place_on_trial
@@ -20,6 +17,9 @@ from conevo.rng import fold
 from conevo.runs.config import RunConfig, resolve
 from conevo.runs.evaluation import score
 from conevo.runs.lab import Lab
+from conevo.studies import signal
+from conevo.studies.repeatability import repeatability, spearman_brown
+from conevo.studies.signal import measure_signal, signal_of_run
 from runs.tiny import TASK, evolve_tiny, tiny_settings
 
 ROOT = Path(__file__).resolve().parents[2]

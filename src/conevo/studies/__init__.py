@@ -1,0 +1,1 @@
+"""What a finished team does: behaviours, lesions, clones, exchanged places, and how repeatable its fitness is."""
