@@ -1,6 +1,6 @@
 """Time and memory of ``conevo report`` on a thousand finished runs that nobody ran.
 
-Their tables have the form of a campaign's (tests/analysis/finished_runs.py): 100 generations a run,
+Their tables have the form of a campaign's (tests/report/finished_runs.py): 100 generations a run,
 20 scenarios for each of its teams, all studies. Each report is written by a process of its own.
 """
 
@@ -35,7 +35,7 @@ MEASURED = """
 import json, resource, sys, time
 from pathlib import Path
 began = time.perf_counter()
-from conevo.analysis.report import write_report
+from conevo.report.files import write_report
 page = write_report(Path(sys.argv[1]), Path(sys.argv[2]))
 spent = resource.getrusage(resource.RUSAGE_SELF)
 print(json.dumps({
@@ -53,7 +53,7 @@ def measure(
 ) -> dict[str, float]:
     """Make the runs, write their report and return what that took."""
     sys.path.insert(0, str(ROOT / "tests"))
-    from analysis.finished_runs import cells, write_campaign
+    from report.finished_runs import cells, write_campaign
 
     campaign = write_campaign(folder / "campaign", cells(environments), seeds, generations)
     command = [sys.executable, "-c", MEASURED, str(campaign), str(folder / "report")]

@@ -14,13 +14,13 @@ from statistics import fmean, stdev
 from typing import Any
 
 import pages
-from conevo.analysis.claims import verdicts
-from conevo.analysis.report import write_report
-from conevo.analysis.statistics import compare, holm
 from conevo.campaigns.campaign import Campaign
 from conevo.campaigns.tables import Tables, Value
 from conevo.cli.find import sealed
 from conevo.evolution.methods.registry import METHODS
+from conevo.report.claims import verdicts
+from conevo.report.files import write_report
+from conevo.report.statistics import compare, holm
 from conevo.runs.run import Run
 
 

@@ -19,11 +19,11 @@ from typing import Any
 import numpy as np
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "docs"))
-from conevo.analysis.statistics import compare, holm
 from conevo.campaigns.tables import Tables
 from conevo.cli.find import find_campaign, sealed
 from conevo.errors import ConevoError, UsageError
 from conevo.evolution.methods.registry import title_of
+from conevo.report.statistics import compare, holm
 from page_arguments import PageParser, rows_for
 from pages import Row, put, table
 from provenance import made_with

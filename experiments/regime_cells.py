@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import t as student
 
-from conevo.analysis.statistics import Comparison, Estimate, compare, holm
+from conevo.report.statistics import Comparison, Estimate, compare, holm
 from incentives import FINDING, Regime, incentive
 from pages import Row
 

@@ -6,9 +6,9 @@ import io
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from conevo.analysis.drawing import grey, is_dark, style
-from conevo.analysis.lettering import SIZE, SMALL
 from conevo.palette import BLUE, INK, VERMILION, shade
+from conevo.report.figures.lettering import SIZE, SMALL
+from conevo.report.figures.style import grey, is_dark, style
 from pages import Row
 from regime_cells import CLONES, INDIVIDUAL, Cell, apart
 from regime_tables import number, percent

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from conevo.analysis.statistics import Estimate, compare
+from conevo.report.statistics import Estimate, compare
 from pages import table
 from regime_cells import (
     CLONES,

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 
 import conevo
-from conevo.analysis.sections.metrics import definitions
 from conevo.controllers.registry import controller
 from conevo.errors import UsageError
+from conevo.report.sections.metrics import definitions
 from conevo.runs.settings import declared
 from conevo.runs.shaping import start_shaping
 from conevo.specialization.team import METRICS, Activity, Metric, measure

@@ -10,7 +10,7 @@ SOURCE = Path(conevo.__file__).parent
 WORLDS = re.compile(r"rover|pursuit|gacc|prey|predator", re.IGNORECASE)
 
 # Claims are a registry of what the thesis says of its worlds.
-FOLDERS = ("worlds/", "analysis/claims/")
+FOLDERS = ("worlds/", "report/claims/")
 ALLOWED = {
     # The command line: a command, an option and examples of what to type.
     "cli/main.py": "its table of commands has shape-prey",

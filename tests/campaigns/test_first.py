@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pytest
 
-from conevo.analysis.report import write_report
 from conevo.campaigns.campaign import Campaign, create
 from conevo.campaigns.executors.local import Serial
 from conevo.campaigns.plan import Plan
@@ -17,6 +16,7 @@ from conevo.campaigns.tables import Tables
 from conevo.campaigns.work import planned_runs
 from conevo.errors import UsageError
 from conevo.reading import read_json
+from conevo.report.files import write_report
 from conevo.runs.directory import as_json
 from conevo.runs.run import Run
 from conevo.runs.shaping import Shaping

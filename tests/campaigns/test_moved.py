@@ -11,13 +11,13 @@ import duckdb
 import pytest
 
 from campaigns.plans import write_plan
-from conevo.analysis.sections.overview import overview, read_campaign
 from conevo.campaigns.campaign import Campaign, create
 from conevo.campaigns.executors.registry import make_executor
 from conevo.campaigns.plan_file import read_plan
 from conevo.campaigns.tables import Tables
 from conevo.cli.main import main
 from conevo.errors import UsageError
+from conevo.report.sections.overview import overview, read_campaign
 from conevo.runs.code import current_code
 from conevo.runs.run import Run
 from conevo.runs.store import Store

@@ -8,10 +8,10 @@ import duckdb
 import numpy as np
 import pytest
 
-from analysis.finished_runs import Cell, cells, write_campaign
 from conevo.campaigns.schema import SCHEMA
 from conevo.campaigns.tables import Tables
 from conevo.errors import UsageError
+from report.finished_runs import Cell, cells, write_campaign
 
 
 def tables_of(folder: Path, of: list[Cell], **further: object) -> Tables:

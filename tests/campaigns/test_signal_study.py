@@ -8,14 +8,14 @@ from pathlib import Path
 import pytest
 
 from campaigns.plans import tiny_campaign, write_plan
-from conevo.analysis.report import sections_of
-from conevo.analysis.sections.overview import read_campaign
 from conevo.campaigns.campaign import Campaign, create
 from conevo.campaigns.executors.local import Serial
 from conevo.campaigns.plan_file import read_plan
 from conevo.campaigns.schema import SCHEMA
 from conevo.campaigns.tables import Tables
 from conevo.reading import read_json
+from conevo.report.files import sections_of
+from conevo.report.sections.overview import read_campaign
 from conevo.runs.run import Run
 from conevo.studies.signal import signal_of_run
 

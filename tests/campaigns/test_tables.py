@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 from campaigns.plans import tiny_campaign
-from conevo.analysis.report import write_report
-from conevo.analysis.sections.overview import read_campaign
 from conevo.campaigns.campaign import Campaign
 from conevo.campaigns.executors.local import Serial
 from conevo.campaigns.places import Places
 from conevo.campaigns.schema import SCHEMA
 from conevo.campaigns.sealing import seal_tables
 from conevo.campaigns.tables import Tables
+from conevo.report.files import write_report
+from conevo.report.sections.overview import read_campaign
 from conevo.runs.directory import read_json
 from conevo.runs.run import Run
 from conevo.runs.shrinkage import shrinkage

@@ -12,9 +12,9 @@ import pytest
 
 import conevo
 from campaigns.plans import write_plan
-from conevo.analysis.claims.catalogue import CLAIMS
 from conevo.campaigns.plan_file import preset_names, read_plan, read_preset
 from conevo.errors import UsageError
+from conevo.report.claims.catalogue import CLAIMS
 from conevo.runs.conditions import _changed
 from conevo.runs.config import resolve
 from conevo.runs.shaping import start_shaping, tasks_up_to

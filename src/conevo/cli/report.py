@@ -22,9 +22,9 @@ def report(name: str, out: str | None) -> None:
     """
     import logging
 
-    from conevo.analysis.report import write_report
     from conevo.cli.find import find_campaign, sealed
     from conevo.errors import EnvironmentFailure
+    from conevo.report.files import write_report
 
     logging.getLogger("matplotlib").setLevel(logging.ERROR)  # it caches fonts, or need not
     found = find_campaign(name)

@@ -1,1 +1,1 @@
-"""What a finished team does: behaviours, lesions, clones, exchanged places, and how repeatable its fitness is."""
+"""What a finished team does: its behaviours, lesions, clones, and how repeatable fitness is."""

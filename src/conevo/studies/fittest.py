@@ -1,4 +1,4 @@
-"""The fittest team of a run, together with what simulates it: where every analysis begins."""
+"""The fittest team of a run, together with what simulates it: where every study begins."""
 
 from __future__ import annotations
 

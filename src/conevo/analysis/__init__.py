@@ -1,1 +1,0 @@
-"""Analysis: what evolved teams do, read from recorded epochs of finished runs."""

@@ -1,0 +1,188 @@
+"""One statement of a claim against its runs: holds, contradicted, open, or not tested.
+
+"Above" is contradicted by a significant difference the other way and by samples shown to be alike;
+"alike" by a significant difference. Each comparison is decided twice: by the t-test, as in the
+thesis, and by Mann-Whitney with Holm's correction over all comparisons of the claim.
+
+- Choice: a share holds if its 95 % interval (Clopper-Pearson; of a mean Student's t) lies inside
+  the range that the claim comes to, is contradicted if it lies outside, and else stays open.
+- Choice: a statement about CONE is not tested by runs in which it hardly exchanged anything between
+  its populations: there it is Multi-Agent ESP with type C fitness.
+- Choice: nor is a statement about a method whose fitness had next to no signal of genotypes, so
+  that it selected by luck; where runs have a study of it (``repeatability.has_signal``).
+- Choice: a statement about several environments together says nothing until all have runs.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from enum import Enum
+
+from conevo.report.claims.evidence import Evidence, Gathered
+from conevo.report.claims.quantities import QUANTITIES
+from conevo.report.claims.statements import Compare, Statement
+from conevo.report.statistics import (
+    ALPHA,
+    Comparison,
+    Estimate,
+    compare,
+    holm,
+    is_alike,
+    mean_interval,
+    proportion_interval,
+)
+
+__all__ = ["Cell", "Outcome", "measure"]
+
+
+class Outcome(Enum):
+    """What runs say about a statement, in the order in which it is told."""
+
+    CONTRADICTED = 0
+    OPEN = 1
+    HOLDS = 2
+    UNTESTED = 3
+    BLIND = 4
+    MISSING = 5
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One statement of a claim and what the runs say about it.
+
+    Attributes:
+        statement: what is claimed.
+        gathered: the runs.
+        comparison: of two samples, with the uncorrected p-values; None of a share or without runs.
+        estimate: of a share or mean; None of a comparison or without runs.
+        p_holm: Mann-Whitney's, corrected over the claim.
+        by_t: outcome by the t-test, as in the thesis.
+        by_rank: outcome by Mann-Whitney and Holm; of a share the same as ``by_t``.
+    """
+
+    statement: Statement
+    gathered: Gathered
+    comparison: Comparison | None
+    estimate: Estimate | None
+    p_holm: float | None
+    by_t: Outcome
+    by_rank: Outcome
+
+    @property
+    def has_runs(self) -> bool:
+        """Whether every sample has runs."""
+        return all(self.gathered.samples)
+
+    @property
+    def is_zero(self) -> bool:
+        """Whether nothing was ever achieved in either sample."""
+        one = self.comparison
+        return one is not None and one.mean_a == 0 and one.mean_b == 0
+
+    @property
+    def interval(self) -> tuple[float | None, float | None]:
+        """The 95 % interval of the difference, share or mean."""
+        found = self.comparison or self.estimate
+        return (found.low, found.high) if found else (None, None)
+
+    @property
+    def scale(self) -> float:
+        """The larger of two means, 0 where there are none."""
+        if self.comparison is None:
+            return 0.0
+        return max(abs(self.comparison.mean_a or 0.0), abs(self.comparison.mean_b or 0.0))
+
+    @property
+    def weight(self) -> tuple[int, float]:
+        """How soon the cell is told: the worst outcome first, then the furthest from the claim."""
+        return self.by_rank.value, self._slack()
+
+    def _slack(self) -> float:
+        """Return how far inside what is claimed the interval lies; negative is outside."""
+        low, high = self.interval
+        if low is None or high is None:
+            return -math.inf
+        if not isinstance(self.statement, Compare):
+            least, most = self.statement.low, self.statement.high
+            # Nothing is below 0 or above 1: these bounds are as far as can be.
+            return min(low - least if least > 0 else 1.0, most - high if most < 1 else 1.0)
+        inside = low if self.statement.expect == "above" else -max(abs(low), abs(high))
+        return inside / (self.scale or 1.0)
+
+
+def measure(statements: Sequence[Statement], evidence: Evidence) -> list[Cell]:
+    """Return all the statements of a claim with their numbers and outcomes."""
+    gathered = [evidence.gather(statement) for statement in statements]
+    made = [_compare(*pair) for pair in zip(statements, gathered, strict=True)]
+    corrected = holm([one.p_mann_whitney if one else None for one in made])
+    return [
+        _cell(statement, runs, comparison, p)
+        for statement, runs, comparison, p in zip(
+            statements, gathered, made, corrected, strict=True
+        )
+    ]
+
+
+def _cell(
+    statement: Statement, runs: Gathered, comparison: Comparison | None, p: float | None
+) -> Cell:
+    estimate = _estimate(statement, runs)
+    if runs.present != set(statement.environments):
+        by_t = by_rank = Outcome.MISSING
+    elif runs.is_blind:
+        by_t = by_rank = Outcome.BLIND
+    elif runs.is_idle:
+        by_t = by_rank = Outcome.UNTESTED
+    elif isinstance(statement, Compare):
+        by_t = by_rank = Outcome.OPEN
+        if comparison is not None:
+            is_more, is_above = (comparison.difference or 0) > 0, (comparison.a12 or 0) > 0.5
+            by_t = _decide(statement, comparison, comparison.p_t, is_more)
+            by_rank = _decide(statement, comparison, p, is_above)
+    else:
+        by_t = by_rank = _place(estimate, statement.low, statement.high)
+    return Cell(statement, runs, comparison, estimate, p, by_t, by_rank)
+
+
+def _compare(statement: Statement, runs: Gathered) -> Comparison | None:
+    if not isinstance(statement, Compare) or not all(runs.samples):
+        return None
+    return compare(*runs.samples)
+
+
+def _estimate(statement: Statement, runs: Gathered) -> Estimate | None:
+    if isinstance(statement, Compare) or not all(runs.samples):
+        return None
+    (values,) = runs.samples
+    if QUANTITIES[statement.sample.quantity].is_share:
+        return proportion_interval(round(math.fsum(values)), len(values))
+    return mean_interval(values)
+
+
+def _decide(statement: Compare, found: Comparison, p: float | None, is_higher: bool) -> Outcome:
+    """Return the outcome of a comparison by one test: its p, and whether it puts a above b.
+
+    Choice: "alike" needs no difference by this test; but only samples that none of the tests tells
+    apart, uncorrected, contradict "above".
+    """
+    if p is None:
+        return Outcome.OPEN
+    if statement.expect == "above":
+        if p < ALPHA:
+            return Outcome.HOLDS if is_higher else Outcome.CONTRADICTED
+        return Outcome.CONTRADICTED if is_alike(found) else Outcome.OPEN
+    if p < ALPHA:
+        return Outcome.CONTRADICTED
+    alone = replace(found, p_t=p, p_welch=None, p_mann_whitney=None)
+    return Outcome.HOLDS if is_alike(alone) else Outcome.OPEN
+
+
+def _place(found: Estimate | None, low: float, high: float) -> Outcome:
+    """Return whether an interval lies inside a range, outside, or neither."""
+    if found is None or found.low is None or found.high is None:
+        return Outcome.OPEN
+    if low <= found.low and found.high <= high:
+        return Outcome.HOLDS
+    return Outcome.CONTRADICTED if found.high < low or found.low > high else Outcome.OPEN

@@ -1,0 +1,235 @@
+"""Tables and figures of a report, each with its numbers: as CSV and as rows of text.
+
+A number is formatted in one place, its column, so that page, LaTeX and CSV cannot disagree.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from conevo.report.figures.style import Drawing
+
+__all__ = [
+    "Column",
+    "Exhibit",
+    "Figure",
+    "Section",
+    "Table",
+    "interval",
+    "number",
+    "p_value",
+    "plain",
+    "slug",
+    "with_values",
+]
+
+Row = Mapping[str, Any]
+NOTHING = "–"
+
+
+def number(value: Any, digits: int | None = None) -> str:
+    """Return a number as people read it: about four digits, or so many decimals.
+
+    "–" for None and NaN.
+    """
+    if value is None or (isinstance(value, float) and not math.isfinite(value)):
+        return NOTHING
+    if isinstance(value, int):
+        return f"{value:,}"
+    if digits is None:
+        if value == 0:
+            return "0"
+        digits = decimals(value)
+    text = f"{value:,.{digits}f}"
+    return text.removeprefix("-") if not text.strip("-0.,") else text
+
+
+def decimals(value: float) -> int:
+    """Return the decimals that leave about four digits of a number."""
+    size = abs(value)
+    return 0 if size >= 1000 else 1 if size >= 100 else 2 if size >= 1 else 3
+
+
+def p_value(value: float | None) -> str:
+    """Return a probability of error: three digits, and never 0."""
+    if value is None or math.isnan(value):
+        return NOTHING
+    return "<0.001" if value < 0.001 else f"{value:.3f}"
+
+
+def interval(value: Sequence[float | None] | None, digits: int | None = None) -> str:
+    """Return a pair as "low to high"."""
+    if value is None or value[0] is None or value[1] is None:
+        return NOTHING
+    return f"{number(value[0], digits)} to {number(value[1], digits)}"
+
+
+def plain(value: Any) -> str:
+    """Return text as it is; "–" for None."""
+    return NOTHING if value is None else str(value)
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of a table.
+
+    Attributes:
+        key: of the rows, and its name in CSV (a pair gets two: KEY_low, KEY_high).
+        title: above it.
+        show: makes the text of a cell.
+        is_wide: whether it holds sentences, which need a width of their own.
+    """
+
+    key: str
+    title: str
+    show: Callable[[Any], str] = number
+    is_wide: bool = False
+
+    @property
+    def is_text(self) -> bool:
+        """Whether it is set to the left."""
+        return self.show is plain
+
+    def texts(self, values: Sequence[Any]) -> list[str]:
+        """Return the texts of all cells: numbers with the same decimals unless sizes are far apart.
+
+        Zeros do not count, and no number is left with less than its first two digits.
+        """
+        show = self.show
+        flat = [x for value in values for x in (value if isinstance(value, tuple) else (value,))]
+        sizes = [abs(x) for x in flat if isinstance(x, float) and math.isfinite(x) and x != 0]
+        own = sorted(map(decimals, sizes))
+        digits = own[len(own) // 2] if own else 0
+        if not own or own[-1] - own[0] > 2 or min(sizes) < 10 ** (1 - digits):
+            return [show(value) for value in values]
+        if show is number:
+            return [number(value, digits) for value in values]
+        return [interval(v, digits) if show is interval else show(v) for v in values]
+
+
+@dataclass(frozen=True)
+class Exhibit:
+    """A table or a figure.
+
+    Attributes:
+        name: of its files, without an ending.
+        title: what it shows.
+        note: how to read it, with sizes and tests.
+        columns: of its numbers.
+        rows: its numbers; keys beyond those of the columns are written to CSV too.
+        numbers: what CSV has if that is not the rows.
+    """
+
+    name: str
+    title: str
+    note: str
+    columns: Sequence[Column]
+    rows: Sequence[Row]
+    numbers: Sequence[Row] = field(default=(), kw_only=True)
+
+    def cells(self) -> list[list[str]]:
+        """Return the text of every cell."""
+        shown = [
+            column.texts([row.get(column.key) for row in self.rows]) for column in self.columns
+        ]
+        return [list(row) for row in zip(*shown, strict=True)]
+
+    def to_csv(self) -> str:
+        """Return all numbers, unrounded."""
+        flat = [dict(_flat(row)) for row in self.numbers or self.rows]
+        names = list(dict.fromkeys(name for row in flat for name in row))
+        text = io.StringIO()
+        writer = csv.DictWriter(text, names, restval="", lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(flat)
+        return text.getvalue()
+
+
+@dataclass(frozen=True)
+class Table(Exhibit):
+    """A table.
+
+    Attributes:
+        is_open: whether the page shows it without being asked.
+    """
+
+    is_open: bool = True
+
+
+@dataclass(frozen=True)
+class Figure(Exhibit):
+    """A figure.
+
+    Attributes:
+        drawing: its two formats.
+    """
+
+    drawing: Drawing = field(kw_only=True)
+
+
+@dataclass(frozen=True)
+class Section:
+    """A part of a report: text, exhibits and parts of its own.
+
+    Attributes:
+        title: its heading.
+        text: paragraphs.
+        exhibits: tables and figures in order.
+        sections: parts of it.
+        preformatted: text that stands as it is, such as commands.
+        name: where links go, if not after the title.
+    """
+
+    title: str
+    text: Sequence[str] = ()
+    exhibits: Sequence[Exhibit] = ()
+    sections: Sequence[Section] = ()
+    preformatted: str = ""
+    name: str = ""
+
+    @property
+    def anchor(self) -> str:
+        """Where links go."""
+        return self.name or slug(self.title)
+
+    def all_exhibits(self) -> list[Exhibit]:
+        """Return the exhibits of the section and of its parts, in order."""
+        return [*self.exhibits, *(one for part in self.sections for one in part.all_exhibits())]
+
+
+def with_values(columns: Sequence[Column], rows: Sequence[Row]) -> list[Column]:
+    """Return the columns that have a value in one of the rows."""
+    return [
+        column
+        for column in columns
+        if any(row.get(column.key) not in (None, (None, None)) for row in rows)
+    ]
+
+
+def slug(text: str) -> str:
+    """Return a name for files and links: small letters, digits, "-"."""
+    return re.sub(r"[^a-z0-9]+", "-", text.lower()).strip("-")
+
+
+def _flat(row: Row) -> list[tuple[str, Any]]:
+    """Return a row with pairs in two columns and None as nothing."""
+    flat: list[tuple[str, Any]] = []
+    for key, value in row.items():
+        if isinstance(value, tuple):
+            flat += [(f"{key}_low", _cell(value[0])), (f"{key}_high", _cell(value[1]))]
+        else:
+            flat.append((key, _cell(value)))
+    return flat
+
+
+def _cell(value: Any) -> Any:
+    """Return a value as CSV has it: ten digits, which hide the last bits of a sum."""
+    if value is None or (isinstance(value, float) and not math.isfinite(value)):
+        return ""
+    return f"{value:.10g}" if isinstance(value, float) else value

@@ -1,0 +1,1 @@
+"""Figures of a report: charts, curves, tiles, and the style they share."""

@@ -1,0 +1,90 @@
+"""How much of what champions were chosen by is left in scenarios that did not choose them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from conevo.report.comparison import Treatment
+from conevo.report.exhibits import Column, Section, Table, plain
+from conevo.report.sections.scope import Scope
+from conevo.terms import counted
+
+__all__ = ["champions"]
+
+NAMES = {
+    ("test", "champion"): "the test of champions",
+    ("test", "generation 0"): "the test of generation 0",
+    ("lesion", ""): "lesions of castes",
+    ("clones", ""): "teams of clones",
+    ("rotated", ""): "teams whose controllers changed places",
+}
+"""What a study, and where it matters its team, is called in a sentence."""
+
+
+def champions(scope: Scope) -> Section | None:
+    """Return selection, validation and test of each cell's champions; None if no run has them."""
+    rows = [*_rows(scope, "fitness"), *_rows(scope, scope.measure)]
+    text = [*_not_finite(scope)]
+    if not rows:
+        return Section("How champions were chosen", text) if text else None
+    columns = [
+        Column("environment", "environment", plain),
+        Column("treatment", "method", plain),
+        Column("measure", "measure", plain),
+        Column("n", "n"),
+        Column("selection", "selection"),
+        Column("validation", "validation"),
+        Column("test", "test"),
+        Column("ratio", "test / selection"),
+    ]
+    note = (
+        "Means over runs. Selection: in the scenarios that the fittest team of each generation "
+        "meets, by which finalists are kept; validation: in scenarios of their own, by which the "
+        "champion is chosen among them; test: in fresh ones. Fitness: mean of the robots, on which "
+        "methods select. Where the test is worse than the selection (a ratio below 1 if larger is "
+        "better, above 1 if smaller is) the champion was lucky when it was selected. "
+        "n: runs in which all three are finite."
+    )
+    title = "Champions: selection, validation and test"
+    table = Table(f"{scope.stem}-chosen", title, note, columns, rows, is_open=len(rows) <= 12)
+    return Section("How champions were chosen", text, [table])
+
+
+def _rows(scope: Scope, measure: str) -> list[dict[str, Any]]:
+    """Return a row per cell."""
+    world, family, budget, name = (part.replace("'", "''") for part in (*scope.group, measure))
+    found = scope.tables.query(
+        "SELECT r.environment, r.method, r.variant, count(*), avg(c.selection), avg(c.validation),"
+        " avg(c.test) FROM champions c JOIN runs r USING (run) JOIN budgets b USING (run)"
+        f" WHERE r.world = '{world}' AND r.family = '{family}' AND b.budget = '{budget}'"
+        f" AND c.measure = '{name}' AND c.selection IS NOT NULL AND c.validation IS NOT NULL"
+        " AND c.test IS NOT NULL GROUP BY ALL"
+    )[1]
+    cells = {(row[0], Treatment(row[1], row[2])): row[3:] for row in found}
+    return [
+        scope.key(*cell)
+        | {"measure": measure.replace("_", " "), "n": n}
+        | {"selection": selection, "validation": validation, "test": test}
+        | {"ratio": test / selection if selection > 0 else None}
+        for cell in scope.cells
+        if cell in cells
+        for n, selection, validation, test in [cells[cell]]
+    ]
+
+
+def _not_finite(scope: Scope) -> list[str]:
+    """Return a sentence for each study and measure that lacks values."""
+    world, family, budget = (part.replace("'", "''") for part in scope.group)
+    found = scope.tables.query(
+        "SELECT s.measure, s.study, if(s.study = 'test', s.team, '') AS team,"
+        " count(DISTINCT run) FILTER (s.value IS NULL), count(DISTINCT run),"
+        " count(*) FILTER (s.value IS NULL), count(*) FROM scores s JOIN runs r USING (run)"
+        f" JOIN budgets b USING (run) WHERE r.world = '{world}' AND r.family = '{family}'"
+        f" AND b.budget = '{budget}' GROUP BY ALL HAVING count(*) > count(s.value) ORDER BY ALL"
+    )[1]
+    return [
+        f"Not finite: {measure.replace('_', ' ')} in {values} of {counted(of_values, 'value')} of "
+        f"{NAMES.get((study, team), study)}, of {runs} of {counted(of_runs, 'run')}. Means are "
+        "those of the other scenarios; a run without any is left out of tables and figures."
+        for measure, study, team, runs, of_runs, values, of_values in found
+    ]

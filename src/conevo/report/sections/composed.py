@@ -1,0 +1,147 @@
+"""Teams composed of several behaviours against teams of clones (Nitschke 2009, figure 4.12).
+
+Choice: a composed team is compared with the best of the same run's teams of clones, and methods are
+pooled, as figure 4.12 names none; the drawing has every behaviour's clones, of all runs.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from statistics import fmean, stdev
+from typing import Any, NamedTuple
+
+from conevo.report.exhibits import Column, Figure, Section, Table, interval, p_value, plain
+from conevo.report.figures import charts as figures
+from conevo.report.sections.scope import Scope, place_names
+from conevo.report.statistics import compare, holm
+
+__all__ = ["composed"]
+
+TITLE = "Behavioural validation: composed teams"
+NOTE = (
+    "Teams composed of the fittest specialist of each behaviour of a champion, as many as 4.6.5 "
+    "lists, and teams of clones of one; all methods together."
+)
+COLUMNS = [
+    Column("environment", "environment", plain),
+    Column("team", "team", plain),
+    Column("n", "n"),
+    Column("value", "composed"),
+    Column("clones", "best clones"),
+    Column("difference", "difference"),
+    Column("interval", "95 % interval", interval),
+    Column("p_t", "p (t)", p_value),
+    Column("p_holm", "p (MW, Holm)", p_value),
+]
+
+
+class _Played(NamedTuple):
+    """A team that was played, and what it reached in the mean of its scenarios."""
+
+    study: str
+    team: str
+    value: float
+
+
+def composed(scope: Scope) -> Section | None:
+    """Return what composed teams and teams of clones reach; None if no team was composed."""
+    by_run = _played(scope)
+    rows = _rows(scope, by_run)
+    if not rows:
+        return None
+    about = f"Task performance ({scope.unit}) of composed teams and teams of clones"
+    table = Table(
+        f"{scope.stem}-composed-teams",
+        about,
+        f"{NOTE} Best clones: of the same runs. n: runs whose champions have all behaviours of the "
+        "team. p (t): Student's independent t-test, uncorrected, as in the thesis; p (MW, Holm): "
+        f"Mann-Whitney, corrected by Holm for the {len(rows)} rows.",
+        COLUMNS,
+        rows,
+        is_open=len(rows) <= 12,
+    )
+    return Section(TITLE, exhibits=[_figure(scope, about, by_run), table])
+
+
+def _played(scope: Scope) -> dict[str, list[_Played]]:
+    """Return the teams of each run that were composed or cloned."""
+    found: dict[str, list[_Played]] = defaultdict(list)
+    for run, *played in scope.tables.query(
+        """
+        SELECT s.run, s.study, s.team, avg(s.value) FROM scores s JOIN runs r USING (run)
+        WHERE s.study IN ('clones', 'composed') AND s.team <> 'whole' AND s.measure = r.measure
+            AND s.value IS NOT NULL
+        GROUP BY ALL ORDER BY ALL
+        """
+    )[1]:
+        found[run].append(_Played(*played))
+    return found
+
+
+def _rows(scope: Scope, by_run: dict[str, list[_Played]]) -> list[dict[str, Any]]:
+    """Return each composed team with the best clones of the same runs."""
+    best = max if scope.main.larger_is_better else min
+    pairs: dict[tuple[str, str], list[tuple[float, float]]] = defaultdict(list)
+    for cell, runs in scope.cells.items():
+        for one in runs:
+            teams = by_run.get(one.run, [])
+            clones = [team.value for team in teams if team.study == "clones"]
+            for team in teams:
+                if team.study == "composed" and clones:
+                    pairs[cell.environment, team.team].append((team.value, best(clones)))
+    rows: list[dict[str, Any]] = []
+    for (environment, name), values in sorted(pairs.items()):
+        found = compare([a for a, _ in values], [b for _, b in values])
+        rows.append(
+            {"environment": environment, "team": name, "n": len(values)}
+            | {"value": found.mean_a, "clones": found.mean_b, "difference": found.difference}
+            | {"interval": (found.low, found.high)}
+            | {"p_t": found.p_t, "p_mann_whitney": found.p_mann_whitney}
+        )
+    corrected = holm([row["p_mann_whitney"] for row in rows])
+    return [row | {"p_holm": p} for row, p in zip(rows, corrected, strict=True)]
+
+
+def _figure(scope: Scope, about: str, by_run: dict[str, list[_Played]]) -> Figure:
+    """Draw a bar per team and environment, clones first: the form of figure 4.12."""
+    values: dict[tuple[str, str], dict[str, list[float]]] = defaultdict(lambda: defaultdict(list))
+    for cell, runs in scope.cells.items():
+        for one in runs:
+            for study, team, value in by_run.get(one.run, ()):
+                values[study, team][cell.environment].append(value)
+    names = {
+        f"{team} {study}": f"{team} clones" if study == "clones" else team
+        for study, team in sorted(values)
+    }
+    places = [e for e in scope.environments if any(e in of for of in values.values())]
+    means = {
+        f"{team} {study}": [_bar(values[study, team].get(e, [])) for e in places]
+        for study, team in sorted(values)
+    }
+    rows = [
+        {"environment": e, "study": study, "team": team, "value": value}
+        for (study, team), of in sorted(values.items())
+        for e in places
+        for value in of.get(e, ())
+    ]
+    return Figure(
+        f"{scope.stem}-composed",
+        about,
+        f"{NOTE} Mean over runs; error bars: standard deviation of the runs.",
+        (),
+        rows,
+        drawing=figures.bars(
+            {"": means},
+            place_names(places),
+            names,
+            x_label=scope.axis,
+            y_label=scope.unit,
+            within=scope.within,
+        ),
+    )
+
+
+def _bar(values: list[float]) -> figures.Bar | None:
+    if not values:
+        return None
+    return figures.Bar(fmean(values), stdev(values) if len(values) > 1 else None)

@@ -1,0 +1,265 @@
+"""What teams lose without a caste or in changed places, and what clones of a specialist do.
+
+Nitschke 2009, sections 4.6.5, 4.6.6, 5.5.3, 5.5.4, 6.5.4, 6.5.5. Choice: what a run loses is told
+in percent of the larger of the two performances, as in the claims, so that a team that reached
+almost nothing before cannot outweigh all others; the thesis' percent of the unchanged team is that
+of the means. Of a measure of which smaller is better, what is added is lost.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+from conevo.report.comparison import Cell
+from conevo.report.exhibits import (
+    Column,
+    Exhibit,
+    Figure,
+    Section,
+    Table,
+    interval,
+    p_value,
+    plain,
+    with_values,
+)
+from conevo.report.figures import charts as figures
+from conevo.report.sections.scope import KEYS, Scope, named, sizes
+from conevo.report.statistics import Estimate, compare, holm, mean_interval
+
+__all__ = ["clones", "lesions", "rotations"]
+
+MOST = 100.0  # percent that can be lost, and gained: of the larger of two performances
+ROTATED = "rotated"  # the study without castes
+OVER_CASTES = ": the mean over its castes"
+ENDS = "which ends at ±100 %, where losses do"
+
+
+class _Team(NamedTuple):
+    """A changed team of a run: its main measure, and that of the team unchanged."""
+
+    run: str
+    caste: str
+    whole: float
+    value: float
+    larger_is_better: bool
+
+    @property
+    def scale(self) -> float:
+        """The larger of the two, whatever their signs; their distance if these differ."""
+        return max(abs(self.whole), abs(self.value), abs(self.whole - self.value))
+
+    @property
+    def lost(self) -> float:
+        """What is lost, in percent of the larger of the two: -100 to 100, below 0 if it gained."""
+        lost = self.whole - self.value if self.larger_is_better else self.value - self.whole
+        return 100 * lost / self.scale
+
+
+def lesions(scope: Scope) -> Section:
+    """Return what is left when all robots of a caste are replaced by heuristic ones."""
+    return _section(
+        scope,
+        "lesion",
+        "Lesions",
+        "a caste replaced by heuristic robots",
+        "All robots of a caste replaced by the heuristic controller that matches it; compared with "
+        "the same team unlesioned in the same fresh scenarios.",
+    )
+
+
+def clones(scope: Scope) -> Section:
+    """Return what teams of clones of a caste's fittest robot reach."""
+    return _section(
+        scope,
+        "clones",
+        "Behavioural validation: clones",
+        "a caste cloned",
+        "A team of clones of the caste's fittest robot; compared with the evolved team in the same "
+        "fresh scenarios.",
+    )
+
+
+def rotations(scope: Scope) -> Section | None:
+    """Return what is left when controllers change places; None if no run was studied so."""
+    if not _teams(scope, ROTATED)[0]:
+        return None
+    return _section(
+        scope,
+        ROTATED,
+        "Roles: controllers that change places",
+        "controllers moved to other robots",
+        "Every robot with the controller of the one K before it (conevo test RUN --rotate K), mean "
+        "over all K from 1 to R - 1, so also over moves to robots of the same caste; compared with "
+        "the evolved team in the same fresh scenarios. Nothing is lost where robots are alike, "
+        "much where each has a role, also one that S and favourites do not see.",
+    )
+
+
+def _section(scope: Scope, study: str, title: str, what: str, note: str) -> Section:
+    cells, lost = _teams(scope, study)
+    text = []
+    if lost:
+        text.append(f"Teams left out, as neither they nor the unchanged ones scored: {lost}.")
+    if not cells:
+        return Section(title, text or ["None of these runs has an intervention study."])
+    rows = _rows(scope, cells)
+    figure, table = _figure(scope, study, what, note, cells), _table(scope, study, what, note, rows)
+    return Section(title, text, [figure, table])
+
+
+def _teams(scope: Scope, study: str) -> tuple[dict[Cell, list[_Team]], int]:
+    """Return the changed teams of each cell by run, and how many of them have nothing to lose."""
+    found = scope.tables.query(
+        f"""
+        SELECT s.run, s.team, avg(s.value) FROM scores s JOIN runs r USING (run)
+        WHERE s.study = '{study}' AND s.measure = r.measure AND s.value IS NOT NULL
+        GROUP BY ALL ORDER BY ALL
+        """
+    )[1]
+    values: dict[str, dict[str, float]] = defaultdict(dict)
+    for run, team, value in found:
+        values[run][team] = value
+    cells: dict[Cell, list[_Team]] = {}
+    lost = 0
+    for cell, runs in scope.cells.items():
+        teams = []
+        for one in runs:
+            of = dict(values.get(one.run, {}))
+            whole = of.pop("whole", None)
+            if whole is not None:
+                direction = scope.main.larger_is_better
+                own = [_Team(one.run, caste, whole, v, direction) for caste, v in of.items()]
+                able = [team for team in own if team.scale > 0]
+                teams += able
+                lost += len(own) - len(able)
+        if teams:
+            cells[cell] = teams
+    return cells, lost
+
+
+def _figure(
+    scope: Scope, study: str, what: str, note: str, cells: dict[Cell, list[_Team]]
+) -> Exhibit:
+    """Draw a point per run: the mean over its castes."""
+    means: dict[Cell, list[float]] = {}
+    for cell, teams in cells.items():
+        of_run = defaultdict(list)
+        for team in teams:
+            of_run[team.run].append(team.lost)
+        means[cell] = [sum(values) / len(values) for values in of_run.values()]
+    rows = [
+        scope.key(cell.environment, cell.treatment)
+        | {"run": team.run, "caste": team.caste, "whole": team.whole, scope.measure: team.value}
+        | {"lost": team.lost}
+        for cell, teams in cells.items()
+        for team in teams
+    ]
+    title = f"Task performance ({scope.unit}) that is lost with {what}"
+    at = scope.arranged(means)
+    if not at.is_drawable:
+        columns = [
+            *KEYS,
+            Column("run", "run", plain),
+            *_by_caste(study),
+            Column("lost", "lost, %"),
+        ]
+        return Table(f"{scope.stem}-{study}", title, note, columns, rows, is_open=False)
+    several = any(len(values) > 1 for values in means.values())
+    size = sizes(len(values) for values in means.values())
+    return Figure(
+        f"{scope.stem}-{study}",
+        title,
+        f"{note} Percent of the larger of the two; below 0 the changed team was better "
+        f"({scope.main.direction}). A point per run{'' if study == ROTATED else OVER_CASTES}"
+        + (f"; next to them the mean with Student's 95 % interval, {ENDS}" if several else "")
+        + f". {size} per cell.",
+        (),
+        rows,
+        drawing=figures.points(
+            at.grid(means, lambda values: figures.Runs(values, _ends(_mean_lost(values)))),
+            at.places,
+            named({cell: len(values) for cell, values in means.items()}),
+            x_label=at.axis,
+            y_label="lost, % of the larger",
+            reference=0.0,
+            within=(-MOST, MOST),
+        ),
+    )
+
+
+def _mean_lost(values: Sequence[float]) -> Estimate:
+    """Return the mean of losses in percent, with an interval that ends where losses do."""
+    mean = mean_interval(values)
+    if mean.low is None or mean.high is None:
+        return mean
+    return replace(mean, low=max(mean.low, -MOST), high=min(mean.high, MOST))
+
+
+def _ends(mean: Estimate) -> tuple[float, float, float] | None:
+    """Return a mean with its interval, if it has one."""
+    if mean.value is None or mean.low is None or mean.high is None:
+        return None
+    return mean.value, mean.low, mean.high
+
+
+def _rows(scope: Scope, cells: dict[Cell, list[_Team]]) -> list[dict[str, Any]]:
+    rows: list[dict[str, Any]] = []
+    for cell, teams in cells.items():
+        for caste in sorted({team.caste for team in teams}):
+            with_it = [team for team in teams if team.caste == caste]
+            result = compare([team.value for team in with_it], [team.whole for team in with_it])
+            lost = _mean_lost([team.lost for team in with_it])
+            of = _percent(result.mean_a, result.mean_b)
+            rows.append(
+                scope.key(cell.environment, cell.treatment)
+                | {"caste": caste, "n": len(with_it)}
+                | {"whole": result.mean_b, "changed": result.mean_a, "percent": of}
+                | {"lost": lost.value, "interval": (lost.low, lost.high)}
+                | {"p_t": result.p_t, "p_mann_whitney": result.p_mann_whitney}
+            )
+    corrected = holm([row["p_mann_whitney"] for row in rows])
+    return [row | {"p_holm": p} for row, p in zip(rows, corrected, strict=True)]
+
+
+def _by_caste(study: str) -> list[Column]:
+    return [] if study == ROTATED else [Column("caste", "caste", plain)]
+
+
+def _percent(changed: float | None, whole: float | None) -> float | None:
+    """Return what is left of the whole, None where there is none."""
+    return 100 * changed / whole if changed is not None and whole else None
+
+
+def _table(scope: Scope, study: str, what: str, note: str, rows: list[dict[str, Any]]) -> Table:
+    columns = [
+        *KEYS,
+        *_by_caste(study),
+        Column("n", "n"),
+        Column("whole", "unchanged"),
+        Column("changed", "changed"),
+        Column("percent", "% of unchanged"),
+        Column("lost", "lost, %"),
+        Column("interval", "95 % interval", interval),
+        Column("p_t", "p (t)", p_value),
+        Column("p_holm", "p (MW, Holm)", p_value),
+    ]
+    shown = with_values(columns, rows)
+    is_tested = any(column.key == "p_t" for column in shown)
+    tests = (
+        f" with Student's 95 % interval, {ENDS}. p (t): Student's independent t-test of changed "
+        "and unchanged teams, uncorrected, as in the thesis; p (MW, Holm): Mann-Whitney, corrected "
+        f"by Holm for the {len(rows)} rows."
+    )
+    return Table(
+        f"{scope.stem}-{study}-castes",
+        f"Task performance ({scope.unit}) with {what}",
+        f"{note} n: runs{'' if study == ROTATED else ' that have the caste'}; % of unchanged: of "
+        "the means; lost: percent of the "
+        f"larger of the two, mean over runs{tests if is_tested else '.'}",
+        shown,
+        rows,
+        is_open=len(rows) <= 12,
+    )

@@ -1,0 +1,245 @@
+"""What was run: the plan, its cost, what failed, and with which versions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from typing_extensions import TypedDict
+
+from conevo.campaigns.tables import Tables
+from conevo.errors import ConevoError
+from conevo.evolution.methods.registry import name_in
+from conevo.reading import parse_toml, read_json, read_json_lines, read_text
+from conevo.report.exhibits import Column, Section, Table, number, plain
+from conevo.terms import counted
+
+__all__ = ["Campaign", "overview", "read_campaign", "repetition"]
+
+
+MOST_NAMES = 12  # of runs that a sentence may list
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """What the directory of a campaign says beside its tables.
+
+    Attributes:
+        name: of the campaign.
+        title: one line, or the name.
+        produces: tables and figures of the thesis.
+        plan: text of the plan, empty without one.
+        planned: label of every run -> what the plan says of it.
+        failed: label -> origin and message of runs that ended without a result.
+        left_out: run or file -> why it could not be read.
+    """
+
+    name: str
+    title: str
+    produces: tuple[str, ...]
+    plan: str
+    planned: dict[str, dict[str, Any]]
+    failed: dict[str, dict[str, Any]]
+    left_out: dict[str, str] = field(default_factory=dict)
+
+
+class Ending(TypedDict):
+    """What is shown of ``ended/LABEL.json``, see ``campaigns.ended``."""
+
+    status: str
+    origin: str
+    message: str
+
+
+def read_campaign(root: Path, tables: Path | None = None) -> Campaign:
+    """Return what a campaign's directory says next to its tables; missing files say nothing.
+
+    Args:
+        root: the directory.
+        tables: the folder of its tables, by default in the directory.
+    """
+    plan, listed = root / "plan.toml", root / "runs.jsonl"
+    text = read_text(plan) if plan.is_file() else ""
+    head = parse_toml(text, str(plan)).get("campaign", {})
+    lines = read_json_lines(listed) if listed.is_file() else []
+    manifest = (tables or root / "tables") / "tables.json"
+    sealed = read_json(manifest) if manifest.is_file() else {}
+    left_out = {f"runs/{label}": why for label, why in sealed.get("left_out", {}).items()}
+    endings: dict[str, dict[str, Any]] = {}
+    for path in sorted((root / "ended").glob("*.json")):
+        try:
+            endings[path.stem] = read_json(path, Ending)
+        except ConevoError as error:
+            left_out[f"ended/{path.name}"] = str(error)
+    # Of paths below the campaign: the same report wherever it is.
+    left_out = {file: why.replace(f"{root}/", "") for file, why in left_out.items()}
+    name = str(head.get("name", root.resolve().name))
+    return Campaign(
+        name=name,
+        title=str(head.get("title") or name),
+        produces=tuple(map(str, head.get("produces", ()))),
+        plan=text,
+        planned={str(line["label"]): line for line in lines},
+        failed={k: v for k, v in endings.items() if v["status"] != "finished"},
+        left_out=left_out,
+    )
+
+
+def overview(tables: Tables, campaign: Campaign) -> Section:
+    """Return what was run, what it cost, what is missing, and with which versions."""
+    runs = [run for (run,) in tables.query("SELECT run FROM runs ORDER BY run")[1]]
+    finished = {run.partition("/")[0] for run in runs}
+    failed = {label: why for label, why in campaign.failed.items() if label not in finished}
+    waiting = [x for x in campaign.planned if x not in finished and x not in failed]
+    text = []
+    if campaign.produces:
+        text.append(f"Data of the thesis' {', '.join(campaign.produces)}.")
+    planned = f" of {len(campaign.planned):,} planned" if campaign.planned else ""
+    stages = f" ({counted(len(runs), 'stage')})" if len(runs) > len(finished) else ""
+    text.append(
+        f"Runs finished: {len(finished):,}{planned}{stages}; failed: {len(failed):,}; not ended: "
+        f"{len(waiting):,}. Only finished runs count below. Runs of different "
+        "presets or budgets are never in one table or figure."
+    )
+    if waiting:
+        more = f" and {len(waiting) - MOST_NAMES:,} more" if len(waiting) > MOST_NAMES else ""
+        text.append(f"Not ended: {', '.join(waiting[:MOST_NAMES])}{more}.")
+    text += _warnings(tables)
+    exhibits = [_cost(tables), _versions(tables)]
+    if failed:
+        exhibits.insert(1, _failures(failed, campaign))
+    if campaign.left_out:
+        exhibits.insert(1, _left_out(campaign.left_out))
+        n = len(campaign.left_out)
+        text.append(f"Files that could not be read are left out: {n:,}, see below.")
+    return Section("Runs", text, exhibits)
+
+
+def _warnings(tables: Tables) -> list[str]:
+    """Return what makes runs of one comparison less comparable: the code that made them."""
+    text = []
+    mixed = tables.query(
+        "SELECT task FROM runs JOIN budgets USING (run) GROUP BY task, budget"
+        " HAVING count(DISTINCT code) > 1 ORDER BY task"
+    )[1]
+    if tasks := list(dict.fromkeys(task for (task,) in mixed)):
+        more = f" and {len(tasks) - 3} more" if len(tasks) > 3 else ""
+        text.append(
+            f"Warning: runs of {', '.join(tasks[:3])}{more} that are compared here were made by "
+            "different code (see Versions), so a difference between them may be one of the code."
+        )
+    changed = tables.query("SELECT run, changes FROM runs WHERE changes <> '' ORDER BY run")[1]
+    for run, changes in changed[:3]:
+        text.append(f"Warning: run {run} was {changes}.")
+    if len(changed) > 3:
+        text.append(f"Warning: so were {len(changed) - 3} more; the table of runs has them all.")
+    return text
+
+
+def repetition(tables: Tables, campaign: Campaign) -> Section:
+    """Return the commands that repeat the campaign, and its plan."""
+    versions = tables.query("SELECT DISTINCT conevo FROM runs ORDER BY 1")[1]
+    presets = tables.query("SELECT DISTINCT preset FROM runs ORDER BY 1")[1]
+    text = [
+        "Save the plan below as plan.toml; with conevo "
+        + " or ".join(version for (version,) in versions)
+        + " the same commands give the same runs, bit for bit on the same kind of processor, and "
+        "from the same runs the same report, byte for byte.",
+    ]
+    if any(preset != "night" for (preset,) in presets):
+        text.append("At a larger scale: conevo campaign start plan.toml --preset night")
+    commands = f"conevo campaign start plan.toml\nconevo report {campaign.name}\n\n# plan.toml\n"
+    return Section("How to repeat it", text, preformatted=commands + campaign.plan)
+
+
+def _cost(tables: Tables) -> Table:
+    columns, found = tables.query(
+        """
+        SELECT r.world, r.family, b.budget, count(DISTINCT environment) AS environments,
+               count(DISTINCT method || variant) AS methods, count(DISTINCT seed) AS seeds,
+               count(*) AS runs, min(r.generations) AS least_generations,
+               max(r.generations) AS most_generations, min(evaluations) AS least_evaluations,
+               max(evaluations) AS most_evaluations, sum(team_steps) / 1e6 AS million_team_steps,
+               sum(core_seconds) / 3600 AS core_hours
+        FROM runs r JOIN budgets b USING (run) GROUP BY ALL ORDER BY ALL
+        """
+    )
+    rows = [dict(zip(columns, row, strict=True)) for row in found]
+    for row in rows:
+        for what in ("generations", "evaluations"):
+            row[what] = (row.pop(f"least_{what}"), row.pop(f"most_{what}"))
+    shown = [
+        Column("world", "world", plain),
+        Column("family", "environments", plain),
+        Column("budget", "budget", plain, is_wide=True),
+        Column("environments", "how many"),
+        Column("methods", "methods"),
+        Column("seeds", "seeds"),
+        Column("runs", "runs"),
+        Column("generations", "generations", _span),
+        Column("evaluations", "team evaluations", _span),
+        Column("million_team_steps", "team-steps, million"),
+        Column("core_hours", "core hours"),
+    ]
+    note = "Generations and team evaluations of a run, lowest to highest; the rest of all runs."
+    return Table("runs", "Runs and their cost", note, shown, rows)
+
+
+def _span(value: tuple[int, int]) -> str:
+    low, high = value
+    return number(low) if low == high else f"{low:,} to {high:,}"
+
+
+def _failures(failed: dict[str, dict[str, Any]], campaign: Campaign) -> Table:
+    rows = [
+        {
+            "run": label,
+            "method": name_in(campaign.planned.get(label, {}).get("method") or ""),
+            "seed": campaign.planned.get(label, {}).get("seed"),
+            "origin": why.get("origin"),
+            "message": why.get("message"),
+        }
+        for label, why in failed.items()
+    ]
+    columns = [
+        Column("run", "run", plain),
+        Column("method", "method", plain),
+        Column("seed", "seed", plain),
+        Column("origin", "origin", plain),
+        Column("message", "reason", plain, is_wide=True),
+    ]
+    note = (
+        "Origin: machine, the environment failed; request, it could not be carried out; program, "
+        "conevo failed."
+    )
+    return Table("failures", "Runs that failed", note, columns, rows, is_open=len(rows) <= 12)
+
+
+def _left_out(left_out: dict[str, str]) -> Table:
+    columns = [Column("file", "run or file", plain), Column("why", "reason", plain, is_wide=True)]
+    rows = [{"file": file, "why": why} for file, why in left_out.items()]
+    note = "Damaged files; of a damaged run nothing counts below."
+    return Table("left-out", "Files that could not be read", note, columns, rows)
+
+
+def _versions(tables: Tables) -> Table:
+    columns, found = tables.query(
+        "SELECT conevo, code, numpy, warp, world, kernel_hash, count(*) AS runs FROM runs"
+        " GROUP BY ALL ORDER BY ALL"
+    )
+    shown = [
+        Column("conevo", "conevo", plain),
+        Column("code", "code", plain),
+        Column("numpy", "numpy", plain),
+        Column("warp", "Warp", plain),
+        Column("world", "world", plain),
+        Column("kernel_hash", "kernels", plain),
+        Column("runs", "runs"),
+    ]
+    note = (
+        "Code: digest of all text of conevo that decides results, several if others continued the "
+        "run. Kernels: digest of the simulation's program. Runs with the same ones are comparable."
+    )
+    rows = [dict(zip(columns, row, strict=True)) for row in found]
+    return Table("versions", "Versions", note, shown, rows)

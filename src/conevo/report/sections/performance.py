@@ -1,0 +1,287 @@
+"""What the treatments of a group reached."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from conevo.report.comparison import (
+    Aggregate,
+    Cell,
+    Summary,
+    aggregate,
+    summarize,
+)
+from conevo.report.exhibits import (
+    Column,
+    Exhibit,
+    Figure,
+    Section,
+    Table,
+    interval,
+    number,
+    p_value,
+    plain,
+    with_values,
+)
+from conevo.report.figures import charts as figures
+from conevo.report.sections.scope import KEYS, Scope, named, sizes, span
+from conevo.worlds.registry import entry_of
+
+__all__ = ["performance"]
+
+MOST_COLUMNS = 5  # of treatments that a table compares with each other
+
+
+def performance(scope: Scope) -> Section:
+    """Return what every cell reached."""
+    found = {Cell(one.environment, one.treatment): one for one in summarize(scope.cells)}
+    exchanges = scope.exchanges()
+    rows = [
+        scope.key(*cell) | _summary_row(one, scope) | _exchange_row(exchanges.get(cell))
+        for cell, one in found.items()
+    ]
+    exhibits = [*_drawn(scope, found, rows), _table(scope, rows), *_pooled(scope), *_others(scope)]
+    return Section(f"Task performance: {scope.main.heading}", _warnings(scope), exhibits)
+
+
+def _drawn(
+    scope: Scope, found: Mapping[Cell, Summary], rows: Sequence[Mapping[str, Any]]
+) -> list[Exhibit]:
+    """Return means as bars, and every run as a point; a table of the runs if that is too much."""
+    runs = [
+        scope.key(*cell) | {"seed": one.seed, "run": one.run, scope.measure: one.value}
+        for cell, values in scope.cells.items()
+        for one in values
+    ]
+    title = f"Task performance ({scope.unit}) of every run"
+    at = scope.arranged(found)
+    if not at.is_drawable:
+        columns = [*KEYS, Column("seed", "seed"), Column(scope.measure, scope.unit)]
+        note = "Mean over fresh scenarios."
+        return [Table(f"{scope.stem}-runs", title, note, columns, runs, is_open=False)]
+    names = named({cell: len(one.values) for cell, one in found.items()})
+    size = sizes(len(one.values) for one in found.values())
+    several = any(len(one.values) > 1 for one in found.values())
+    bars = Figure(
+        f"{scope.stem}-bars",
+        f"Task performance ({scope.unit}) by {at.axis_name} and method",
+        f"{scope.about} Mean over runs of the fittest team in fresh scenarios"
+        + ("; error bars: standard deviation of the runs" if several else "")
+        + f". {size} per bar.",
+        (),
+        rows,
+        drawing=figures.bars(
+            at.grid(found, lambda one: figures.Bar(one.mean.value, one.sd)),
+            at.places,
+            names,
+            x_label=at.axis,
+            y_label=scope.unit,
+            within=scope.within,
+        ),
+    )
+    if not several:
+        return [bars]
+    points = Figure(
+        f"{scope.stem}-runs",
+        title,
+        f"{scope.about} A point per run; next to them the mean with Student's 95 % interval. "
+        f"{size} per cell.",
+        (),
+        runs,
+        drawing=figures.points(
+            at.grid(found, lambda one: figures.Runs(one.values, _ends(one, scope))),
+            at.places,
+            names,
+            x_label=at.axis,
+            y_label=scope.unit,
+            within=scope.within,
+        ),
+    )
+    return [bars, points]
+
+
+def _table(scope: Scope, rows: Sequence[Mapping[str, Any]]) -> Table:
+    """Return what every cell reached, with what is known of it."""
+    shown = _performance_columns(rows)
+    keys = {column.key for column in shown}
+    notes = {
+        "interval": "95 % interval: Student's t"
+        + (", ends where values do" if any(map(math.isfinite, scope.within)) else ""),
+        "generation_0": "generation 0: the fittest team of the first generation in the same "
+        "scenarios",
+        "exchanges": "exchange: pairs of sub-populations that recombined between populations in a "
+        "generation, and percent of those that could have",
+        "p_ks": "p (KS): Kolmogorov-Smirnov against the normal fitted to the runs, as in the "
+        "thesis, which overstates normality",
+        "p_lilliefors": "p (Lilliefors): the same distance with the corrected null distribution",
+    }
+    return Table(
+        f"{scope.stem}-performance",
+        f"Task performance ({scope.unit}) by environment and method",
+        "; ".join(
+            [
+                f"{scope.about} Mean over runs of the mean over fresh scenarios",
+                "n: runs",
+            ]
+            + [note for key, note in notes.items() if key in keys]
+        )
+        + ".",
+        shown,
+        rows,
+        is_open=len(rows) <= 12,
+    )
+
+
+def _ends(one: Summary, scope: Scope) -> tuple[float, float, float] | None:
+    """Return mean and interval, which ends where values do; None if there is no interval."""
+    mean, (least, most) = one.mean, scope.within
+    if mean.value is None or mean.low is None or mean.high is None:
+        return None
+    return mean.value, max(mean.low, least), min(mean.high, most)
+
+
+def _summary_row(one: Summary, scope: Scope) -> dict[str, Any]:
+    cell = Cell(one.environment, one.treatment)
+    begun = [value.value for value in scope.first.get(cell, ())]
+    optima = {value.optimum for value in scope.cells[cell]}
+    optimum = optima.pop() if len(optima) == 1 else None
+    mean = one.mean.value
+    interval_of = _ends(one, scope)
+    return {
+        "n": len(one.values),
+        "mean": mean,
+        "sd": one.sd,
+        "interval": interval_of[1:] if interval_of else (None, None),
+        "range": (min(one.values), max(one.values)),
+        "generation_0": sum(begun) / len(begun) if begun else None,
+        "share": mean / optimum if optimum and mean is not None else None,
+        "p_ks": one.normal.p_ks,
+        "p_lilliefors": one.normal.p_lilliefors,
+    }
+
+
+def _exchange_row(made: tuple[float, float] | None) -> dict[str, Any]:
+    pairs, share = made or (None, None)
+    return {"exchanges": pairs, "exchange_share": None if share is None else 100 * share}
+
+
+def _performance_columns(rows: Sequence[Mapping[str, Any]]) -> list[Column]:
+    columns = [
+        *KEYS,
+        Column("n", "n"),
+        Column("mean", "mean"),
+        Column("sd", "sd"),
+        Column("interval", "95 % interval", interval),
+        Column("range", "lowest to highest", interval),
+        Column("generation_0", "generation 0"),
+        Column("share", "share of optimum"),
+        Column("exchanges", "exchange, pairs"),
+        Column("exchange_share", "exchange, %"),
+        Column("p_ks", "p (KS)", p_value),
+        Column("p_lilliefors", "p (Lilliefors)", p_value),
+    ]
+    return with_values(columns, rows)
+
+
+def _warnings(scope: Scope) -> list[str]:
+    counts = [len(of) for of in scope.cells.values()]
+    text = []
+    if max(counts) < 2:
+        text.append("There is one run per cell: no deviation, no interval, and nothing is tested.")
+    elif min(counts) < 2:
+        text.append("Cells with a single run have no deviation, no interval and no t-test.")
+    if max(counts) < 20 and entry_of(scope.group.world):
+        text.append(
+            f"The thesis has 20 runs per cell; here are {span(counts).removeprefix('n = ')}."
+        )
+    missing = len(scope.environments) * len(scope.treatments) - len(scope.cells)
+    if missing:
+        text.append(f"{missing} of the cells of this table have no finished run.")
+    return text
+
+
+def _pooled(scope: Scope) -> list[Exhibit]:
+    """Return the table over all environments, if there is something to pool."""
+    if max(map(len, scope.cells.values())) < 2:
+        return []
+    found = aggregate(scope.cells)
+    if len(found) < 2 or (found[0].environments < 2 and len(scope.environments) > 1):
+        return []
+    optima = {one.optimum for of in scope.cells.values() for one in of}
+    scale = scope.unit if None in optima else f"share of the optimal {scope.unit}"
+    others = [one.treatment for one in found[:-1]] if len(found) <= MOST_COLUMNS else []
+    improvement = (
+        "P(better than X): probability of improvement, that a run is better than one of X in the "
+        f"same environment ({scope.main.direction}); "
+    )
+    several = found[0].environments > 1
+    columns = [
+        Column("treatment", "method", plain),
+        Column("n", "n"),
+        Column("iqm", "IQM"),
+        Column("interval", "95 % interval", interval),
+        *(Column(f"better than {t.title}", f"P(better than {t.title})", plain) for t in others),
+    ]
+    return [
+        Table(
+            f"{scope.stem}-aggregate",
+            f"{'All environments together' if several else 'Interquartile means'}: {scale}",
+            f"Environments: {found[0].environments}; n: runs; IQM: interquartile mean of the runs; "
+            f"{improvement if others else ''}95 % intervals: stratified bootstrap, 2000 "
+            "resamples.",
+            columns,
+            [_aggregate_row(one) for one in found],
+        )
+    ]
+
+
+def _aggregate_row(one: Aggregate) -> dict[str, Any]:
+    return {
+        "treatment": one.treatment.title,
+        "n": one.iqm.n,
+        "iqm": one.iqm.value,
+        "interval": (one.iqm.low, one.iqm.high),
+    } | {
+        f"better than {other.title}": f"{number(p.value)}"
+        + (f" ({interval((p.low, p.high))})" if p.low is not None else "")
+        for other, p in one.improvement.items()
+    }
+
+
+def _others(scope: Scope) -> list[Exhibit]:
+    """Return a table of the measures other than the main one."""
+    rows = [
+        scope.key(environment, treatment)
+        | {
+            "measure": measure.title,
+            "unit": measure.unit,
+            "direction": measure.direction,
+            "n": len(values),
+        }
+        | _mean_and_sd([one.value for one in values])
+        for measure, cells in scope.others.items()
+        for (environment, treatment), values in cells.items()
+    ]
+    if not rows:
+        return []
+    columns = [
+        Column("environment", "environment", plain),
+        Column("measure", "measure", plain),
+        Column("unit", "unit", plain),
+        Column("direction", "direction", plain),
+        Column("treatment", "method", plain),
+        Column("n", "n"),
+        Column("mean", "mean"),
+        Column("sd", "sd"),
+    ]
+    note = "Mean over runs of the mean over fresh scenarios; sd: of the runs; n: runs."
+    name, title = f"{scope.stem}-measures", "Other measures of task performance"
+    return [Table(name, title, note, columns, rows, is_open=False)]
+
+
+def _mean_and_sd(values: Sequence[float]) -> dict[str, float | None]:
+    n, mean = len(values), sum(values) / len(values)
+    squares = sum((value - mean) ** 2 for value in values)
+    return {"mean": mean, "sd": math.sqrt(squares / (n - 1)) if n > 1 else None}

@@ -1,0 +1,304 @@
+"""Statistics of runs: as the thesis does them, and as readers expect them today.
+
+Nitschke 2009, sections 4.5, 5.4, 6.4 and appendices A, C, D: a Kolmogorov-Smirnov test of each data
+set, then an independent t-test of two, significant below 0.05. Beside these: the Lilliefors test,
+Welch's test and interval, Mann-Whitney, Vargha-Delaney's A12, Holm's correction.
+
+The unit of every sample is a run, never a scenario. Choice: a value that is not finite is left
+out; the sizes returned count what was used. What a sample cannot answer is None, never a warning.
+
+Choice: two runs are the least for a mean's error, three for a test of normality. Choice: samples
+without any spread have no t-test and no interval, however equal or different they are: there is no
+error to judge them by.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from conevo.report.ranks import Floats, above, mann_whitney, smallest_mann_whitney
+from conevo.rng import stream
+
+__all__ = [
+    "ALPHA",
+    "Comparison",
+    "Estimate",
+    "Normality",
+    "compare",
+    "finite",
+    "holm",
+    "is_alike",
+    "mean_interval",
+    "normality",
+    "proportion_interval",
+]
+
+ALPHA = 0.05
+"""The thesis' threshold of significance (appendix A)."""
+
+LILLIEFORS_BLOCKS = 10  # of 1000 samples: a p-value near 0.05 is then known to about 0.004
+
+
+@dataclass(frozen=True)
+class Normality:
+    """Whether a sample may come from a normal distribution.
+
+    Attributes:
+        n: runs.
+        p_ks: Kolmogorov-Smirnov against the normal with the sample's mean and deviation, as in
+            the thesis. Too large: the normal was fitted to the very sample.
+        p_lilliefors: the same distance, judged by samples of normal numbers fitted in the same
+            way (Lilliefors 1967).
+    """
+
+    n: int
+    p_ks: float | None
+    p_lilliefors: float | None
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Two independent samples of runs, a and b. All tests are two-sided.
+
+    Attributes:
+        n_a, n_b: runs.
+        mean_a, mean_b: None without runs.
+        sd_a, sd_b: of the sample (n - 1); None below two runs.
+        difference: mean_a - mean_b.
+        low, high: Welch's 95 % interval of the difference.
+        p_t: Student's independent t-test, as in the thesis.
+        p_welch: Welch's t-test, which does not assume equal variances.
+        p_mann_whitney: exact, ties included, up to 60 runs; then by the normal approximation.
+        a12: the probability that a run of a is above one of b, ties half (Vargha & Delaney 2000).
+        smallest_p: the smallest p that Mann-Whitney could give at these sizes.
+    """
+
+    n_a: int
+    n_b: int
+    mean_a: float | None
+    mean_b: float | None
+    sd_a: float | None
+    sd_b: float | None
+    difference: float | None
+    low: float | None
+    high: float | None
+    p_t: float | None
+    p_welch: float | None
+    p_mann_whitney: float | None
+    a12: float | None
+    smallest_p: float | None
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A value and its interval.
+
+    Attributes:
+        value: None without runs.
+        low, high: None where the runs say nothing about the error.
+        n: runs.
+        method: of the interval, in words for a caption.
+    """
+
+    value: float | None
+    low: float | None
+    high: float | None
+    n: int
+    method: str
+
+
+def normality(values: npt.ArrayLike) -> Normality:
+    """Test a sample of runs against the normal distribution fitted to it.
+
+    Both p-values are None below three runs, and if all are equal.
+    """
+    x = finite(values)
+    if len(x) < 3 or not _moments(x)[1]:
+        return Normality(len(x), None, None)
+    from scipy.stats import kstwo
+
+    distance = _distances(x[None, :])[0]
+    by_chance = _lilliefors(len(x))
+    at_least = len(by_chance) - np.searchsorted(by_chance, distance - 1e-12)
+    return Normality(
+        n=len(x),
+        p_ks=float(kstwo.sf(distance, len(x))),
+        p_lilliefors=(1 + int(at_least)) / (1 + len(by_chance)),
+    )
+
+
+def compare(a: npt.ArrayLike, b: npt.ArrayLike) -> Comparison:
+    """Compare two independent samples of runs.
+
+    The t-tests and the interval need two runs in each and a spread in one of them; Mann-Whitney
+    and A12 need one run in each (of two samples of equal values p is 1, and A12 a half).
+    """
+    x, y = finite(a), finite(b)
+    n, m = len(x), len(y)
+    (mean_a, sd_a), (mean_b, sd_b) = _moments(x), _moments(y)
+    difference = None if mean_a is None or mean_b is None else mean_a - mean_b
+    low = high = p_t = p_welch = p_mann_whitney = a12 = smallest_p = None
+    if difference is not None and sd_a is not None and sd_b is not None and (sd_a or sd_b):
+        p_t = _two_sided_t(difference, *_student(sd_a, n, sd_b, m))
+        error, freedom = _welch(sd_a, n, sd_b, m)
+        p_welch = _two_sided_t(difference, error, freedom)
+        reach = _t_quantile(1 - ALPHA / 2, freedom) * error
+        low, high = difference - reach, difference + reach
+    if n and m:
+        p_mann_whitney = mann_whitney(x, y)
+        a12 = float(above(x, y).mean())
+        smallest_p = smallest_mann_whitney(n, m)
+    return Comparison(
+        n_a=n,
+        n_b=m,
+        mean_a=mean_a,
+        mean_b=mean_b,
+        sd_a=sd_a,
+        sd_b=sd_b,
+        difference=difference,
+        low=low,
+        high=high,
+        p_t=p_t,
+        p_welch=p_welch,
+        p_mann_whitney=p_mann_whitney,
+        a12=a12,
+        smallest_p=smallest_p,
+    )
+
+
+def holm(ps: Sequence[float | None]) -> list[float | None]:
+    """Return the p-values of a family of tests, corrected for their number (Holm 1979).
+
+    In the order given. None or NaN, a test that could not be made, is None and does not count.
+    """
+    made = [(p, k) for k, p in enumerate(ps) if p is not None and not math.isnan(p)]
+    adjusted: list[float | None] = [None] * len(ps)
+    least = 0.0
+    for rank, (p, k) in enumerate(sorted(made)):
+        least = max(least, min(1.0, (len(made) - rank) * p))
+        adjusted[k] = least
+    return adjusted
+
+
+def is_alike(comparison: Comparison, margin: float = 0.15) -> bool:
+    """Return whether two samples are shown to be alike (absence of evidence is not evidence).
+
+    None of the three tests finds a difference, uncorrected, and the interval of the difference
+    lies inside +-``margin`` of the larger mean. Choice: of the means' absolute values. Choice:
+    samples without an interval are not alike, whatever their means.
+    """
+    low, high = comparison.low, comparison.high
+    if low is None or high is None or comparison.mean_a is None or comparison.mean_b is None:
+        return False
+    tests = (comparison.p_t, comparison.p_welch, comparison.p_mann_whitney)
+    if any(p is not None and p < ALPHA for p in tests):
+        return False
+    room = margin * max(abs(comparison.mean_a), abs(comparison.mean_b))
+    return -room <= low and high <= room
+
+
+def mean_interval(values: npt.ArrayLike, level: float = 0.95) -> Estimate:
+    """Return the mean of a sample of runs with Student's t interval.
+
+    The interval is None below two runs, and if all are equal.
+    """
+    x = finite(values)
+    mean, sd = _moments(x)
+    method = "Student's t"
+    if mean is None or not sd:
+        return Estimate(mean, None, None, len(x), method)
+    reach = _t_quantile((1 + level) / 2, len(x) - 1) * sd / math.sqrt(len(x))
+    return Estimate(mean, mean - reach, mean + reach, len(x), method)
+
+
+def proportion_interval(successes: int, n: int, level: float = 0.95) -> Estimate:
+    """Return the share of runs in which something was seen, with its exact interval.
+
+    Clopper and Pearson 1934; None without runs.
+
+    Raises:
+        ValueError: successes outside 0 .. n.
+    """
+    if not 0 <= successes <= n:
+        raise ValueError(f"{successes} of {n} runs is not a share")
+    method = "Clopper-Pearson"
+    if n == 0:
+        return Estimate(None, None, None, 0, method)
+    from scipy.special import betaincinv
+
+    tail = (1 - level) / 2
+    low = float(betaincinv(successes, n - successes + 1, tail)) if successes else 0.0
+    high = float(betaincinv(successes + 1, n - successes, 1 - tail)) if successes < n else 1.0
+    return Estimate(successes / n, low, high, n, method)
+
+
+def finite(values: npt.ArrayLike) -> Floats:
+    """Return the finite values of a sample, [runs].
+
+    Raises:
+        ValueError: more than one dimension.
+    """
+    x = np.asarray(values, dtype=np.float64)
+    if x.ndim != 1:
+        raise ValueError(f"a sample has one value per run, not the shape {x.shape}")
+    return x[np.isfinite(x)]
+
+
+def _moments(x: Floats) -> tuple[float | None, float | None]:
+    """Return mean and standard deviation; the latter exactly 0 if all values are equal."""
+    mean = float(x.mean()) if len(x) else None
+    if len(x) < 2:
+        return mean, None
+    return (mean, float(x.std(ddof=1))) if np.ptp(x) > 0 else (float(x[0]), 0.0)
+
+
+def _student(sd_a: float, n: int, sd_b: float, m: int) -> tuple[float, float]:
+    """Return the standard error of a difference of means and its degrees of freedom, pooled."""
+    freedom = n + m - 2
+    pooled = math.hypot(math.sqrt(n - 1) * sd_a, math.sqrt(m - 1) * sd_b) / math.sqrt(freedom)
+    return pooled * math.sqrt(1 / n + 1 / m), freedom
+
+
+def _welch(sd_a: float, n: int, sd_b: float, m: int) -> tuple[float, float]:
+    """Return the same without the assumption of equal variances (Welch 1947)."""
+    a, b = sd_a / math.sqrt(n), sd_b / math.sqrt(m)
+    error = math.hypot(a, b)
+    return error, 1 / ((a / error) ** 4 / (n - 1) + (b / error) ** 4 / (m - 1))
+
+
+def _two_sided_t(difference: float, error: float, freedom: float) -> float:
+    from scipy.special import stdtr
+
+    return float(2 * stdtr(freedom, -abs(difference) / error))
+
+
+def _t_quantile(probability: float, freedom: float) -> float:
+    from scipy.special import stdtrit
+
+    return float(stdtrit(freedom, probability))
+
+
+def _distances(samples: Floats) -> Floats:
+    """Return the Kolmogorov-Smirnov distance of each sample [k, n] to its own fitted normal."""
+    from scipy.special import ndtr
+
+    n = samples.shape[1]
+    centred = np.sort(samples, axis=1) - samples.mean(axis=1, keepdims=True)
+    normal: Any = ndtr(centred / samples.std(axis=1, ddof=1, keepdims=True))
+    steps = np.arange(n + 1) / n
+    return np.asarray(np.maximum(steps[1:] - normal, normal - steps[:-1]).max(axis=1))
+
+
+@lru_cache(maxsize=256)
+def _lilliefors(n: int) -> Floats:
+    """Return the distances of samples of n normal numbers, ascending."""
+    numbers = stream(0, "lilliefors", n)
+    blocks = [_distances(numbers.standard_normal((1000, n))) for _ in range(LILLIEFORS_BLOCKS)]
+    return np.sort(np.concatenate(blocks))
