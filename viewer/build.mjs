@@ -1,11 +1,11 @@
-// Make one self-contained HTML file of each page, where the package has them: replay.html, live.html.
+// Make one self-contained HTML file of each page, where the package has it: PAGE/PAGE.html.
 //
 // A page is a folder with page.html and main.ts. Style (what main.ts imports ending in .css) and
 // script are put where page.html says <!-- conevo:style --> and <!-- conevo:script -->. Its content
 // security policy names the script by its hash, so nothing else that could get into a page runs.
 //
-// With --check nothing is written: it fails if they differ from what a build gives. Their folder may
-// be named.
+// With --check nothing is written: it fails if they differ from what a build gives. The package's
+// folder may be named.
 
 import { createHash } from "node:crypto";
 import { existsSync, readFileSync, writeFileSync } from "node:fs";
@@ -19,11 +19,11 @@ const { values, positionals } = parseArgs({
   options: { check: { type: "boolean" } },
   allowPositionals: true,
 });
-const folder = positionals[0] ?? join(here, "..", "src", "conevo", "replay", "pages");
+const folder = positionals[0] ?? join(here, "..", "src", "conevo");
 
-for (const page of ["replay", "live"]) {
+for (const page of ["replay", "watch"]) {
   const html = await assemble(page);
-  const path = join(folder, `${page}.html`);
+  const path = join(folder, page, `${page}.html`);
   if (!values.check) {
     writeFileSync(path, html);
     console.log(`${page}.html: ${Buffer.byteLength(html)} bytes`);

@@ -15,8 +15,8 @@ from conevo.campaigns.plan_file import read_plan
 from conevo.cli.main import main
 from conevo.errors import UsageError
 from conevo.evolution.methods import registry
-from conevo.replay.live.watched import Watched
 from conevo.runs.run import Run
+from conevo.watch.state import Watched
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "random_search.py"
 WHERE = """

@@ -20,8 +20,8 @@ from PIL import Image
 
 from conevo.cli.main import main
 from conevo.cli.seeing import bar
-from conevo.replay.live.server import LiveServer
 from conevo.replay.trajectory import Trajectory
+from conevo.watch.server import LiveServer
 from runs.tiny import evolve_tiny
 
 LONG = {"run__generations": 22}  # of which every second team is kept
@@ -282,7 +282,7 @@ def test_watch_shows_the_champion_of_the_moment(say, here, monkeypatch) -> None:
         watched.snapshot()
         pages.append(replay("later"))
 
-    monkeypatch.setattr("conevo.replay.live.server.serve", serve)
+    monkeypatch.setattr("conevo.watch.server.serve", serve)
     assert say("watch", "later", "--no-browser").code == 0
     said = [data_of(page)["teams"][0]["subtitle"] for page in pages]
     assert ["generation 0," in one for one in said] == [True, True, False]
@@ -330,7 +330,7 @@ def test_watch_serves_while_a_browser_does_not_return(here, monkeypatch) -> None
 
     monkeypatch.setattr("webbrowser.get", lambda: object())
     monkeypatch.setattr("webbrowser.open", browser)
-    monkeypatch.setattr("conevo.replay.live.server.serve", serve)
+    monkeypatch.setattr("conevo.watch.server.serve", serve)
     with pytest.raises(SystemExit) as ended:
         main(["watch", "cone"])
     assert ended.value.code == 0

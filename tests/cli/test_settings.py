@@ -164,7 +164,7 @@ def test_advice_keeps_the_length_that_was_asked_for(say, monkeypatch) -> None:
 def test_watch_refuses_a_device_that_is_not_here(say, monkeypatch) -> None:
     say(*tiny("--quiet", "--out", "here"))
     monkeypatch.setattr("conevo.kernels.devices.cards_here", lambda: ())
-    monkeypatch.setattr("conevo.replay.live.server.serve", lambda *_: None)
+    monkeypatch.setattr("conevo.watch.server.serve", lambda *_: None)
     said = say("watch", "here", "--device", "cuda:7", "--no-browser")
     assert said.code == 3
     assert said.err.startswith("conevo: error: device 'cuda:7': no CUDA device on this machine")

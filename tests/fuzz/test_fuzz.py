@@ -84,7 +84,7 @@ def call(command: str, folder: Path) -> tuple[int, str, str]:
 
 def watch(path: Path) -> int:
     """Look as the live page does."""
-    from conevo.replay.live.watched import Watched
+    from conevo.watch.state import Watched
 
     try:
         watched = Watched([path])

@@ -21,8 +21,8 @@ from conevo.runs.config import resolve
 from conevo.runs.lab import Lab
 from conevo.runs.provenance import describe_machine
 from conevo.runs.store import Store, create
-from replay.followed import record
 from runs.tiny import command, evolve_tiny, spawn, wait_for
+from watch.followed import record
 
 HOLD = """
 import fcntl, os, sys

@@ -12,7 +12,7 @@ from conevo.cli.browser import open_while_serving
 from conevo.cli.carry import device_option
 
 if TYPE_CHECKING:
-    from conevo.replay.live.watched import Watched
+    from conevo.watch.state import Watched
 
 __all__ = ["watch"]
 
@@ -35,7 +35,7 @@ def watch(what: str | None, port: int, device: str | None, no_browser: bool) -> 
     Try: conevo watch runs/first
     """
     from conevo.kernels.devices import device_here
-    from conevo.replay.live.server import serve
+    from conevo.watch.server import serve
 
     watched = _watched(what)
     if device is not None:
@@ -53,8 +53,8 @@ def _watched(what: str | None) -> Watched:
     """Return what is to be followed."""
     from conevo.campaigns.campaign import CAMPAIGNS
     from conevo.cli.find import campaign_at, find
-    from conevo.replay.live.watched import Watched
     from conevo.runs.run import RUNS
+    from conevo.watch.state import Watched
 
     if what is None:
         return Watched(folders=[RUNS, CAMPAIGNS])

@@ -1,1 +1,1 @@
-"""Seeing the team: trajectories, the viewer in the browser, films, and a page that follows runs."""
+"""Seeing the team: trajectories, the viewer in the browser, and films."""

@@ -41,7 +41,7 @@ def replay_page(playbacks: Sequence[Playback]) -> str:
     about = {"format": FORMAT, "conevo": version("conevo"), "teams": teams}
     text = json.dumps(about, allow_nan=False, separators=(",", ":")).translate(_ESCAPED)
     data = base64.b64encode(zlib.compress(pool.data, 9)).decode()
-    viewer = resources.files("conevo.replay").joinpath("pages/replay.html").read_text("utf-8")
+    viewer = resources.files("conevo.replay").joinpath("replay.html").read_text("utf-8")
     before, found, after = viewer.partition(PLACE)
     if not found:
         raise RuntimeError(f"the viewer has no {PLACE}")

@@ -25,7 +25,7 @@ from typing import Any
 from urllib.parse import unquote, unquote_plus
 
 from conevo.errors import ConevoError, EnvironmentFailure
-from conevo.replay.live.watched import Watched
+from conevo.watch.state import Watched
 
 __all__ = ["LiveServer", "serve"]
 
@@ -98,7 +98,7 @@ class LiveServer(ThreadingHTTPServer):
         self.port = int(self.server_address[1])
         self.address = f"http://{HOST}:{self.port}/"
         self.hosts = {f"{HOST}:{self.port}", f"localhost:{self.port}"}
-        self.page = resources.files("conevo.replay").joinpath("pages/live.html").read_bytes()
+        self.page = resources.files("conevo.watch").joinpath("watch.html").read_bytes()
         self.at_replay = threading.Lock()
         watched.snapshot(PATIENCE)  # so that labels are known
         self._deadlines: dict[socket.socket, float] = {}

@@ -16,10 +16,10 @@ from conevo.campaigns.inputs import shown_as
 from conevo.campaigns.ledger import Entry
 from conevo.errors import ConevoError, UsageError
 from conevo.evolution.methods.registry import name_in
-from conevo.replay.live.files import Stamp, is_locked, readable, stamp
-from conevo.replay.live.panels import Panel, panels_of
-from conevo.replay.live.runs import Standing, Subject, span
 from conevo.runs.directory import LOCK, kind_of
+from conevo.watch.comparisons import Panel, panels_of
+from conevo.watch.subjects import Standing, Subject, span
+from conevo.watch.tail import Stamp, is_locked, readable, stamp
 
 __all__ = ["Experiment", "Group", "Names", "Runs", "children"]
 

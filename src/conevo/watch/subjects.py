@@ -17,10 +17,10 @@ import numpy.typing as npt
 
 from conevo.errors import ConevoError, UsageError
 from conevo.evolution.methods.registry import name_in
-from conevo.replay.live.declared import NOTHING, Declared, Found
-from conevo.replay.live.files import Log, Whole, is_locked, readable, stamp
-from conevo.replay.live.settings import CODE, FROM, Choices, choices_of, factors
 from conevo.runs.directory import CONFIG, LOCK, SEAL, SHAPING, kind_of
+from conevo.watch.declared import NOTHING, Declared, Found
+from conevo.watch.settings import CODE, FROM, Choices, choices_of, factors
+from conevo.watch.tail import Log, Whole, is_locked, readable, stamp
 from conevo.worlds.measures import Measure
 
 __all__ = ["Settings", "Standing", "Subject", "plain", "span"]

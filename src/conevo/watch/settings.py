@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from conevo.replay.live.files import readable
+from conevo.watch.tail import readable
 
 __all__ = ["CODE", "FROM", "Choices", "choices_of", "comparisons", "differences", "factors"]
 

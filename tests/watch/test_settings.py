@@ -5,9 +5,9 @@ import tomllib
 
 import tomli_w
 
-from conevo.replay.live.settings import comparisons, differences, factors
-from conevo.replay.live.watched import Watched
-from replay.followed import write_run, write_shaping
+from conevo.watch.settings import comparisons, differences, factors
+from conevo.watch.state import Watched
+from watch.followed import write_run, write_shaping
 
 
 def with_settings(path, method="cone", seed=1, **settings):

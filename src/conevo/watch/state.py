@@ -15,10 +15,10 @@ from typing import Any
 from conevo.errors import UsageError
 from conevo.evolution.methods.registry import METHODS, title_of
 from conevo.palette import caste_colours, method_looks, several
-from conevo.replay.live.files import readable
-from conevo.replay.live.groups import Experiment, Group, Names, Runs, children
-from conevo.replay.live.runs import Subject
 from conevo.runs.directory import kind_of
+from conevo.watch.groups import Experiment, Group, Names, Runs, children
+from conevo.watch.subjects import Subject
+from conevo.watch.tail import readable
 from conevo.worlds.registry import colours_of
 
 __all__ = ["FORMAT", "Watched"]

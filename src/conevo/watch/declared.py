@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 from conevo.errors import ConevoError
 from conevo.evolution.methods.registry import remember_title
 from conevo.reading import parse_json
-from conevo.replay.live.files import Whole, readable
+from conevo.watch.tail import Whole, readable
 from conevo.worlds.measures import Measure
 
 __all__ = ["Declared", "Found"]

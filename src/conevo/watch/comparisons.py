@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from conevo.replay.live.runs import Subject
-from conevo.replay.live.settings import comparisons, differences
+from conevo.watch.settings import comparisons, differences
+from conevo.watch.subjects import Subject
 from conevo.worlds.measures import Measure
 
 __all__ = ["Panel", "panels_of"]

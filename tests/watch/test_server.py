@@ -13,9 +13,9 @@ from contextlib import contextmanager
 import pytest
 
 from conevo.errors import EnvironmentFailure, UsageError
-from conevo.replay.live.server import LiveServer, serve
-from conevo.replay.live.watched import Watched
-from replay.followed import append, record, write_run
+from conevo.watch.server import LiveServer, serve
+from conevo.watch.state import Watched
+from watch.followed import append, record, write_run
 
 SECRET = "what no page may tell"
 
@@ -273,7 +273,7 @@ def threads_of(server):
 
 
 def test_a_client_that_asks_letter_by_letter_is_not_waited_for(server, monkeypatch, capfd):
-    monkeypatch.setattr("conevo.replay.live.server.ASKING", 0.3)
+    monkeypatch.setattr("conevo.watch.server.ASKING", 0.3)
     before = len(threads_of(server))
     began = time.monotonic()
     with (
@@ -294,8 +294,8 @@ def test_a_client_that_asks_letter_by_letter_is_not_waited_for(server, monkeypat
 
 
 def test_a_client_that_does_not_take_its_answer_is_not_waited_for(folder, monkeypatch, capfd):
-    monkeypatch.setattr("conevo.replay.live.server.SENDING", 0.2)
-    monkeypatch.setattr("conevo.replay.live.server.SLOWEST", 1e9)
+    monkeypatch.setattr("conevo.watch.server.SENDING", 0.2)
+    monkeypatch.setattr("conevo.watch.server.SLOWEST", 1e9)
     with serving(folder, lambda label: "x" * 50_000_000) as server:
         before = len(threads_of(server))
         with socket.create_connection(("127.0.0.1", server.port), timeout=10) as slow:
@@ -312,14 +312,14 @@ def test_a_client_that_does_not_take_its_answer_is_not_waited_for(folder, monkey
 
 
 def test_making_a_replay_may_take_longer_than_asking_for_it(folder, monkeypatch):
-    monkeypatch.setattr("conevo.replay.live.server.ASKING", 0.1)
-    monkeypatch.setattr("conevo.replay.live.server.SENDING", 0.1)
+    monkeypatch.setattr("conevo.watch.server.ASKING", 0.1)
+    monkeypatch.setattr("conevo.watch.server.SENDING", 0.1)
     with serving(folder, lambda label: time.sleep(0.5) or label) as server:
         assert ask(server, "/replay/run")[::2] == (200, "run")
 
 
 def test_there_are_only_so_many_connections(server, monkeypatch, capfd):
-    monkeypatch.setattr("conevo.replay.live.server.MOST", 3)
+    monkeypatch.setattr("conevo.watch.server.MOST", 3)
     held = [socket.create_connection(("127.0.0.1", server.port), timeout=10) for _ in range(3)]
     until = time.monotonic() + 5
     while len(server._deadlines) < 3:
@@ -399,8 +399,8 @@ def test_nothing_is_written(server, folder):
 SERVE = """
 import signal, sys
 from pathlib import Path
-from conevo.replay.live.watched import Watched
-from conevo.replay.live.server import serve
+from conevo.watch.state import Watched
+from conevo.watch.server import serve
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a background job's children ignore it
 serve(Watched(folders=[Path(sys.argv[1])]), None, str, lambda address: print(address, flush=True))
 print("the end", flush=True)

@@ -16,9 +16,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from conevo.replay.live.server import LiveServer
-from conevo.replay.live.watched import Watched
 from conevo.replay.page import replay_page
+from conevo.watch.server import LiveServer
+from conevo.watch.state import Watched
 from replay.synthetic import made_up
 from replay.viewing import hexadecimal, inside, overflow, pixels, until
 from runs.tiny import evolve_tiny

@@ -7,8 +7,8 @@ import shutil
 import pytest
 
 from conevo.errors import UsageError
-from conevo.replay.live.watched import Watched
-from replay.followed import (
+from conevo.watch.state import Watched
+from watch.followed import (
     append,
     at_work,
     record,

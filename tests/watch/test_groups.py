@@ -4,9 +4,9 @@ import time
 import pytest
 
 from conevo.campaigns.campaign import Campaign
-from conevo.replay.live.watched import Watched
+from conevo.watch.state import Watched
 from conevo.worlds.rover import drawn as rover
-from replay.followed import append, at_work, record, write_campaign, write_run
+from watch.followed import append, at_work, record, write_campaign, write_run
 
 
 def by_label(watched):
@@ -212,7 +212,7 @@ def test_whatever_goes_wrong_in_one_place_all_others_are_shown(campaign, monkeyp
     state = watched.snapshot()
     problems = {group["kind"]: group["problem"] for group in state["groups"]}
     assert problems == {"runs": "", "campaign": "is damaged: ZeroDivisionError('division by zero')"}
-    monkeypatch.setattr("conevo.replay.live.groups.panels_of", lambda *_: 1 / 0)
+    monkeypatch.setattr("conevo.watch.groups.panels_of", lambda *_: 1 / 0)
     watched = Watched([campaign.path, campaign.path.parent / "run"])
     for group in watched.snapshot()["groups"]:
         assert group["problem"].startswith("cannot be shown: ZeroDivisionError")
