@@ -16,7 +16,7 @@ from typing import Any
 import pages
 from conevo.campaigns.campaign import Campaign
 from conevo.campaigns.tables import Tables, Value
-from conevo.cli.find import sealed
+from conevo.cli.lookup import sealed
 from conevo.evolution.methods.registry import METHODS
 from conevo.report.claims import verdicts
 from conevo.report.files import write_report

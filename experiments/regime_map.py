@@ -20,7 +20,7 @@ import numpy as np
 sys.path.append(str(Path(__file__).resolve().parents[1] / "docs"))
 from conevo.campaigns.plan import PlannedRun
 from conevo.campaigns.tables import Tables
-from conevo.cli.find import find_campaign, sealed
+from conevo.cli.lookup import find_campaign, sealed
 from conevo.errors import ConevoError, UsageError
 from conevo.runs.records import own_numbers
 from conevo.runs.run import Run

@@ -22,7 +22,7 @@ import numpy as np
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "docs"))
 from compare_levels import level_name
-from conevo.cli.find import find_campaign
+from conevo.cli.lookup import find_campaign
 from conevo.errors import ConevoError, UsageError
 from conevo.evolution.methods.registry import title_of
 from conevo.evolution.protocol import IntArray

@@ -18,8 +18,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from conevo.cli.epoch_options import bar
 from conevo.cli.main import main
-from conevo.cli.seeing import bar
 from conevo.replay.trajectory import Trajectory
 from conevo.watch.server import LiveServer
 from runs.tiny import evolve_tiny

@@ -12,8 +12,8 @@ import pytest
 from rich.console import Console
 
 from conevo.cli.progress import Display, Pace
-from conevo.cli.summary import exchange_text, run_text
-from conevo.cli.summary import test_text as text_of_test
+from conevo.cli.run_text import exchange_text, run_text
+from conevo.cli.run_text import test_text as text_of_test
 from conevo.cli.text import bars, castes, duration, neurons, number, progress, spread, table
 from conevo.terms import counted
 from runs.tiny import TASK, evolve_tiny, tiny_settings

@@ -11,7 +11,7 @@ import pytest
 
 import conevo
 from conevo.cli.main import main
-from conevo.cli.summary import generations_table
+from conevo.cli.run_text import generations_table
 from conevo.errors import UsageError
 from conevo.runs.checkpoint import save
 from conevo.runs.config import resolve

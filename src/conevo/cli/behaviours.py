@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from conevo.cli.carry import device_option
+from conevo.cli.run_to_end import device_option
 from conevo.worlds.registry import WORLDS
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ def behaviours(
     as_json: bool,
 ) -> None:
     """Classify what the fittest team of a run does."""
-    from conevo.cli.find import find_run
+    from conevo.cli.lookup import find_run
     from conevo.studies.behaviour_report import behaviour_report
     from conevo.studies.observation import studied
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from conevo.cli.carry import accept_option, time_limit_option
+from conevo.cli.run_to_end import accept_option, time_limit_option
 from conevo.errors import UsageError
 from conevo.terms import counted, quoted
 
@@ -214,7 +214,7 @@ def status(name: str, runs: bool, as_json: bool) -> int:
     Try: conevo campaign status rover-complex --runs
     """
     from conevo.cli.campaign_text import print_status
-    from conevo.cli.find import find_campaign
+    from conevo.cli.lookup import find_campaign
 
     return FAILED if print_status(find_campaign(name), runs, as_json) else 0
 
@@ -226,7 +226,7 @@ def stop(name: str) -> None:
 
     Runs write a checkpoint first, so nothing is lost; conevo campaign start continues them.
     """
-    from conevo.cli.find import find_campaign
+    from conevo.cli.lookup import find_campaign
 
     found = find_campaign(name)
     found.stop()
@@ -241,7 +241,7 @@ def stop(name: str) -> None:
 def retry(name: str, accept_other_code: bool, **execution: Any) -> int:
     """Retry the failed runs of a campaign and finish what is missing."""
     from conevo.cli.campaign_run import carry_on, ready
-    from conevo.cli.find import find_campaign
+    from conevo.cli.lookup import find_campaign
 
     execute = ready(**execution)
     found = find_campaign(name)
@@ -259,7 +259,7 @@ def _planned(
     """
     from conevo.campaigns.campaign import CAMPAIGNS
     from conevo.campaigns.plan_file import preset_names, read_plan, read_preset
-    from conevo.cli.find import campaign_at
+    from conevo.cli.lookup import campaign_at
     from conevo.runs.assignments import parse_assignments
 
     there = campaign_at(name)

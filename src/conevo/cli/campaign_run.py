@@ -18,7 +18,7 @@ from conevo.campaigns.executors.protocol import Ending, Executor
 from conevo.campaigns.executors.registry import make_executor
 from conevo.campaigns.ledger import Entry
 from conevo.cli.campaign_text import counts, grid, print_failed
-from conevo.cli.carry import drop_output, style_of
+from conevo.cli.run_to_end import drop_output, style_of
 from conevo.cli.text import duration
 from conevo.errors import EnvironmentFailure, UsageError
 from conevo.runs.time_limit import TimeLimit

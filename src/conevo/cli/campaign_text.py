@@ -20,7 +20,7 @@ from conevo.campaigns.ledger import Entry
 from conevo.campaigns.plan import PlannedRun
 from conevo.campaigns.plan_file import preset_names, read_preset
 from conevo.campaigns.progress import last_written, progress_of
-from conevo.cli.find import campaigns_in
+from conevo.cli.lookup import campaigns_in
 from conevo.cli.text import duration, table
 from conevo.errors import ConevoError
 from conevo.evolution.methods.registry import name_in

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from conevo.cli.seeing import epoch_options
+from conevo.cli.epoch_options import epoch_options
 from conevo.errors import UsageError
 
 __all__ = ["film"]
@@ -59,7 +59,7 @@ def film(
 
     Try: conevo film runs/first --gif
     """
-    from conevo.cli.seeing import REPLAYS, bar, name_of, playbacks, trajectories
+    from conevo.cli.epoch_options import REPLAYS, bar, name_of, playbacks, trajectories
     from conevo.replay.film import SIZES, choose_format, frames_of, write_film, write_poster
     from conevo.replay.picture import Painter
     from conevo.runs.durable import refuse_file

@@ -123,8 +123,8 @@ TABLES = {"worlds": _worlds, "controllers": _controllers, "methods": _methods}
 
 
 def _runs(folder: str | None) -> Rows:
-    from conevo.cli.find import directories, open_directory
-    from conevo.cli.stages import span
+    from conevo.cli.lookup import directories, open_directory
+    from conevo.cli.shaping_text import span
     from conevo.runs.run import RUNS, Run
 
     place = Path(folder) if folder else RUNS

@@ -211,7 +211,7 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
         )
     except OSError as error:
         if error.errno == errno.EPIPE:  # the reader of our output has gone
-            from conevo.cli.carry import drop_output
+            from conevo.cli.run_to_end import drop_output
 
             drop_output()
             sys.exit(0)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from conevo.cli.carry import carry_on, style_of, time_limit_option
+from conevo.cli.run_to_end import carry_on, style_of, time_limit_option
 from conevo.errors import UsageError
 
 if TYPE_CHECKING:
@@ -167,7 +167,7 @@ class Order:
             origin: as for ``run``, as the next.
             of_champion: whether the populations are bred from its champion.
         """
-        from conevo.cli.find import find_last
+        from conevo.cli.lookup import find_last
         from conevo.cli.settings_text import print_dry_run
         from conevo.runs.directory import refuse_existing
         from conevo.runs.run import RUNS, beginning
@@ -191,7 +191,7 @@ class Order:
             origin: names the run whose populations it begins with, or a shaping whose last stage's.
             of_champion: they are bred from its champion.
         """
-        from conevo.cli.find import find_last
+        from conevo.cli.lookup import find_last
         from conevo.runs.run import start
 
         begun = start(

@@ -10,7 +10,7 @@ from typing import Any
 
 import click
 
-from conevo.cli.summary import declared, heading_of, measures_text
+from conevo.cli.run_text import declared, heading_of, measures_text
 from conevo.cli.text import bars, castes, count, duration, favourites, neurons, number
 from conevo.runs.run import Run
 from conevo.terms import S_MEANS, SHARE_SCALE, counted

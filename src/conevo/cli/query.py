@@ -25,7 +25,7 @@ def query(arguments: tuple[str, ...], as_csv: bool, as_json: bool) -> None:
     Try: conevo query NAME "SELECT method, count(*) FROM runs GROUP BY ALL"
     """
     from conevo.campaigns.tables import Tables
-    from conevo.cli.find import find_campaign, only_campaign, sealed
+    from conevo.cli.lookup import find_campaign, only_campaign, sealed
     from conevo.cli.text import table
     from conevo.errors import UsageError
 

@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from conevo.cli.browser import open_page
-from conevo.cli.seeing import epoch_options
+from conevo.cli.epoch_options import epoch_options
 
 __all__ = ["replay"]
 
@@ -27,7 +27,7 @@ def replay(what: str, out: str | None, keep: str | None, no_browser: bool, **whi
 
     Try: conevo replay runs/first
     """
-    from conevo.cli.seeing import REPLAYS, name_of, playbacks, trajectories
+    from conevo.cli.epoch_options import REPLAYS, name_of, playbacks, trajectories
     from conevo.replay.page import replay_page
     from conevo.runs.durable import write_new
 

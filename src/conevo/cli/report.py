@@ -22,7 +22,7 @@ def report(name: str, out: str | None) -> None:
     """
     import logging
 
-    from conevo.cli.find import find_campaign, sealed
+    from conevo.cli.lookup import find_campaign, sealed
     from conevo.errors import EnvironmentFailure
     from conevo.report.files import write_report
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from conevo.cli.carry import (
+from conevo.cli.run_to_end import (
     accept_option,
     carry_on,
     device_option,
@@ -64,7 +64,7 @@ def resume(
 
     Try: conevo resume runs/first --generations 100
     """
-    from conevo.cli.find import find
+    from conevo.cli.lookup import find
 
     length: dict[str, Any] = {
         "generations": generations,

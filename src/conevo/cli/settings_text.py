@@ -13,7 +13,7 @@ from typing import Any
 
 import click
 
-from conevo.cli.summary import title
+from conevo.cli.run_text import title
 from conevo.cli.text import count, table
 from conevo.errors import UsageError
 from conevo.runs.config import RunConfig, resolve

@@ -6,8 +6,8 @@ from typing import Any
 
 import click
 
-from conevo.cli.carry import output_options
 from conevo.cli.options import Order, setting_options
+from conevo.cli.run_to_end import output_options
 
 __all__ = ["shape_prey"]
 

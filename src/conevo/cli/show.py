@@ -31,9 +31,9 @@ def show(run: str, rows: int, as_json: bool) -> None:
 
     Try: conevo show runs/first --rows 20
     """
-    from conevo.cli.find import find
-    from conevo.cli.stages import shaping_text
-    from conevo.cli.summary import run_text
+    from conevo.cli.lookup import find
+    from conevo.cli.run_text import run_text
+    from conevo.cli.shaping_text import shaping_text
     from conevo.runs.run import Run
 
     found = find(run)

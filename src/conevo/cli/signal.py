@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from conevo.cli.carry import device_option
 from conevo.cli.options import Order, settings_only
+from conevo.cli.run_to_end import device_option
 from conevo.errors import UsageError
 
 if TYPE_CHECKING:
@@ -94,7 +94,7 @@ def _is_run(what: str) -> bool:
 
 def _found(what: str, settings: dict[str, Any]) -> Run:
     """Return a run, for which there are no settings."""
-    from conevo.cli.find import find_run
+    from conevo.cli.lookup import find_run
     from conevo.cli.test import note_other_code
 
     names = {"settings": "--set"}

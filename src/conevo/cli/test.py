@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from conevo.cli.carry import device_option
+from conevo.cli.run_to_end import device_option
 from conevo.errors import UsageError
 
 if TYPE_CHECKING:
@@ -73,9 +73,9 @@ def test(
 
     Try: conevo test runs/first --set world.iterations=500 --robots 10
     """
-    from conevo.cli.find import find_run, find_shaping
-    from conevo.cli.stages import stages_test_text
-    from conevo.cli.summary import test_text
+    from conevo.cli.lookup import find_run, find_shaping
+    from conevo.cli.run_text import test_text
+    from conevo.cli.shaping_text import stages_test_text
 
     is_changed = on is not None or bool(settings) or robots is not None or rotate is not None
     if stages:
@@ -90,7 +90,7 @@ def test(
     found = find_run(run)
     note_other_code(found)
     if is_changed:
-        from conevo.cli.summary import conditions_text
+        from conevo.cli.run_text import conditions_text
         from conevo.runs.assignments import parse_assignments
 
         world = parse_assignments(settings)

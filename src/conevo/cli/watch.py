@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from conevo.cli.browser import open_while_serving
-from conevo.cli.carry import device_option
+from conevo.cli.run_to_end import device_option
 
 if TYPE_CHECKING:
     from conevo.watch.state import Watched
@@ -52,7 +52,7 @@ def watch(what: str | None, port: int, device: str | None, no_browser: bool) -> 
 def _watched(what: str | None) -> Watched:
     """Return what is to be followed."""
     from conevo.campaigns.campaign import CAMPAIGNS
-    from conevo.cli.find import campaign_at, find
+    from conevo.cli.lookup import campaign_at, find
     from conevo.runs.run import RUNS
     from conevo.watch.state import Watched
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from conevo.cli.carry import device_option
+from conevo.cli.run_to_end import device_option
 from conevo.errors import UsageError
 
 if TYPE_CHECKING:
@@ -87,7 +87,7 @@ def _trajectory(
     device: str | None,
     like: Trajectory | None,
 ) -> Trajectory:
-    from conevo.cli.find import find_run
+    from conevo.cli.lookup import find_run
     from conevo.replay.recording import record
     from conevo.replay.trajectory import Trajectory
 

@@ -116,8 +116,8 @@ def carry_on(
         device: by default the one of its last session.
     """
     from conevo.cli.progress import watching
-    from conevo.cli.stages import print_shaping_end
-    from conevo.cli.summary import print_end
+    from conevo.cli.run_text import print_end
+    from conevo.cli.shaping_text import print_shaping_end
     from conevo.outside import line_of
     from conevo.runs.run import Run
 

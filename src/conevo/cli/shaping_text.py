@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from conevo.cli.summary import controlled, generations_table, spaced, title
+from conevo.cli.run_text import controlled, generations_table, spaced, title
 from conevo.cli.text import castes, count, duration, number, progress, spread, table
 from conevo.evolution.methods.registry import title_of
 from conevo.runs.code import changes_text
