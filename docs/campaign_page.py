@@ -15,7 +15,7 @@ from typing import Any
 
 import pages
 from conevo.campaigns.campaign import Campaign
-from conevo.campaigns.tables import Tables, Value
+from conevo.campaigns.tables import RunValue, Tables
 from conevo.cli.lookup import sealed
 from conevo.evolution.methods.registry import METHODS
 from conevo.report.claims import verdicts
@@ -24,7 +24,7 @@ from conevo.report.statistics import compare, holm
 from conevo.runs.run import Run
 
 
-def by_cell(values: list[Value]) -> dict[str, dict[str, list[float]]]:
+def by_cell(values: list[RunValue]) -> dict[str, dict[str, list[float]]]:
     """Return the runs' values: task -> method -> values."""
     found: dict[str, dict[str, list[float]]] = {}
     for one in values:

@@ -9,7 +9,7 @@ import pytest
 from campaigns.plans import tiny_campaign, write_plan
 from conevo.campaigns.campaign import ATTEMPTS, Campaign, Stopped, create
 from conevo.campaigns.executors.local import Serial
-from conevo.campaigns.executors.protocol import Ending, Job
+from conevo.campaigns.executors.protocol import Ending, RunJob
 from conevo.campaigns.plan_file import read_plan
 from conevo.campaigns.work import carry_out
 from conevo.errors import EnvironmentFailure, UsageError
@@ -23,8 +23,8 @@ class Scripted:
 
     def __init__(self, cores=2, fate=None):
         self.cores, self.fate = cores, fate or (lambda job: carry_out(job.root, job.label, 1))
-        self.jobs: list[Job] = []
-        self.begun: list[Job] = []
+        self.jobs: list[RunJob] = []
+        self.begun: list[RunJob] = []
         self.most = 0
         self.stopped = 0
 
@@ -127,7 +127,7 @@ def test_a_refusal_of_the_machine_is_tried_again(tmp_path):
 def test_an_old_ending_does_not_speak_for_a_new_worker(tmp_path):
     campaign = tiny_campaign(tmp_path)
     for label in campaign.planned:
-        end_as(campaign, status="finished")(Job(tmp_path, label, 1))
+        end_as(campaign, status="finished")(RunJob(tmp_path, label, 1))
     entries = campaign.carry_on(Scripted(fate=lambda job: None))
     assert {entry.state for entry in entries.values()} == {"failed"}
     assert "worker exited without reporting" in next(iter(entries.values())).reason

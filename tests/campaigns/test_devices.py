@@ -11,7 +11,7 @@ import conevo
 from campaigns.plans import tiny_campaign
 from conevo.campaigns import devices, slurm, work
 from conevo.campaigns.devices import devices_here, next_device, parse_devices
-from conevo.campaigns.executors.protocol import Ending, Job
+from conevo.campaigns.executors.protocol import Ending, RunJob
 from conevo.campaigns.executors.registry import make_executor
 from conevo.campaigns.executors.worker import worker_command
 from conevo.cli.campaign_run import ready
@@ -89,7 +89,7 @@ def test_every_worker_slot_has_a_device(campaign):
 
 def test_the_device_reaches_the_run_that_is_begun(campaign, monkeypatch):
     label = next(iter(campaign.planned))
-    job = Job(campaign.path, label, 1, "cuda:1")
+    job = RunJob(campaign.path, label, 1, "cuda:1")
     assert worker_command(job)[-4:] == [str(campaign.path.resolve()), label, "1", "cuda:1"]
     asked = []
     monkeypatch.setattr(work, "start", lambda *_, **more: asked.append(more["device"]))
@@ -99,7 +99,9 @@ def test_the_device_reaches_the_run_that_is_begun(campaign, monkeypatch):
     monkeypatch.setattr(sys.stdin, "isatty", lambda: True, raising=False)
     work.main()
     assert asked == ["cuda:1", 1]  # nothing was begun, and so nothing finished
-    monkeypatch.setattr(sys, "argv", ["work", *worker_command(Job(campaign.path, label, 1))[-3:]])
+    monkeypatch.setattr(
+        sys, "argv", ["work", *worker_command(RunJob(campaign.path, label, 1))[-3:]]
+    )
     work.main()
     assert asked[2:] == ["cpu", 1]  # where none is named
 
@@ -244,8 +246,8 @@ def test_a_ray_task_asks_for_a_gpu_where_its_device_is_one(campaign, ray_with):
     label = next(iter(campaign.planned))
     fake = ray_with(2)
     executor = make_executor("ray", 4, devices=("cuda",))
-    executor.submit(Job(campaign.path, label, 1, "cuda"))
-    executor.submit(Job(campaign.path, label, 1))
+    executor.submit(RunJob(campaign.path, label, 1, "cuda"))
+    executor.submit(RunJob(campaign.path, label, 1))
     (on_gpu, words), (on_cpu, others) = fake.asked
     assert (on_gpu["num_gpus"], on_gpu["num_cpus"], words[-1]) == (1, 1, "cuda")
     assert ("num_gpus" in on_cpu, others[-1]) == (False, None)
@@ -255,7 +257,7 @@ def test_a_ray_task_asks_for_a_gpu_where_its_device_is_one(campaign, ray_with):
 def test_auto_is_a_gpu_per_task_where_ray_has_any(campaign, ray_with, gpus, asked):
     label = next(iter(campaign.planned))
     fake = ray_with(gpus)
-    make_executor("ray", 4, devices=("auto",)).submit(Job(campaign.path, label, 1, "auto"))
+    make_executor("ray", 4, devices=("auto",)).submit(RunJob(campaign.path, label, 1, "auto"))
     ((resources, words),) = fake.asked
     assert (resources.get("num_gpus"), words[-1]) == (asked, "auto")
 

@@ -13,7 +13,7 @@ import pytest
 import conevo
 from campaigns.plans import tiny_campaign
 from campaigns.processes import n_generations, until, workers
-from conevo.campaigns.executors.protocol import Job
+from conevo.campaigns.executors.protocol import RunJob
 from conevo.campaigns.executors.ray import RayCluster
 from conevo.campaigns.executors.registry import make_executor
 from conevo.errors import EnvironmentFailure
@@ -61,7 +61,7 @@ def test_ray_itself_carries_a_run_on_whose_ray_worker_was_killed(long_run, undis
     campaign, label = long_run
     executor = make_executor("ray", 1)
     try:
-        executor.submit(Job(campaign.path, label, 1))
+        executor.submit(RunJob(campaign.path, label, 1))
         until(lambda: n_generations(campaign, label) > 2)
         (worker,) = workers(campaign.path)
         os.kill(parent(worker), signal.SIGKILL)
@@ -83,7 +83,7 @@ def test_results_come_through_an_object_store_where_nodes_do_not_see_the_campaig
     monkeypatch.setenv("TMPDIR", str(scratch))  # of the workers
     uri = f"file://{tmp_path}/bucket"
     executor = RayCluster(1, store=uri)
-    executor.submit(Job(campaign.path, label, 1))
+    executor.submit(RunJob(campaign.path, label, 1))
     (folder,) = until(lambda: list(scratch.glob("conevo-*")))
     made = folder / "runs" / label / "generations.jsonl"
     until(lambda: made.is_file() and made.read_bytes().count(b"\n") > 2)
@@ -119,7 +119,7 @@ def test_a_cluster_by_address_has_the_cores_of_its_nodes_and_survives_the_loss_o
         other = cluster.add_node(num_cpus=1, **least)
         executor = make_executor("ray", address=cluster.address)
         assert executor.cores == 2
-        executor.submit(Job(campaign.path, label, 2))  # as the last one of a campaign
+        executor.submit(RunJob(campaign.path, label, 2))  # as the last one of a campaign
         until(lambda: n_generations(campaign, label) > 2)
         (worker,) = workers(campaign.path)
         raylet = parent(parent(worker))

@@ -9,12 +9,12 @@ import pytest
 import conevo
 from campaigns.plans import tiny_campaign
 from conevo.campaigns.executors.registry import make_executor
-from conevo.campaigns.progress import Progress, last_written, progress_of
+from conevo.campaigns.progress import RunProgress, last_written, progress_of
 from conevo.campaigns.work import carry_out
 from conevo.runs.directory import Directory
 
 CONFIG = "[run]\ngenerations = 10\nbudget_evaluations = {budget}\n"
-NOTHING = Progress(0, 0, 0, 0, 0.0, None)
+NOTHING = RunProgress(0, 0, 0, 0, 0.0, None)
 
 
 @pytest.fixture
@@ -128,7 +128,7 @@ def test_a_run_is_as_far_as_its_last_line_and_its_settings_say(campaign, n, budg
     write_log(path, n, budget, more='{"generation": 99, "team_eval')
     os.utime(path / "generations.jsonl", (1000, 2000))
     found = progress_of(campaign.places, campaign.planned[label])
-    assert found == Progress(*expected, written=2000.0)
+    assert found == RunProgress(*expected, written=2000.0)
     assert last_written(campaign.places, label) == 2000.0
 
 
@@ -176,5 +176,5 @@ def test_a_shaping_is_as_far_as_its_stages(tmp_path):
     os.utime(run / "stage-2" / "generations.jsonl", (1000, 2000))
     os.utime(run / "stage-1" / "generations.jsonl", (1000, 1000))
     found = progress_of(campaign.places, planned)
-    assert found == Progress(15, 20, 105, 210, 0.75, 2000.0)
+    assert found == RunProgress(15, 20, 105, 210, 0.75, 2000.0)
     assert last_written(campaign.places, label) == 2000.0

@@ -18,7 +18,7 @@ import pytest
 import conevo
 from campaigns.processes import n_generations, until, workers
 from conevo.campaigns.campaign import create
-from conevo.campaigns.executors.protocol import Job
+from conevo.campaigns.executors.protocol import RunJob
 from conevo.campaigns.executors.registry import EXECUTORS, make_executor
 from conevo.campaigns.plan_file import read_plan
 from conevo.runs.directory import read_json
@@ -222,7 +222,7 @@ def test_workers_that_are_stopped_write_their_checkpoint_and_are_gone(name, camp
     made = campaign(ENDLESS)
     (label,) = made.planned
     executor = make_executor(name, 1)
-    executor.submit(Job(made.path, label, 1))
+    executor.submit(RunJob(made.path, label, 1))
     until(lambda: n_generations(made, label) > 0)
     executor.stop()
     assert workers(made.path) == {}
@@ -230,7 +230,7 @@ def test_workers_that_are_stopped_write_their_checkpoint_and_are_gone(name, camp
     assert run.status == "interrupted"
     done = len(run.generations())
     executor = make_executor("processes", 1)
-    executor.submit(Job(made.path, label, 1))
+    executor.submit(RunJob(made.path, label, 1))
     until(lambda: n_generations(made, label) > done)
     executor.stop()
     assert run.provenance["sessions"][1]["from_generation"] in (done - 1, done)  # records go first
@@ -243,7 +243,7 @@ def test_workers_leave_also_where_interrupts_are_ignored(campaign):
     executor = make_executor("processes", 1)
     before = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
-        executor.submit(Job(made.path, label, 1))
+        executor.submit(RunJob(made.path, label, 1))
     finally:
         signal.signal(signal.SIGINT, before)
     until(lambda: n_generations(made, label) > 0)
@@ -292,7 +292,7 @@ def test_ctrl_c_lets_all_write_their_checkpoints_and_leave(name, campaign):
     assert [one.state for one in made.standings().values()] == ["pending"]
     done = len(run.generations())
     executor = make_executor("processes", 1)
-    executor.submit(Job(made.path, label, 1))
+    executor.submit(RunJob(made.path, label, 1))
     until(lambda: n_generations(made, label) > done)
     executor.stop()
     assert run.provenance["sessions"][1]["from_generation"] in (done - 1, done)  # records go first
@@ -321,7 +321,7 @@ def test_libraries_of_a_worker_begin_no_threads_of_their_own(name, campaign):
     made = campaign(ENDLESS)
     (label,) = made.planned
     executor = make_executor(name, 1)
-    executor.submit(Job(made.path, label, 1))
+    executor.submit(RunJob(made.path, label, 1))
     try:
         until(lambda: n_generations(made, label) > 0)
         (worker,) = workers(made.path)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from conevo.campaigns.tables import Value
+from conevo.campaigns.tables import RunValue
 from conevo.report.comparison import (
     Cell,
     Group,
@@ -24,8 +24,8 @@ CONE, MESP, HOM = Treatment("cone", ""), Treatment("mesp", ""), Treatment("homcn
 
 def value(
     environment, treatment, seed, reached, budget="smoke", optimum=None, larger_is_better=True
-) -> Value:
-    return Value(
+) -> RunValue:
+    return RunValue(
         run=f"{environment}-{treatment.title}-{seed}",
         task=f"rover-v2/{environment}",
         world="rover-v2",
@@ -47,7 +47,9 @@ def sample(mean: float, n: int = 12, seed: int = 0, sd: float = 1.0) -> list[flo
     return np.random.default_rng(seed).normal(mean, sd, n).tolist()
 
 
-def cells_of(samples: dict[tuple[str, Treatment], list[float]], **about) -> dict[Cell, list[Value]]:
+def cells_of(
+    samples: dict[tuple[str, Treatment], list[float]], **about
+) -> dict[Cell, list[RunValue]]:
     return {
         Cell(*key): [value(*key, seed, one, **about) for seed, one in enumerate(reached)]
         for key, reached in samples.items()

@@ -107,8 +107,8 @@ def bars() -> Drawing:
 
 def points() -> Drawing:
     panel = {
-        "homcne": [figures.Runs([1.0, 2.0], (1.5, 1.0, 2.0)), None],
-        "cone": [figures.Runs([2.0], None), figures.Runs([3.0, 4.0], (3.5, 3.0, 4.0))],
+        "homcne": [figures.Points([1.0, 2.0], (1.5, 1.0, 2.0)), None],
+        "cone": [figures.Points([2.0], None), figures.Points([3.0, 4.0], (3.5, 3.0, 4.0))],
     }
     places = ["complex-1", "complex-2"]
     return figures.points(
@@ -186,7 +186,7 @@ def test_any_number_of_methods_and_panels_fits(methods, panels, places, drawn) -
         x_label="an environment with a long name " * 3,
         y_label="a measure with a long name and a unit (share of all of the objects)",
     )
-    runs = figures.Runs([0.2, 0.3], (0.25, 0.1, 0.4))
+    runs = figures.Points([0.2, 0.3], (0.25, 0.1, 0.4))
     figures.points(
         {title: dict.fromkeys(methods, [runs] * len(places)) for title in titles},
         places,
@@ -253,7 +253,7 @@ def test_nothing_is_drawn_beyond_the_range_of_a_measure(drawn) -> None:
     cells = {"cone": [figures.Bar(0.9, 0.5)]}
     within = (0.0, 1.0)
     figures.bars({"": cells}, ["1"], {"cone": "CONE"}, x_label="x", y_label="y", within=within)
-    runs = {"cone": [figures.Runs([0.1, 0.9], (0.5, -4.6, 5.6))]}
+    runs = {"cone": [figures.Points([0.1, 0.9], (0.5, -4.6, 5.6))]}
     figures.points({"": runs}, ["1"], {"cone": "CONE"}, x_label="x", y_label="y", within=within)
     wide = curves.Band(X, X / 40, X / 40 - 3, X / 40 + 3)
     line = Line("cone")

@@ -31,7 +31,7 @@ from pathlib import Path
 from conevo.campaigns.admission import admit_code
 from conevo.campaigns.devices import next_device
 from conevo.campaigns.ended import read_ended
-from conevo.campaigns.executors.protocol import Ending, Executor, Job
+from conevo.campaigns.executors.protocol import Ending, Executor, RunJob
 from conevo.campaigns.extension import check_plan, settle, texts_of, write_plan
 from conevo.campaigns.inputs import located
 from conevo.campaigns.ledger import Entry, Ledger
@@ -348,7 +348,7 @@ class Campaign:
             for entry in self.ledger.entries()
             if entry.state == "pending" and entry.label in self.planned
         )
-        at_work: dict[str, Job] = {}
+        at_work: dict[str, RunJob] = {}
         next_seal = time.monotonic() + SEAL_EVERY
         while waiting or at_work:
             free = executor.cores - sum(job.threads for job in at_work.values())
@@ -356,7 +356,7 @@ class Campaign:
             while ready and free >= threads:
                 share = max(threads, free // len(ready))
                 device = next_device(devices, (job.device for job in at_work.values()))
-                job = Job(self.path, ready.popleft(), share, device, limit)
+                job = RunJob(self.path, ready.popleft(), share, device, limit)
                 waiting.remove(job.label)
                 at_work[job.label] = job
                 free -= share

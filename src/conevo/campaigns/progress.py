@@ -19,11 +19,11 @@ from conevo.runs import locks
 from conevo.runs.directory import CONFIG, LOCK, SHAPING
 from conevo.runs.store import GENERATIONS
 
-__all__ = ["Progress", "is_held", "last_written", "progress_of"]
+__all__ = ["RunProgress", "is_held", "last_written", "progress_of"]
 
 
 @dataclass(frozen=True)
-class Progress:
+class RunProgress:
     """How far a run or a shaping is.
 
     Attributes:
@@ -62,7 +62,7 @@ def last_written(places: Places, label: str) -> float | None:
     return max(found, default=None)
 
 
-def progress_of(places: Places, planned: PlannedRun) -> Progress:
+def progress_of(places: Places, planned: PlannedRun) -> RunProgress:
     """Return how far a run is; what is missing or damaged counts as not done."""
     lengths = _lengths(places.run(planned.label), planned.in_stages)
     done, spent, share = 0, 0, 0.0
@@ -79,7 +79,7 @@ def progress_of(places: Places, planned: PlannedRun) -> Progress:
             over = generations / planned_generations
             share += min(max(over, evaluations / budget if budget else 0.0), 1.0)
     budgets = [budget for _, budget in lengths]
-    return Progress(
+    return RunProgress(
         generations=done,
         of=sum(length for length, _ in lengths),
         evaluations=spent,

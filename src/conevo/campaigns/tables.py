@@ -15,14 +15,14 @@ from conevo.errors import UsageError
 from conevo.evolution.methods.registry import remember_title
 from conevo.worlds.measures import Measure
 
-__all__ = ["Tables", "Value"]
+__all__ = ["Tables", "RunValue"]
 
 QUERY = '"SELECT method, count(*) FROM runs GROUP BY ALL"'
 QUERIES = ("SELECT", "EXPLAIN", "MULTI")  # as DuckDB names them: VALUES is a SELECT, PIVOT MULTI
 NEAR = 0.2  # budgets that differ by no more are one
 
 
-class Value(NamedTuple):
+class RunValue(NamedTuple):
     """What one run reached: the unit of all statistics.
 
     budget: of the group of runs that may be compared with it, see ``Tables``.
@@ -145,7 +145,7 @@ class Tables:
 
     def values(
         self, measure: str | None = None, study: str = "test", team: str | None = "champion"
-    ) -> list[Value]:
+    ) -> list[RunValue]:
         """Return the mean over scenarios of a measure, a row per run that has it.
 
         Ordered by task, budget, variant, method, seed and run. Runs whose mean is not a finite
@@ -174,7 +174,7 @@ class Tables:
             {"study": study, "team": team, "measure": measure},
         ).fetchall()
         return [
-            Value._make((*about, Measure(name, unit, is_larger, low, high), optimum, value))
+            RunValue._make((*about, Measure(name, unit, is_larger, low, high), optimum, value))
             for *about, name, unit, is_larger, low, high, optimum, value in rows
         ]
 

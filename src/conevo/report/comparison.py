@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from conevo.campaigns.tables import Value
+from conevo.campaigns.tables import RunValue
 from conevo.evolution.methods.registry import METHODS, title_of
 from conevo.report.bootstrap import iqm_interval, probability_of_improvement
 from conevo.report.statistics import (
@@ -197,16 +197,16 @@ def treatments_of(found: Iterable[tuple[str, str]]) -> list[Treatment]:
     return sorted(distinct, key=lambda t: (order.get(t.method, len(order)), t.method, t.variant))
 
 
-def group_values(values: Iterable[Value]) -> dict[Group, dict[Cell, list[Value]]]:
+def group_values(values: Iterable[RunValue]) -> dict[Group, dict[Cell, list[RunValue]]]:
     """Return values by group and cell, in the order given: environments by number."""
-    groups: dict[Group, dict[Cell, list[Value]]] = defaultdict(lambda: defaultdict(list))
+    groups: dict[Group, dict[Cell, list[RunValue]]] = defaultdict(lambda: defaultdict(list))
     for one in values:
         cell = Cell(one.environment, Treatment(one.method, one.variant))
         groups[Group(one.world, one.family, one.budget)][cell].append(one)
     return {group: dict(cells) for group, cells in groups.items()}
 
 
-def summarize(cells: Mapping[Cell, Sequence[Value]]) -> list[Summary]:
+def summarize(cells: Mapping[Cell, Sequence[RunValue]]) -> list[Summary]:
     """Return what each cell reached: by environment, then by treatment."""
     return [
         Summary(
@@ -222,7 +222,7 @@ def summarize(cells: Mapping[Cell, Sequence[Value]]) -> list[Summary]:
     ]
 
 
-def compare_all(cells: Mapping[Cell, Sequence[Value]]) -> list[Pair]:
+def compare_all(cells: Mapping[Cell, Sequence[RunValue]]) -> list[Pair]:
     """Return every two treatments of each environment that differ in the method or in the levels.
 
     Pairs that differ in both are left out: nothing would follow from them. The second of the
@@ -253,7 +253,7 @@ def compare_all(cells: Mapping[Cell, Sequence[Value]]) -> list[Pair]:
     ]
 
 
-def aggregate(cells: Mapping[Cell, Sequence[Value]]) -> list[Aggregate]:
+def aggregate(cells: Mapping[Cell, Sequence[RunValue]]) -> list[Aggregate]:
     """Return each treatment over the environments that all treatments have runs of.
 
     Shares of the optimum where the world knows it, so that environments may be pooled.
@@ -288,13 +288,13 @@ def aggregate(cells: Mapping[Cell, Sequence[Value]]) -> list[Aggregate]:
     ]
 
 
-def _larger_is_better(cells: Mapping[Cell, Sequence[Value]]) -> bool:
+def _larger_is_better(cells: Mapping[Cell, Sequence[RunValue]]) -> bool:
     """Return the direction of the measure of some cells, which all have the same one."""
     return all(one.measure.larger_is_better for values in cells.values() for one in values)
 
 
 def _by_environment(
-    cells: Mapping[Cell, Sequence[Value]],
+    cells: Mapping[Cell, Sequence[RunValue]],
 ) -> dict[str, dict[Treatment, list[float]]]:
     """Return the samples of each environment, treatments in order."""
     order = treatments_of(treatment for _, treatment in cells)

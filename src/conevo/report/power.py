@@ -20,7 +20,7 @@ import numpy.typing as npt
 from conevo.report.statistics import ALPHA, finite
 from conevo.rng import stream
 
-__all__ = ["CAMPAIGNS", "Drawn", "draw", "found_alike", "power_of_pair"]
+__all__ = ["CAMPAIGNS", "Redrawn", "draw", "found_alike", "power_of_pair"]
 
 CAMPAIGNS = 2000
 """Campaigns that are drawn: a power of a half is then known to 2 %."""
@@ -28,7 +28,7 @@ CAMPAIGNS = 2000
 Numbers = npt.NDArray[np.float64]
 
 
-class Drawn(NamedTuple):
+class Redrawn(NamedTuple):
     """One sample in every campaign drawn: its runs, means and variances [campaigns]."""
 
     n: int
@@ -36,7 +36,7 @@ class Drawn(NamedTuple):
     variance: Numbers
 
 
-def draw(values: npt.ArrayLike, *place: int | str) -> Drawn | None:
+def draw(values: npt.ArrayLike, *place: int | str) -> Redrawn | None:
     """Return samples like one of runs but of mean 1, whatever its mean is.
 
     None where the runs do not scatter, or are fewer than two, or their mean is 0.
@@ -50,14 +50,14 @@ def draw(values: npt.ArrayLike, *place: int | str) -> Drawn | None:
     if not mean or not sd:
         return None
     numbers, n, scatter = stream(0, "power", *place), len(x), abs(sd / mean)
-    return Drawn(
+    return Redrawn(
         n,
         numbers.normal(1.0, scatter / np.sqrt(n), CAMPAIGNS),
         scatter**2 * numbers.chisquare(n - 1, CAMPAIGNS) / (n - 1),
     )
 
 
-def found_alike(a: Drawn, b: Drawn, margin: float = 0.15) -> npt.NDArray[np.bool_]:
+def found_alike(a: Redrawn, b: Redrawn, margin: float = 0.15) -> npt.NDArray[np.bool_]:
     """Return in which campaigns two samples are found alike [campaigns].
 
     That is: neither Student's nor Welch's test is below 0.05, and Welch's interval of the

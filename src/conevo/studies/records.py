@@ -12,7 +12,7 @@ __all__ = ["SignalStudy", "Study"]
 Count = Annotated[int, Ge(0)]
 
 
-class Score(TypedDict):
+class ScoreRow(TypedDict):
     """What a team of a comparison reached in one scenario."""
 
     study: str
@@ -22,7 +22,7 @@ class Score(TypedDict):
     value: float | None
 
 
-class Robot(TypedDict):
+class RobotRow(TypedDict):
     """A robot of the fittest team, see ``studies.study``; the first versions wrote five columns."""
 
     robot: Count
@@ -39,7 +39,7 @@ class Robot(TypedDict):
     relative: NotRequired[float | None]
 
 
-class Action(TypedDict):
+class ActionRow(TypedDict):
     """How often a robot executed an action."""
 
     robot: Count
@@ -47,7 +47,7 @@ class Action(TypedDict):
     count: Count
 
 
-class Behaviour(TypedDict):
+class BehaviourRow(TypedDict):
     """How many predators or captures are of a kind."""
 
     kind: str
@@ -58,14 +58,14 @@ class Behaviour(TypedDict):
 class Study(TypedDict):
     """See ``studies.study``."""
 
-    scores: list[Score]
-    robots: list[Robot]
-    actions: list[Action]
+    scores: list[ScoreRow]
+    robots: list[RobotRow]
+    actions: list[ActionRow]
     metrics: dict[str, float | None]
-    behaviours: list[Behaviour]
+    behaviours: list[BehaviourRow]
 
 
-class Signal(TypedDict):
+class SignalRow(TypedDict):
     """The signal of populations, at first or at last."""
 
     unit: str
@@ -94,5 +94,5 @@ class SignalStudy(TypedDict):
     task: str
     method: str
     credit: str
-    signal: list[Signal]
+    signal: list[SignalRow]
     not_measured: str

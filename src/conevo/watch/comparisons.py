@@ -14,7 +14,7 @@ from conevo.watch.settings import comparisons, differences
 from conevo.watch.subjects import Subject
 from conevo.worlds.measures import Measure
 
-__all__ = ["Panel", "panels_of"]
+__all__ = ["CurvePanel", "panels_of"]
 
 Array = npt.NDArray[np.float64]
 MOST = 300  # points of a curve
@@ -25,7 +25,7 @@ AXES = ("evaluations", "generation")
 QUANTITIES = ("performance", "fitness")
 
 
-class Panel:
+class CurvePanel:
     """The runs of one environment that are compared with each other.
 
     Args:
@@ -117,7 +117,7 @@ class Panel:
         return found
 
 
-def panels_of(subjects: Sequence[Subject], group: str) -> list[Panel]:
+def panels_of(subjects: Sequence[Subject], group: str) -> list[CurvePanel]:
     """Return the panels of runs that belong together, an environment each.
 
     Methods are compared where their settings are the same; the settings, where there is one
@@ -135,7 +135,7 @@ def panels_of(subjects: Sequence[Subject], group: str) -> list[Panel]:
         compared = comparisons(differences(methods, [one.apart for one in members]))
         if len(set(methods)) > 1:
             found += [
-                Panel(
+                CurvePanel(
                     title | {"variant": variant, "by": "method"},
                     {members[k]: methods[k] for k in some},
                 )
@@ -144,7 +144,7 @@ def panels_of(subjects: Sequence[Subject], group: str) -> list[Panel]:
         else:
             series = {members[k]: variant or methods[k] for variant, some in compared for k in some}
             by = "variant" if any(variant for variant, _ in compared) else "method"
-            found.append(Panel(title | {"variant": "", "by": by}, series))
+            found.append(CurvePanel(title | {"variant": "", "by": by}, series))
     return found
 
 

@@ -12,10 +12,10 @@ from conevo.reading import parse_json
 from conevo.watch.tail import Whole, readable
 from conevo.worlds.measures import Measure
 
-__all__ = ["Declared", "Found"]
+__all__ = ["Declared", "Declaration"]
 
 
-class Found(NamedTuple):
+class Declaration(NamedTuple):
     """What is declared.
 
     measures: by name; none of a run that conevo 0.1.0 made. origin: the run whose populations or
@@ -27,7 +27,7 @@ class Found(NamedTuple):
     codes: str
 
 
-NOTHING = Found({}, "", "")
+NOTHING = Declaration({}, "", "")
 
 
 class Declared:
@@ -42,7 +42,7 @@ class Declared:
     def __init__(self, folder: Path) -> None:
         self._file = Whole(folder / "provenance.json", _declared)
 
-    def read(self) -> Found:
+    def read(self) -> Declaration:
         """Return what is declared now."""
         try:
             return self._file.read() or NOTHING
@@ -50,7 +50,7 @@ class Declared:
             return NOTHING
 
 
-def _declared(content: bytes) -> Found:
+def _declared(content: bytes) -> Declaration:
     about = parse_json(content, "provenance.json")
     sessions, method = about.get("sessions"), about.get("method")
     if isinstance(method, dict):
@@ -60,7 +60,7 @@ def _declared(content: bytes) -> Found:
         for one in (sessions if isinstance(sessions, list) else [])
         if isinstance(one, dict) and "code" in one
     ]
-    return Found(_measures(about), _origin(about), readable(" + ".join(dict.fromkeys(codes))))
+    return Declaration(_measures(about), _origin(about), readable(" + ".join(dict.fromkeys(codes))))
 
 
 def _measures(about: Mapping[str, Any]) -> dict[str, Measure]:

@@ -17,11 +17,11 @@ from conevo.campaigns.ledger import Entry
 from conevo.errors import ConevoError, UsageError
 from conevo.evolution.methods.registry import name_in
 from conevo.runs.directory import LOCK, kind_of
-from conevo.watch.comparisons import Panel, panels_of
+from conevo.watch.comparisons import CurvePanel, panels_of
 from conevo.watch.subjects import Standing, Subject, span
 from conevo.watch.tail import Stamp, is_locked, readable, stamp
 
-__all__ = ["Experiment", "Group", "Names", "Runs", "children"]
+__all__ = ["Experiment", "Followed", "Names", "FollowedRuns", "children"]
 
 GoOn = Callable[[], bool]
 PLACES = ("task", "preset", "method", "variant")  # what decides in which panel a run is
@@ -46,7 +46,7 @@ class Names:
         return self._of[path]
 
 
-class Group:
+class Followed:
     """Runs that belong together.
 
     Attributes:
@@ -66,7 +66,7 @@ class Group:
         self._about["title"] = self._about["name"]
         self._failure = ""
         self.subjects: list[Subject] = []
-        self.panels: list[Panel] = []
+        self.panels: list[CurvePanel] = []
         self._places: Hashable = ()
 
     @property
@@ -102,7 +102,7 @@ class Group:
             self.panels = panels_of(self.subjects, self._about["name"])
 
 
-class Runs(Group):
+class FollowedRuns(Followed):
     """Runs and shapings.
 
     Attributes:
@@ -135,7 +135,7 @@ class Runs(Group):
         }
 
 
-class Experiment(Group):
+class Experiment(Followed):
     """A campaign: what its plan and its ledger say, and the files of its runs."""
 
     is_named = True

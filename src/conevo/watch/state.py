@@ -16,7 +16,7 @@ from conevo.errors import UsageError
 from conevo.evolution.methods.registry import METHODS, title_of
 from conevo.palette import caste_colours, method_looks, several
 from conevo.runs.directory import kind_of
-from conevo.watch.groups import Experiment, Group, Names, Runs, children
+from conevo.watch.groups import Experiment, Followed, FollowedRuns, Names, children
 from conevo.watch.subjects import Subject
 from conevo.watch.tail import readable
 from conevo.worlds.registry import colours_of
@@ -50,10 +50,10 @@ class Watched:
         self.title = readable(title or names)
         self._lock = threading.Lock()
         self._names = Names()
-        self._groups: dict[Path, Group] = {}
+        self._groups: dict[Path, Followed] = {}
         runs = [path for path in named if kind_of(path) != "campaign"]
         if runs:
-            self._groups[Path()] = group = Runs(None, "runs", self._names)
+            self._groups[Path()] = group = FollowedRuns(None, "runs", self._names)
             group.listing = runs
         for path in named:
             if path not in runs:
@@ -133,8 +133,8 @@ class Watched:
     def _list(self, folder: Path) -> None:
         """Find what is in a folder now."""
         kinds = dict(children(folder))
-        group = self._groups.setdefault(folder, Runs(folder, folder.name, self._names))
-        assert isinstance(group, Runs)
+        group = self._groups.setdefault(folder, FollowedRuns(folder, folder.name, self._names))
+        assert isinstance(group, FollowedRuns)
         group.listing = [path for path, kind in kinds.items() if kind != "campaign"]
         for path in [one for one in self._groups if one.parent == folder]:
             if kinds.get(path) != "campaign" and path not in self._folders:

@@ -18,7 +18,7 @@ import numpy.typing as npt
 from conevo.errors import ConevoError, UsageError
 from conevo.evolution.methods.registry import name_in
 from conevo.runs.directory import CONFIG, LOCK, SEAL, SHAPING, kind_of
-from conevo.watch.declared import NOTHING, Declared, Found
+from conevo.watch.declared import NOTHING, Declaration, Declared
 from conevo.watch.settings import CODE, FROM, Choices, choices_of, factors
 from conevo.watch.tail import Log, Whole, is_locked, readable, stamp
 from conevo.worlds.measures import Measure
@@ -196,7 +196,7 @@ class Subject:
         return self._found.measures
 
     @property
-    def _found(self) -> Found:
+    def _found(self) -> Declaration:
         return self._declared.read() if self._declared is not None else NOTHING
 
     # --- what is said -----------------------------------------------------------------------------

@@ -9,7 +9,7 @@ import pytest
 
 from conevo.report.claims.evidence import Evidence, RunOf
 from conevo.report.claims.judgement import judge
-from conevo.report.claims.outcomes import Outcome
+from conevo.report.claims.outcomes import Decision
 from conevo.report.claims.statements import Claim, Part, above, across, alike, within
 from conevo.report.statistics import compare, holm
 
@@ -105,8 +105,8 @@ def test_a_cell_is_decided_by_its_own_test_alone() -> None:
     cone, mesp = around(104, 0.05, 20), around(100, 0.05, 20)
     ten = {(place, name): v for place in PLACES for name, v in (("cone", cone), ("mesp", mesp))}
     found = judge(claim(Part(alike("value", PLACES, [("cone", "mesp")]))), evidence(ten))
-    assert {cell.by_rank for cell in found.cells} == {Outcome.HOLDS}
-    assert {cell.by_t for cell in found.cells} == {Outcome.CONTRADICTED}
+    assert {cell.by_rank for cell in found.cells} == {Decision.HOLDS}
+    assert {cell.by_t for cell in found.cells} == {Decision.CONTRADICTED}
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ import subprocess
 import time
 from typing import ClassVar
 
-from conevo.campaigns.executors.protocol import Ending, Job
+from conevo.campaigns.executors.protocol import Ending, RunJob
 from conevo.campaigns.executors.worker import spawn, why_lost
 from conevo.campaigns.work import carry_out, core_seconds
 
@@ -22,7 +22,7 @@ class Serial:
         self.cores = cores
         self._endings: list[Ending] = []
 
-    def submit(self, job: Job) -> None:
+    def submit(self, job: RunJob) -> None:
         """Carry the job out now; Ctrl-C reaches the run itself."""
         carry_out(
             job.root,
@@ -52,7 +52,7 @@ class Processes:
         self.cores = cores
         self._workers: dict[str, subprocess.Popen[bytes]] = {}
 
-    def submit(self, job: Job) -> None:
+    def submit(self, job: RunJob) -> None:
         """Spawn a worker; it leaves when this process does, since its stdin ends then."""
         self._workers[job.label] = spawn(job)
 

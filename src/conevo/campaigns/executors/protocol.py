@@ -12,11 +12,11 @@ from typing import ClassVar, Protocol
 
 from conevo.runs.time_limit import TimeLimit
 
-__all__ = ["Ending", "Executor", "Job"]
+__all__ = ["Ending", "Executor", "RunJob"]
 
 
 @dataclass(frozen=True)
-class Job:
+class RunJob:
     """One run to execute, with its number of threads and its device.
 
     Without a device it is begun on the CPU, and carried on where it was. ``limit`` is for an
@@ -54,7 +54,7 @@ class Executor(Protocol):
     name: ClassVar[str]
     cores: int
 
-    def submit(self, job: Job) -> None:
+    def submit(self, job: RunJob) -> None:
         """Begin a job; only called when the cores it asks for are free."""
 
     def wait(self, seconds: float) -> list[Ending]:

@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from conevo.campaigns.devices import AUTO, CPU
-from conevo.campaigns.executors.protocol import Ending, Job
+from conevo.campaigns.executors.protocol import Ending, RunJob
 from conevo.campaigns.executors.worker import spawn, usable_cores, why_lost
 from conevo.campaigns.object_store import ObjectStore
 from conevo.campaigns.places import Places
@@ -69,7 +69,7 @@ class RayCluster:
         except ImportError as error:
             raise UsageError("executor 'ray' needs Ray: pip install 'conevo[ray]'") from error
         self._store = ObjectStore(store) if store else None
-        self._tasks: dict[Any, Job] = {}  # by the reference of the exit code to come
+        self._tasks: dict[Any, RunJob] = {}  # by the reference of the exit code to come
         options: dict[str, Any] = {"log_to_driver": False, "logging_level": "ERROR"}
         if address is None:
             options |= {"num_cpus": cores or usable_cores(), "object_store_memory": MEMORY}
@@ -93,7 +93,7 @@ class RayCluster:
         self._widest = max(nodes)
         self.cores = min(cores or sum(nodes), sum(nodes))
 
-    def submit(self, job: Job) -> None:
+    def submit(self, job: RunJob) -> None:
         """Hand a task to the cluster; it never asks for more cores than one node has."""
         threads = min(job.threads, self._widest)
         job = replace(job, root=job.root.resolve(), threads=threads)
@@ -143,10 +143,10 @@ class RayCluster:
 def _carry(root: str, label: str, threads: int, store: str, device: str | None = None) -> int:
     """Carry a run on, on the node where this is called, and return the worker's exit code."""
     if not store:
-        return _supervise(Job(Path(root), label, threads, device))
+        return _supervise(RunJob(Path(root), label, threads, device))
     copies = ObjectStore(store)
     with tempfile.TemporaryDirectory(prefix="conevo-") as folder:
-        job = Job(Path(folder), label, threads, device)
+        job = RunJob(Path(folder), label, threads, device)
         copies.get_plan(job.root)
         copies.get_run(job.root, label)
         Places(job.root).ended(label).unlink(missing_ok=True)
@@ -155,7 +155,7 @@ def _carry(root: str, label: str, threads: int, store: str, device: str | None =
     return code
 
 
-def _supervise(job: Job, copies: ObjectStore | None = None) -> int:
+def _supervise(job: RunJob, copies: ObjectStore | None = None) -> int:
     """Spawn a worker and return its exit code; if the task is cancelled, the worker leaves.
 
     The worker also leaves when this process is killed: its stdin ends then.

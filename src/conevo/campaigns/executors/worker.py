@@ -6,7 +6,7 @@ import os
 import subprocess
 import sys
 
-from conevo.campaigns.executors.protocol import Job
+from conevo.campaigns.executors.protocol import RunJob
 from conevo.campaigns.places import Places
 
 __all__ = ["ONE_THREAD", "spawn", "usable_cores", "why_lost", "worker_command"]
@@ -14,7 +14,7 @@ __all__ = ["ONE_THREAD", "spawn", "usable_cores", "why_lost", "worker_command"]
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
-def spawn(job: Job) -> subprocess.Popen[bytes]:
+def spawn(job: RunJob) -> subprocess.Popen[bytes]:
     """Begin a worker, which leaves when its stdin ends; what it says goes to the run's log."""
     log = Places(job.root).log(job.label)
     log.parent.mkdir(exist_ok=True)
@@ -29,7 +29,7 @@ def spawn(job: Job) -> subprocess.Popen[bytes]:
         )
 
 
-def worker_command(job: Job) -> list[str]:
+def worker_command(job: RunJob) -> list[str]:
     """Return the command that carries a job out."""
     arguments = [str(job.root.resolve()), job.label, str(job.threads)]
     arguments += [job.device] if job.device else []

@@ -24,10 +24,10 @@ from conevo.campaigns.tables import Tables
 from conevo.report.claims import wording
 from conevo.report.claims.catalogue import CLAIMS
 from conevo.report.claims.evidence import Evidence, read_evidence
-from conevo.report.claims.outcomes import Cell, Outcome, measure
+from conevo.report.claims.outcomes import Answer, Decision, measure
 from conevo.report.claims.quantities import QUANTITIES
 from conevo.report.claims.statements import Claim, Compare, Part, Sample
-from conevo.report.power import CAMPAIGNS, Drawn, draw, found_alike
+from conevo.report.power import CAMPAIGNS, Redrawn, draw, found_alike
 
 __all__ = ["Verdict", "judge", "verdicts"]
 
@@ -35,8 +35,8 @@ REPRODUCED = "reproduced"
 NOT_REPRODUCED = "not reproduced"
 UNDECIDED = "undecided: "
 UNTESTED = {
-    Outcome.BLIND: "not tested: no signal",
-    Outcome.UNTESTED: "not tested: no exchange",
+    Decision.BLIND: "not tested: no signal",
+    Decision.UNTESTED: "not tested: no exchange",
 }
 NOT_JUDGED = "not judged: the thesis contradicts itself"
 BY_WORLD = "decided by the world"
@@ -83,7 +83,7 @@ class Verdict:
     power: float | None
     exchange: tuple[float | None, float | None]
     why: str
-    cells: tuple[Cell, ...]
+    cells: tuple[Answer, ...]
 
 
 def verdicts(tables: Tables, claims: Sequence[Claim] = CLAIMS) -> list[Verdict]:
@@ -166,7 +166,7 @@ def _concerns(claim: Claim, evidence: Evidence) -> bool:
 
 
 def _verdict(
-    claim: Claim, cells: Sequence[Cell], outcomes: Sequence[Outcome], evidence: Evidence
+    claim: Claim, cells: Sequence[Answer], outcomes: Sequence[Decision], evidence: Evidence
 ) -> str:
     """Return the verdict by one of the two tests."""
     if not any(cell.has_runs for cell in cells):
@@ -176,15 +176,15 @@ def _verdict(
         stop = start + len(part.statements)
         parts.append(_part(part, outcomes[start:stop]))
         start = stop
-    if Outcome.CONTRADICTED in parts:
+    if Decision.CONTRADICTED in parts:
         return NOT_REPRODUCED
-    if all(outcome is Outcome.HOLDS for outcome in parts):
+    if all(outcome is Decision.HOLDS for outcome in parts):
         return REPRODUCED
     for outcome, verdict in UNTESTED.items():
         if outcome in parts:
             return verdict
-    if Outcome.OPEN in parts:
-        still = [c for c, o in zip(cells, outcomes, strict=True) if o is Outcome.OPEN]
+    if Decision.OPEN in parts:
+        still = [c for c, o in zip(cells, outcomes, strict=True) if o is Decision.OPEN]
         is_zero = all(cell.is_zero for cell in still)
         return f"{UNDECIDED}all values are 0" if is_zero else f"{UNDECIDED}n too small"
     places = {place for cell in cells for place in cell.statement.environments}
@@ -192,38 +192,38 @@ def _verdict(
     return f"{UNDECIDED}{len(places - lacking)} of {len(places)} environments"
 
 
-def _part(part: Part, outcomes: Sequence[Outcome]) -> Outcome:
+def _part(part: Part, outcomes: Sequence[Decision]) -> Decision:
     """Return whether the statements of a part hold in as many environments as it needs."""
-    by_place: dict[tuple[str, ...], set[Outcome]] = defaultdict(set)
+    by_place: dict[tuple[str, ...], set[Decision]] = defaultdict(set)
     for statement, outcome in zip(part.statements, outcomes, strict=True):
         by_place[statement.environments].add(outcome)
     order = (
-        Outcome.CONTRADICTED,
-        Outcome.BLIND,
-        Outcome.UNTESTED,
-        Outcome.OPEN,
-        Outcome.MISSING,
-        Outcome.HOLDS,
+        Decision.CONTRADICTED,
+        Decision.BLIND,
+        Decision.UNTESTED,
+        Decision.OPEN,
+        Decision.MISSING,
+        Decision.HOLDS,
     )
     settled = [next(o for o in order if o in found) for found in by_place.values()]
     need = len(settled) if part.need is None else part.need
-    if settled.count(Outcome.CONTRADICTED) > len(settled) - need:
-        return Outcome.CONTRADICTED
-    if settled.count(Outcome.HOLDS) >= need:
-        return Outcome.HOLDS
+    if settled.count(Decision.CONTRADICTED) > len(settled) - need:
+        return Decision.CONTRADICTED
+    if settled.count(Decision.HOLDS) >= need:
+        return Decision.HOLDS
     return next(o for o in order[1:] if o in settled)
 
 
-def _power(claim: Claim, cells: Sequence[Cell]) -> float | None:
+def _power(claim: Claim, cells: Sequence[Answer]) -> float | None:
     """Return how likely what is claimed to be alike is found so in campaigns where it is."""
     alike, start = [], 0
     for part in claim.parts:
         own, start = cells[start : start + len(part.statements)], start + len(part.statements)
         if all(isinstance(s, Compare) and s.expect == "alike" for s in part.statements):
             alike.append((part, own))
-    if not alike or any(cell.by_t is Outcome.MISSING for _, own in alike for cell in own):
+    if not alike or any(cell.by_t is Decision.MISSING for _, own in alike for cell in own):
         return None
-    drawn: dict[Sample, Drawn | None] = {}
+    drawn: dict[Sample, Redrawn | None] = {}
     holds = np.ones(CAMPAIGNS, dtype=bool)
     for part, own in alike:
         by_place: dict[tuple[str, ...], list[npt.NDArray[np.bool_]]] = defaultdict(list)
@@ -240,7 +240,7 @@ def _power(claim: Claim, cells: Sequence[Cell]) -> float | None:
     return float(holds.mean())
 
 
-def _absence(cells: Sequence[Cell], evidence: Evidence) -> str:
+def _absence(cells: Sequence[Answer], evidence: Evidence) -> str:
     """Return why no statement has runs of all that it compares."""
     for cell in cells:
         samples = cell.statement.samples

@@ -34,10 +34,10 @@ from conevo.report.statistics import (
     proportion_interval,
 )
 
-__all__ = ["Cell", "Outcome", "measure"]
+__all__ = ["Answer", "Decision", "measure"]
 
 
-class Outcome(Enum):
+class Decision(Enum):
     """What runs say about a statement, in the order in which it is told."""
 
     CONTRADICTED = 0
@@ -49,7 +49,7 @@ class Outcome(Enum):
 
 
 @dataclass(frozen=True)
-class Cell:
+class Answer:
     """One statement of a claim and what the runs say about it.
 
     Attributes:
@@ -67,8 +67,8 @@ class Cell:
     comparison: Comparison | None
     estimate: Estimate | None
     p_holm: float | None
-    by_t: Outcome
-    by_rank: Outcome
+    by_t: Decision
+    by_rank: Decision
 
     @property
     def has_runs(self) -> bool:
@@ -112,7 +112,7 @@ class Cell:
         return inside / (self.scale or 1.0)
 
 
-def measure(statements: Sequence[Statement], evidence: Evidence) -> list[Cell]:
+def measure(statements: Sequence[Statement], evidence: Evidence) -> list[Answer]:
     """Return all the statements of a claim with their numbers and outcomes."""
     gathered = [evidence.gather(statement) for statement in statements]
     made = [_compare(*pair) for pair in zip(statements, gathered, strict=True)]
@@ -127,23 +127,23 @@ def measure(statements: Sequence[Statement], evidence: Evidence) -> list[Cell]:
 
 def _cell(
     statement: Statement, runs: Gathered, comparison: Comparison | None, p: float | None
-) -> Cell:
+) -> Answer:
     estimate = _estimate(statement, runs)
     if runs.present != set(statement.environments):
-        by_t = by_rank = Outcome.MISSING
+        by_t = by_rank = Decision.MISSING
     elif runs.is_blind:
-        by_t = by_rank = Outcome.BLIND
+        by_t = by_rank = Decision.BLIND
     elif runs.is_idle:
-        by_t = by_rank = Outcome.UNTESTED
+        by_t = by_rank = Decision.UNTESTED
     elif isinstance(statement, Compare):
-        by_t = by_rank = Outcome.OPEN
+        by_t = by_rank = Decision.OPEN
         if comparison is not None:
             is_more, is_above = (comparison.difference or 0) > 0, (comparison.a12 or 0) > 0.5
             by_t = _decide(statement, comparison, comparison.p_t, is_more)
             by_rank = _decide(statement, comparison, p, is_above)
     else:
         by_t = by_rank = _place(estimate, statement.low, statement.high)
-    return Cell(statement, runs, comparison, estimate, p, by_t, by_rank)
+    return Answer(statement, runs, comparison, estimate, p, by_t, by_rank)
 
 
 def _compare(statement: Statement, runs: Gathered) -> Comparison | None:
@@ -161,28 +161,28 @@ def _estimate(statement: Statement, runs: Gathered) -> Estimate | None:
     return mean_interval(values)
 
 
-def _decide(statement: Compare, found: Comparison, p: float | None, is_higher: bool) -> Outcome:
+def _decide(statement: Compare, found: Comparison, p: float | None, is_higher: bool) -> Decision:
     """Return the outcome of a comparison by one test: its p, and whether it puts a above b.
 
     Choice: "alike" needs no difference by this test; but only samples that none of the tests tells
     apart, uncorrected, contradict "above".
     """
     if p is None:
-        return Outcome.OPEN
+        return Decision.OPEN
     if statement.expect == "above":
         if p < ALPHA:
-            return Outcome.HOLDS if is_higher else Outcome.CONTRADICTED
-        return Outcome.CONTRADICTED if is_alike(found) else Outcome.OPEN
+            return Decision.HOLDS if is_higher else Decision.CONTRADICTED
+        return Decision.CONTRADICTED if is_alike(found) else Decision.OPEN
     if p < ALPHA:
-        return Outcome.CONTRADICTED
+        return Decision.CONTRADICTED
     alone = replace(found, p_t=p, p_welch=None, p_mann_whitney=None)
-    return Outcome.HOLDS if is_alike(alone) else Outcome.OPEN
+    return Decision.HOLDS if is_alike(alone) else Decision.OPEN
 
 
-def _place(found: Estimate | None, low: float, high: float) -> Outcome:
+def _place(found: Estimate | None, low: float, high: float) -> Decision:
     """Return whether an interval lies inside a range, outside, or neither."""
     if found is None or found.low is None or found.high is None:
-        return Outcome.OPEN
+        return Decision.OPEN
     if low <= found.low and found.high <= high:
-        return Outcome.HOLDS
-    return Outcome.CONTRADICTED if found.high < low or found.low > high else Outcome.OPEN
+        return Decision.HOLDS
+    return Decision.CONTRADICTED if found.high < low or found.low > high else Decision.OPEN

@@ -17,7 +17,7 @@ from collections import defaultdict
 from collections.abc import Mapping
 from typing import Any
 
-from conevo.campaigns.tables import Tables, Value
+from conevo.campaigns.tables import RunValue, Tables
 from conevo.report.comparison import levels_of
 
 __all__ = ["changed"]
@@ -30,13 +30,13 @@ Usual = Mapping[str, float]  # factor -> its unchanged level
 
 def changed(tables: Tables) -> dict[str, float]:
     """Return by which share of the unchanged runs' mean a run differs, of those that count."""
-    groups: dict[tuple[str, ...], list[Value]] = defaultdict(list)
+    groups: dict[tuple[str, ...], list[RunValue]] = defaultdict(list)
     for one in tables.values():
         groups[one.world, one.preset, one.environment, one.method].append(one)
     return {run: share for group in groups.values() for run, share in _shares(group).items()}
 
 
-def _shares(group: list[Value]) -> dict[str, float]:
+def _shares(group: list[RunValue]) -> dict[str, float]:
     levels = {one.variant: levels_of(one.variant) for one in group}
     usual = _usual(list(levels.values()))
     if not usual:

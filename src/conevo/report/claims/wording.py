@@ -6,7 +6,7 @@ from collections import defaultdict
 from collections.abc import Sequence
 
 from conevo.report.claims.evidence import Evidence
-from conevo.report.claims.outcomes import Cell, Outcome
+from conevo.report.claims.outcomes import Answer, Decision
 from conevo.report.claims.quantities import QUANTITIES
 from conevo.report.claims.statements import Compare, Sample, Statement
 from conevo.report.statistics import ALPHA
@@ -62,7 +62,7 @@ def what_of(statement: Statement) -> str:
     return f"{a.quantity}, {_methods(a)} - {_methods(b)}"
 
 
-def effect(cell: Cell, n_cells: int) -> str:
+def effect(cell: Answer, n_cells: int) -> str:
     """Return the effect of a cell with runs, one of ``n_cells``."""
     statement = cell.statement
     head = f"{place_of(statement)}: {what_of(statement)} = "
@@ -76,7 +76,7 @@ def effect(cell: Cell, n_cells: int) -> str:
     return f"{head}{difference:+.4g}{relative}{tail}"
 
 
-def tests(cells: Sequence[Cell]) -> str:
+def tests(cells: Sequence[Answer]) -> str:
     """Return the names of the tests and intervals of a claim."""
     made = sum(cell.comparison is not None for cell in cells)
     names = [f"t-test; Mann-Whitney with Holm over {made}"] if made else []
@@ -84,7 +84,7 @@ def tests(cells: Sequence[Cell]) -> str:
     return "; ".join(names)
 
 
-def sizes(cells: Sequence[Cell]) -> str:
+def sizes(cells: Sequence[Answer]) -> str:
     """Return the runs per sample: "20", or "3 to 20"."""
     found = {len(sample) for cell in cells if cell.has_runs for sample in cell.gathered.samples}
     if len(found) < 2:
@@ -92,21 +92,21 @@ def sizes(cells: Sequence[Cell]) -> str:
     return f"{min(found)} to {max(found)}"
 
 
-def counts(cells: Sequence[Cell]) -> list[str]:
+def counts(cells: Sequence[Answer]) -> list[str]:
     """Return how many statements hold (by Mann-Whitney and Holm), and which do not."""
-    of = {outcome: [c for c in cells if c.by_rank is outcome] for outcome in Outcome}
-    told = [f"{len(of[Outcome.HOLDS])} of {len(cells)} hold"]
-    if worst := sorted(of[Outcome.CONTRADICTED], key=lambda cell: cell.weight):
+    of = {outcome: [c for c in cells if c.by_rank is outcome] for outcome in Decision}
+    told = [f"{len(of[Decision.HOLDS])} of {len(cells)} hold"]
+    if worst := sorted(of[Decision.CONTRADICTED], key=lambda cell: cell.weight):
         names = [f"{place_of(cell.statement)} {what_of(cell.statement)}" for cell in worst]
         told.append(f"{len(worst)} contradicted ({'; '.join(_few(names))})")
-    if blind := of[Outcome.BLIND]:
+    if blind := of[Decision.BLIND]:
         told.append(f"{len(blind)} not tested: no signal, fitness tells nothing about genotypes")
-    if untested := of[Outcome.UNTESTED]:
+    if untested := of[Decision.UNTESTED]:
         told.append(f"{len(untested)} not tested: no exchange between populations")
-    if of[Outcome.OPEN]:
-        told.append(f"{len(of[Outcome.OPEN])} open")
-    if of[Outcome.MISSING]:
-        told.append(f"{len(of[Outcome.MISSING])} without all their runs")
+    if of[Decision.OPEN]:
+        told.append(f"{len(of[Decision.OPEN])} open")
+    if of[Decision.MISSING]:
+        told.append(f"{len(of[Decision.MISSING])} without all their runs")
     return told
 
 
@@ -118,7 +118,7 @@ def power(found: float | None) -> list[str]:
     return [f"power: of campaigns like this one in which all are alike {share} show it"]
 
 
-def too_few(cells: Sequence[Cell]) -> list[str]:
+def too_few(cells: Sequence[Answer]) -> list[str]:
     """Return a warning where Mann-Whitney could not become significant whatever the runs reach."""
     smallest = [cell.comparison.smallest_p for cell in cells if cell.comparison]
     least = min((p for p in smallest if p is not None), default=0.0) * len(smallest)
@@ -127,7 +127,7 @@ def too_few(cells: Sequence[Cell]) -> list[str]:
     return [f"with so few runs none of {len(smallest)} Mann-Whitney tests can become significant"]
 
 
-def lacking(cells: Sequence[Cell], evidence: Evidence) -> list[str]:
+def lacking(cells: Sequence[Answer], evidence: Evidence) -> list[str]:
     """Return which runs are missing."""
     absent: dict[str, set[str]] = defaultdict(set)
     for cell in cells:

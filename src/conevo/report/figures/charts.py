@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["Bar", "Drawing", "Runs", "bars", "points"]
+__all__ = ["Bar", "Drawing", "Points", "bars", "points"]
 
 Floats = npt.NDArray[np.float64]
 SLOT = 0.5  # inches: most that one method takes of an axis
@@ -54,7 +54,7 @@ class Bar(NamedTuple):
     deviation: float | None
 
 
-class Runs(NamedTuple):
+class Points(NamedTuple):
     """The runs of a cell, and their mean with low and high end of its interval, if there is one."""
 
     values: Sequence[float]
@@ -114,7 +114,7 @@ def bars(
 
 
 def points(
-    panels: Mapping[str, Mapping[str, Sequence[Runs | None]]],
+    panels: Mapping[str, Mapping[str, Sequence[Points | None]]],
     places: Sequence[str],
     names: Mapping[str, str],
     *,

@@ -179,7 +179,7 @@ def _figure(
         (),
         rows,
         drawing=figures.points(
-            at.grid(means, lambda values: figures.Runs(values, _ends(_mean_lost(values)))),
+            at.grid(means, lambda values: figures.Points(values, _ends(_mean_lost(values)))),
             at.places,
             named({cell: len(values) for cell, values in means.items()}),
             x_label=at.axis,

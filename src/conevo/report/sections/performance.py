@@ -91,7 +91,7 @@ def _drawn(
         (),
         runs,
         drawing=figures.points(
-            at.grid(found, lambda one: figures.Runs(one.values, _ends(one, scope))),
+            at.grid(found, lambda one: figures.Points(one.values, _ends(one, scope))),
             at.places,
             names,
             x_label=at.axis,

@@ -6,7 +6,7 @@ import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from conevo.campaigns.tables import Tables, Value
+from conevo.campaigns.tables import RunValue, Tables
 from conevo.report.comparison import Cell, Group, Treatment, group_values, treatments_of
 from conevo.report.exhibits import Column, number, plain, slug
 from conevo.report.sections.arrangement import Arrangement, arrange
@@ -18,7 +18,7 @@ __all__ = ["KEYS", "Scope", "named", "place_names", "scopes", "sizes", "span"]
 KEYS = (Column("environment", "environment", plain), Column("treatment", "method", plain))
 """Columns that name a cell."""
 
-Cells = Mapping[Cell, Sequence[Value]]
+Cells = Mapping[Cell, Sequence[RunValue]]
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from conevo.studies.repeatability import LEAST_RELIABILITY, has_signal
 __all__ = ["blind_cells", "signal"]
 
 
-class Found(NamedTuple):
+class MeasuredSignal(NamedTuple):
     """What was measured of a run's first or last populations; None where fitness was the same."""
 
     unit: str
@@ -70,15 +70,15 @@ def blind_cells(scope: Scope) -> set[Cell]:
     return {cell for cell, own in found.items() if not has_signal(_reliability(own["first"]))}
 
 
-def _found(scope: Scope) -> dict[Cell, dict[str, list[Found]]]:
+def _found(scope: Scope) -> dict[Cell, dict[str, list[MeasuredSignal]]]:
     """Return what was measured of the runs of each cell that has any, "first" and "last"."""
-    by_run: dict[str, dict[str, Found]] = {}
+    by_run: dict[str, dict[str, MeasuredSignal]] = {}
     for run, generation, *rest in scope.tables.query(
         "SELECT run, generation, unit, scheme, icc, standard_error, icc_of_scheme, rounds_for_half"
         " FROM signal ORDER BY run, generation"
     )[1]:
-        by_run.setdefault(run, {})[generation] = Found(*rest)
-    found: dict[Cell, dict[str, list[Found]]] = {}
+        by_run.setdefault(run, {})[generation] = MeasuredSignal(*rest)
+    found: dict[Cell, dict[str, list[MeasuredSignal]]] = {}
     for cell, values in scope.cells.items():
         for one in values:
             for generation, measured in by_run.get(one.run, {}).items():
@@ -86,7 +86,7 @@ def _found(scope: Scope) -> dict[Cell, dict[str, list[Found]]]:
     return found
 
 
-def _row(scope: Scope, cell: Cell, own: dict[str, list[Found]]) -> dict[str, Any]:
+def _row(scope: Scope, cell: Cell, own: dict[str, list[MeasuredSignal]]) -> dict[str, Any]:
     """Return the numbers of a cell."""
     first = own["first"]
     row: dict[str, Any] = {**scope.key(cell.environment, cell.treatment)}
@@ -107,7 +107,7 @@ def _row(scope: Scope, cell: Cell, own: dict[str, list[Found]]) -> dict[str, Any
     return row | {"verdict": "signal" if is_there else "not tested: no signal"}
 
 
-def _reliability(runs: Sequence[Found]) -> float | None:
+def _reliability(runs: Sequence[MeasuredSignal]) -> float | None:
     """Return the mean reliability of fitness; fitness that is always the same has none."""
     return _mean([one.reliability or 0.0 for one in runs])
 

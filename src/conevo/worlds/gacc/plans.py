@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["ENVIRONMENTS", "N_OBSTACLES", "PARTS", "TYPES", "Plan", "plan"]
+__all__ = ["ENVIRONMENTS", "N_OBSTACLES", "PARTS", "TYPES", "BuildingPlan", "plan"]
 
 TYPES = "ABC"
 PARTS = 10  # of a complex object
@@ -41,7 +41,7 @@ ENVIRONMENTS = tuple(f"simple-{n}" for n in range(1, len(SIMPLE) + 1)) + tuple(
 
 
 @dataclass(frozen=True)
-class Plan:
+class BuildingPlan:
     """What is to be built in one environment.
 
     Attributes:
@@ -60,14 +60,14 @@ class Plan:
         return np.sort(self.parts.ravel())
 
 
-def plan(environment: str) -> Plan:
+def plan(environment: str) -> BuildingPlan:
     """Return what is to be built in an environment like "complex-4"."""
     kind, _, number = environment.partition("-")
     n = int(number)
     is_simple = kind == "simple"
     sequences = [PARTS * letter for letter in SIMPLE[n - 1]] if is_simple else COMPLEX[n - 1]
     disordered = None if is_simple else DISORDERED.get(n)
-    return Plan(
+    return BuildingPlan(
         parts=np.array([[TYPES.index(one) for one in each] for each in sequences], dtype=np.int32),
         is_ordered=tuple(c != disordered for c in range(len(sequences))),
         n_obstacles=0 if is_simple or n == 1 else N_OBSTACLES,

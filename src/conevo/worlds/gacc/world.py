@@ -103,7 +103,7 @@ from conevo.rng import fold_all
 from conevo.worlds.disturbances import Disturbances, disturbed
 from conevo.worlds.gacc.dynamics import FUNCTIONS, fail
 from conevo.worlds.gacc.obstacles import are_clear, draw_obstacles
-from conevo.worlds.gacc.plans import TYPES, Plan, plan
+from conevo.worlds.gacc.plans import TYPES, BuildingPlan, plan
 from conevo.worlds.gacc.state import GaccConstants, GaccScene, GaccTeam
 from conevo.worlds.measures import Measure
 from conevo.worlds.places import draw_places, sectors
@@ -288,7 +288,7 @@ class GaccWorld:
         return self.params.n_robots
 
     @property
-    def plan(self) -> Plan:
+    def plan(self) -> BuildingPlan:
         """What is to be built."""
         return plan(self.environment)
 
