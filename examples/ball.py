@@ -1,8 +1,8 @@
-"""Ball: four robots push a ball to a goal, which one of them alone cannot.
+"""Ball: four robots push a ball to a goal. One robot alone cannot move it.
 
 =============  =================================================================
 name           ``ball-v1``
-source         made up, the smallest world with something that robots share
+source         made up, the smallest world with shared state
 environments   ``near-1`` (the goal is near the ball), ``far-1``
 robots         4
 epoch          200 iterations
@@ -60,7 +60,7 @@ class BallParams:
 
 @wp.struct
 class Params:
-    """What the kernels need of ``BallParams``, by its names."""
+    """The fields of ``BallParams`` that the kernels need, under the same names."""
 
     step: float
     reach: float
@@ -68,7 +68,7 @@ class Params:
 
 @wp.struct
 class Scene:
-    """A scenario: places (x, y) of R robots, ball and goal, and the seed of all else."""
+    """A scenario: places (x, y) of R robots, ball and goal, and the seed of the rest."""
 
     places: wp.array[float]
     seed: wp.array[wp.uint64]
@@ -82,7 +82,7 @@ class Team:
     outputs: wp.array2d[float]
     x: wp.array[float]
     y: wp.array[float]
-    push_x: wp.array[float]  # by what the robot pushes the ball, nothing if it does not
+    push_x: wp.array[float]  # the push on the ball, 0 without one
     push_y: wp.array[float]
     pushes: wp.array[int]
     ball: Annotated[wp.array[float], "xy"]
@@ -110,7 +110,7 @@ def from_goal(scene: Scene, x: float, y: float) -> float:
 
 @wp.func
 def reset(team: Team, scene: Scene, p: Params, i: int) -> None:
-    """Put robot ``i`` at its start, and one of them the ball, which nobody reads yet."""
+    """Put robot ``i`` at its start; robot 0 also places the ball, which no robot reads yet."""
     team.x[i] = scene.places[2 * i]
     team.y[i] = scene.places[2 * i + 1]
     if i == 0:
@@ -143,7 +143,7 @@ def act(team: Team, scene: Scene, p: Params, i: int, t: int) -> None:
 
 @wp.func
 def commit(team: Team, scene: Scene, p: Params, i: int, t: int) -> None:
-    """Move robot ``i``, note by what it pushes the ball, and count its action."""
+    """Move robot ``i``, store its push on the ball, and count its action."""
     a = team.chosen[i]
     team.pushes[i] = 0
     if a == 1:
@@ -227,7 +227,7 @@ class BallWorld:
         return BallScenarios(places=places, seed=np.array(keys, np.uint64))
 
     def _draw(self, key: int) -> npt.NDArray[np.float32]:
-        """Draw the robots around the ball, and the goal so far from it."""
+        """Draw the robots around the ball, and the goal at the distance of the environment."""
         rng = stream(key, self.name)
         ball = rng.uniform(0.3, 0.7, 2)
         robots = ball + rng.uniform(-0.15, 0.15, (self.n_robots, 2))

@@ -2,7 +2,7 @@
 
 =============  ==========================================================
 name           ``light-v1``
-source         made up, the smallest world there is
+source         made up, the smallest possible world
 environments   ``dark-1`` (the light stands anywhere)
 robots         3
 epoch          100 iterations
@@ -49,14 +49,14 @@ class LightParams:
 
 @wp.struct
 class Params:
-    """What the kernels need of ``LightParams``, by its names."""
+    """The fields of ``LightParams`` that the kernels need, under the same names."""
 
     step: float
 
 
 @wp.struct
 class Scene:
-    """A scenario: places (x, y) of the R robots and of the light, and the seed of all else."""
+    """A scenario: places (x, y) of the R robots and of the light, and the seed of the rest."""
 
     places: wp.array[float]
     seed: wp.array[wp.uint64]
@@ -84,7 +84,7 @@ class Team:
 
 @wp.func
 def light(team: Team, scene: Scene, i: int) -> wp.vec2f:
-    """Return the way from robot ``i`` to the light."""
+    """Return the vector from robot ``i`` to the light."""
     last = scene.places.shape[0] - 1
     return wp.vec2f(scene.places[last - 1] - team.x[i], scene.places[last] - team.y[i])
 
@@ -116,7 +116,7 @@ def act(team: Team, scene: Scene, p: Params, i: int, t: int) -> None:
 
 @wp.func
 def commit(team: Team, scene: Scene, p: Params, i: int, t: int) -> None:
-    """Make robot ``i``'s action its state, and count it."""
+    """Execute robot ``i``'s action, and count it."""
     a = team.chosen[i]
     if a == 1:
         step = steered_step(team.outputs[i, 2], team.outputs[i, 3], p.step)

@@ -41,7 +41,7 @@ class LinearWeights:
 
 @named_arrays
 class LinearMemory:
-    """What recordings show of a team's controllers, 0 for a robot without one."""
+    """Outputs of a team's controllers for recordings, 0 for a robot without one."""
 
     shown: Annotated[wp.array[float], "robots", "parts"]
 
@@ -55,7 +55,7 @@ def load(
     rows: wp.array3d[int],
     n: int,
 ) -> None:
-    """Build robot ``i``'s controller of a genotype; see ``controllers.protocol.Mind``."""
+    """Build robot ``i``'s controller from a genotype; see ``controllers.protocol.Mind``."""
     size = shape.n_inputs * shape.n_outputs
     row = rows[n, i, 0]
     weights.filled[i] = wp.where(row < 0, 0, 1)
@@ -68,7 +68,7 @@ def load(
 
 @wp.func
 def clear(memory: LinearMemory, shape: LinearShape, i: int) -> None:
-    """Let robot ``i`` remember nothing."""
+    """Clear robot ``i``'s memory."""
     memory.shown[i] = 0.0
 
 
@@ -98,11 +98,11 @@ class Linear:
     """weight of gene 1."""
 
     name: ClassVar[str] = "linear"
-    max_outputs: ClassVar[int] = 64  # any number would do
+    max_outputs: ClassVar[int] = 64  # arbitrary
     n_memory: ClassVar[int] = 1
 
     def genome(self, n_inputs: int, n_outputs: int) -> Genome:
-        """Return what a controller is built from: one part, which is all of it."""
+        """Return the parts of a controller: one, the whole network."""
         return Genome(n_parts=1, max_parts=1, n_genes=n_inputs * n_outputs)
 
     def mind(self, n_inputs: int, n_outputs: int) -> Mind:

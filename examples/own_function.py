@@ -1,8 +1,8 @@
-"""Ask and tell by hand: cooperative co-evolution of a function of your own, no world needed.
+"""Ask and tell by hand: cooperative co-evolution for your own function, without a world.
 
-Four agents shall spread over four places of a plane. An agent stands where its three neurons'
-genes, summed, put it; a team is worth minus the summed distances from each place to its nearest
-agent. Nobody is told which place is whose: the populations have to divide the places among them.
+Four agents must spread over four places of a plane. An agent's position is the sum of its three
+neurons' genes. The value of a team is minus the summed distances from each place to its nearest
+agent. No place is assigned to an agent: the populations must divide the places among themselves.
 
 Run it with: python examples/own_function.py [METHOD]
 """
@@ -19,12 +19,12 @@ PLACES = np.array([[1.5, 1.5], [-1.5, 1.5], [-1.5, -1.5], [1.5, -1.5]])
 
 
 def positions(trials: Trials) -> np.ndarray:
-    """Return where each agent of each team stands, [N, R, 2]."""
+    """Return the position of each agent of each team, [N, R, 2]."""
     return trials.networks().sum(axis=2)
 
 
 def evaluate(trials: Trials) -> Scores:
-    """Return the worth of each team [N], given to all its agents, [N, R]."""
+    """Return the value of each team [N], credited to all its agents, [N, R]."""
     gaps = np.linalg.norm(positions(trials)[:, :, None] - PLACES, axis=-1)  # [N, R, places]
     worth = -gaps.min(axis=1).sum(axis=1)
     fitness = np.repeat(worth[:, None], gaps.shape[1], axis=1)
@@ -32,7 +32,7 @@ def evaluate(trials: Trials) -> Scores:
 
 
 def main(name: str = "cone") -> None:
-    """Evolve for 60 generations and print how the fittest team comes along."""
+    """Evolve for 60 generations and print the progress of the fittest team."""
     chosen = method(name, genotypes=20)
     state = chosen.init(Layout(n_robots=4, n_hidden=3, max_hidden=3, n_genes=2), root=1)
     while state.progress.generation < 60:

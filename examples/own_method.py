@@ -3,19 +3,19 @@
 Cumulative step-size adaptation: N. Hansen and A. Ostermeier, Completely derandomized
 self-adaptation in evolution strategies, Evolutionary Computation 9(2), 2001; formulas and constants
 are those of N. Hansen, The CMA evolution strategy: a tutorial, arXiv:1604.00772 (2016), appendix A,
-with a covariance matrix that stays the unit matrix. A (mu/mu_w, lambda)-ES: lambda teams are drawn
+with a covariance matrix that remains the identity. A (mu/mu_w, lambda)-ES: lambda teams are drawn
 around a mean team, the better half moves the mean, and the step size grows where successive steps
 point the same way and shrinks where they cancel out.
 
-It shares nothing with the methods of the package: no populations, no crossover, no elite, and a
-state of its own. Run it, alone or next to CONE, with::
+It shares nothing with the methods of the package: no populations, no crossover, no elite, and
+its own state. Run it, alone or next to CONE, with::
 
     conevo run rover/complex-1 --method examples/own_method.py:team-es
     conevo run rover/complex-1 --method examples/own_method.py:team-es,cone --seeds 3
 
-Choice: a team is worth the mean credit of its robots; one that is not finite ranks last.
-Choice: genes of the teams that are tried are clipped to [-1, 1], and the mean moves to the mean of
-what was tried, so that a step which was cut off does not lengthen the path.
+Choice: the fitness of a team is the mean credit of its robots; a non-finite one ranks last.
+Choice: genes of the tried teams are clipped to [-1, 1], and the mean moves to the mean of the
+clipped teams, so that a clipped step does not lengthen the path.
 Choice: the fittest team of a generation is its mean, after it has moved.
 """
 
@@ -50,7 +50,7 @@ class TeamEsConfig:
 
 @dataclass(frozen=True)
 class TeamEsState:
-    """What the strategy remembers.
+    """State of the strategy.
 
     Attributes:
         progress: the header.
@@ -67,7 +67,7 @@ class TeamEsState:
     has_moved: bool
 
     def problem(self, first: TeamEsState) -> str:
-        """Return the field that cannot be that of a state between generations, if there is one."""
+        """Return the first field that is not valid between generations, if any."""
         for name in ("mean", "path"):
             found = getattr(self, name)
             if found.shape != first.mean.shape or not np.isfinite(found).all():

@@ -35,7 +35,7 @@ class Teams:
         self.genome = self.rollout.genome
 
     def play(self, vectors: np.ndarray, keys: list[int]) -> np.ndarray:
-        """Return what teams of clones reach, [N], the mean over scenarios with these keys."""
+        """Return the fitness of teams of clones, [N], the mean over scenarios with these keys."""
         n, parts = len(vectors), self.genome.n_parts
         pool = vectors.reshape(n * parts, self.genome.n_genes).astype(np.float32)
         teams = np.full((n, self.world.n_robots, self.genome.max_parts), -1, np.int32)
@@ -45,7 +45,7 @@ class Teams:
 
 
 def main(generations: int = 80) -> float:
-    """Evolve, print the progress, and return what the result reaches in twenty fresh scenarios."""
+    """Evolve, print the progress, and return the result's fitness in twenty fresh scenarios."""
     world = conevo.world(WORLD)
     teams = Teams(world, conevo.controller(world=world, n_hidden=4, max_hidden=4))
     size = teams.genome.n_parts * teams.genome.n_genes

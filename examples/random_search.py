@@ -1,6 +1,6 @@
-"""Random search: a team of clones of every genotype; all but the elitists are drawn anew.
+"""Random search: a team of clones of every genotype; all but the elitists are redrawn.
 
-Made up: what a method must at least be better than. It works as it is, ``conevo run
+Made up: the baseline that every method must beat. Use it as it is, ``conevo run
 rover/complex-1 --method examples/random_search.py:random-search``, and without any world, ``python
 examples/random_search.py``. The recipe *add a method* of CONTRIBUTING.md puts it into the package.
 """
@@ -81,7 +81,7 @@ ENTRY = MethodEntry(
 
 
 def main() -> None:
-    """Search for the places of ``own_function.py``, and let HomCNE do so at the same cost."""
+    """Search for the places of ``own_function.py``, and with HomCNE at the same cost."""
     from own_function import evaluate
 
     from conevo import method

@@ -1,4 +1,4 @@
-"""Spread: agents learn to keep away from each other, in a world with a simulator of its own.
+"""Spread: agents learn to keep away from each other, in a world with its own simulator.
 
 =============  ==========================================================
 name           ``spread-v1``
@@ -90,7 +90,7 @@ class SpreadWorld:
         )
 
     def simulator(self, controller: Controller, n_threads: int) -> "SpreadSimulator":
-        """Return what plays this world."""
+        """Return the simulator of this world."""
         return SpreadSimulator(self, controller, n_threads)
 
 
@@ -145,7 +145,7 @@ class SpreadSimulator:
         scenarios: SpreadScenarios,
         heuristic: Ints | None = None,
     ) -> dict[str, npt.NDArray[Any]]:
-        """Play one team in one scenario and return what happened in every iteration."""
+        """Execute one team in one scenario and return the arrays of every iteration."""
         modes = np.full(len(team), -1, np.int32) if heuristic is None else heuristic
         steps = list(self._epoch(genes, team[None], modes[None], scenarios.starts))
         found = {name: np.concatenate([step[name] for step in steps]) for name in steps[0]}
@@ -154,7 +154,7 @@ class SpreadSimulator:
     def _epoch(
         self, genes: Floats, teams: Ints, modes: Ints, starts: Floats
     ) -> Iterator[dict[str, npt.NDArray[Any]]]:
-        """Yield what happens in each iteration to B teams, [B, R, ...]."""
+        """Yield the state of B teams after each iteration, [B, R, ...]."""
         b, r, u = teams.shape
         agents = teams.reshape(b * r, u)
         weights, active = genes[agents], agents >= 0
@@ -181,7 +181,7 @@ class SpreadSimulator:
 
 
 def _closest(place: Floats) -> Floats:
-    """Return the way from every agent [B, R, 2] to the closest other one."""
+    """Return the vector from every agent [B, R, 2] to the closest other one."""
     way = place[:, None] - place[:, :, None]  # from the first index to the second
     far = np.linalg.norm(way, axis=3)
     far[:, np.arange(place.shape[1]), np.arange(place.shape[1])] = np.inf
