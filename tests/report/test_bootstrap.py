@@ -7,20 +7,11 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from conevo.report.bootstrap import iqm, iqm_interval, probability_of_improvement
 from conevo.report.statistics import compare
 
 pytestmark = pytest.mark.filterwarnings("error")
-
-
-@given(st.lists(st.floats(-1e6, 1e6), min_size=1, max_size=40))
-def test_iqm_is_the_trimmed_mean_of_scipy(values):
-    from scipy import stats
-
-    assert iqm(values) == pytest.approx(stats.trim_mean(values, 0.25), rel=1e-9, abs=1e-6)
 
 
 @pytest.mark.parametrize(

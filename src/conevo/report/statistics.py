@@ -15,10 +15,10 @@ error to judge them by.
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -43,7 +43,8 @@ __all__ = [
 ALPHA = 0.05
 """The thesis' threshold of significance (appendix A)."""
 
-LILLIEFORS_BLOCKS = 10  # of 1000 samples: a p-value near 0.05 is then known to about 0.004
+LILLIEFORS_SAMPLES = 10_000  # a p-value near 0.05 is then known to about 0.004
+LILLIEFORS_VALUES = 10**7  # of all these samples, at most: they are drawn at once
 
 
 @dataclass(frozen=True)
@@ -120,18 +121,15 @@ def normality(values: npt.ArrayLike) -> Normality:
     Both p-values are None below three runs, and if all are equal.
     """
     x = finite(values)
-    if len(x) < 3 or not _moments(x)[1]:
+    mean, sd = _moments(x)
+    if len(x) < 3 or not sd:
         return Normality(len(x), None, None)
-    from scipy.stats import kstwo
+    from scipy.stats import kstest
 
-    distance = _distances(x[None, :])[0]
+    thesis = kstest(x, "norm", args=(mean, sd), method="exact")
     by_chance = _lilliefors(len(x))
-    at_least = len(by_chance) - np.searchsorted(by_chance, distance - 1e-12)
-    return Normality(
-        n=len(x),
-        p_ks=float(kstwo.sf(distance, len(x))),
-        p_lilliefors=(1 + int(at_least)) / (1 + len(by_chance)),
-    )
+    at_least = int(np.sum(by_chance >= thesis.statistic - 1e-12))
+    return Normality(len(x), float(thesis.pvalue), (1 + at_least) / (1 + len(by_chance)))
 
 
 def compare(a: npt.ArrayLike, b: npt.ArrayLike) -> Comparison:
@@ -146,11 +144,7 @@ def compare(a: npt.ArrayLike, b: npt.ArrayLike) -> Comparison:
     difference = None if mean_a is None or mean_b is None else mean_a - mean_b
     low = high = p_t = p_welch = p_mann_whitney = a12 = smallest_p = None
     if difference is not None and sd_a is not None and sd_b is not None and (sd_a or sd_b):
-        p_t = _two_sided_t(difference, *_student(sd_a, n, sd_b, m))
-        error, freedom = _welch(sd_a, n, sd_b, m)
-        p_welch = _two_sided_t(difference, error, freedom)
-        reach = _t_quantile(1 - ALPHA / 2, freedom) * error
-        low, high = difference - reach, difference + reach
+        p_t, p_welch, low, high = _t_tests(x, y)
     if n and m:
         p_mann_whitney = mann_whitney(x, y)
         a12 = float(above(x, y).mean())
@@ -214,8 +208,10 @@ def mean_interval(values: npt.ArrayLike, level: float = 0.95) -> Estimate:
     method = "Student's t"
     if mean is None or not sd:
         return Estimate(mean, None, None, len(x), method)
-    reach = _t_quantile((1 + level) / 2, len(x) - 1) * sd / math.sqrt(len(x))
-    return Estimate(mean, mean - reach, mean + reach, len(x), method)
+    from scipy.stats import t
+
+    low, high = t.interval(level, len(x) - 1, mean, sd / math.sqrt(len(x)))
+    return Estimate(mean, float(low), float(high), len(x), method)
 
 
 def proportion_interval(successes: int, n: int, level: float = 0.95) -> Estimate:
@@ -231,12 +227,10 @@ def proportion_interval(successes: int, n: int, level: float = 0.95) -> Estimate
     method = "Clopper-Pearson"
     if n == 0:
         return Estimate(None, None, None, 0, method)
-    from scipy.special import betaincinv
+    from scipy.stats import binomtest
 
-    tail = (1 - level) / 2
-    low = float(betaincinv(successes, n - successes + 1, tail)) if successes else 0.0
-    high = float(betaincinv(successes + 1, n - successes, 1 - tail)) if successes < n else 1.0
-    return Estimate(successes / n, low, high, n, method)
+    low, high = binomtest(successes, n).proportion_ci(level, "exact")
+    return Estimate(successes / n, float(low), float(high), n, method)
 
 
 def finite(values: npt.ArrayLike) -> Floats:
@@ -259,46 +253,28 @@ def _moments(x: Floats) -> tuple[float | None, float | None]:
     return (mean, float(x.std(ddof=1))) if np.ptp(x) > 0 else (float(x[0]), 0.0)
 
 
-def _student(sd_a: float, n: int, sd_b: float, m: int) -> tuple[float, float]:
-    """Return the standard error of a difference of means and its degrees of freedom, pooled."""
-    freedom = n + m - 2
-    pooled = math.hypot(math.sqrt(n - 1) * sd_a, math.sqrt(m - 1) * sd_b) / math.sqrt(freedom)
-    return pooled * math.sqrt(1 / n + 1 / m), freedom
+def _t_tests(x: Floats, y: Floats) -> tuple[float, float, float, float]:
+    """Return the p-values of Student's and of Welch's test, and Welch's interval.
 
+    Of samples that are brought to one size, since the squares of tiny values vanish.
+    """
+    from scipy.stats import ttest_ind
 
-def _welch(sd_a: float, n: int, sd_b: float, m: int) -> tuple[float, float]:
-    """Return the same without the assumption of equal variances (Welch 1947)."""
-    a, b = sd_a / math.sqrt(n), sd_b / math.sqrt(m)
-    error = math.hypot(a, b)
-    return error, 1 / ((a / error) ** 4 / (n - 1) + (b / error) ** 4 / (m - 1))
-
-
-def _two_sided_t(difference: float, error: float, freedom: float) -> float:
-    from scipy.special import stdtr
-
-    return float(2 * stdtr(freedom, -abs(difference) / error))
-
-
-def _t_quantile(probability: float, freedom: float) -> float:
-    from scipy.special import stdtrit
-
-    return float(stdtrit(freedom, probability))
-
-
-def _distances(samples: Floats) -> Floats:
-    """Return the Kolmogorov-Smirnov distance of each sample [k, n] to its own fitted normal."""
-    from scipy.special import ndtr
-
-    n = samples.shape[1]
-    centred = np.sort(samples, axis=1) - samples.mean(axis=1, keepdims=True)
-    normal: Any = ndtr(centred / samples.std(axis=1, ddof=1, keepdims=True))
-    steps = np.arange(n + 1) / n
-    return np.asarray(np.maximum(steps[1:] - normal, normal - steps[:-1]).max(axis=1))
+    centre, size = y.mean(), max(np.ptp(x), np.ptp(y))
+    x, y = (x - centre) / size, (y - centre) / size
+    with warnings.catch_warnings(action="ignore"):  # of a sample without a spread
+        student, welch = (ttest_ind(x, y, equal_var=are_equal) for are_equal in (True, False))
+        low, high = welch.confidence_interval(1 - ALPHA)
+    return float(student.pvalue), float(welch.pvalue), float(low * size), float(high * size)
 
 
 @lru_cache(maxsize=256)
 def _lilliefors(n: int) -> Floats:
-    """Return the distances of samples of n normal numbers, ascending."""
+    """Return how far samples of n normal numbers are from the normals fitted to them."""
+    from scipy.stats import goodness_of_fit, norm
+
     numbers = stream(0, "lilliefors", n)
-    blocks = [_distances(numbers.standard_normal((1000, n))) for _ in range(LILLIEFORS_BLOCKS)]
-    return np.sort(np.concatenate(blocks))
+    some = numbers.standard_normal(n)
+    k = min(LILLIEFORS_SAMPLES, LILLIEFORS_VALUES // n)
+    found = goodness_of_fit(norm, some, statistic="ks", n_mc_samples=k, rng=numbers)
+    return np.asarray(found.null_distribution)
