@@ -75,13 +75,14 @@ def test_ray_itself_carries_a_run_on_whose_ray_worker_was_killed(long_run, undis
     assert outcome(run) == undisturbed
 
 
+@pytest.mark.parametrize("kind", ["file", "s3"])
 def test_results_come_through_an_object_store_where_nodes_do_not_see_the_campaign(
-    long_run, undisturbed, tmp_path, monkeypatch
+    long_run, undisturbed, tmp_path, monkeypatch, request, kind
 ):
     campaign, label = long_run
     scratch = Path(tempfile.mkdtemp())  # short, since Ray makes sockets below it
     monkeypatch.setenv("TMPDIR", str(scratch))  # of the workers
-    uri = f"file://{tmp_path}/bucket"
+    uri = request.getfixturevalue("bucket") if kind == "s3" else f"file://{tmp_path}/bucket"
     executor = RayCluster(1, store=uri)
     executor.submit(RunJob(campaign.path, label, 1))
     (folder,) = until(lambda: list(scratch.glob("conevo-*")))

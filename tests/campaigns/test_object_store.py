@@ -1,4 +1,7 @@
-"""Runs in an object store: whole, or broken off anywhere, they go on to the same bits."""
+"""Runs in an object store: whole, or broken off anywhere, they go on to the same bits.
+
+The store is one that is asked through S3.
+"""
 
 import shutil
 from pathlib import Path
@@ -9,9 +12,8 @@ import conevo
 from campaigns.plans import tiny_campaign
 from conevo.campaigns.object_store import ObjectStore
 from conevo.campaigns.work import carry_out
-from conevo.errors import UsageError
+from conevo.errors import EnvironmentFailure, UsageError
 
-pytest.importorskip("pyarrow")
 MORE = '[[where]]\nsettings = { "run.generations" = 9 }'
 
 
@@ -26,8 +28,8 @@ def label(campaign):
 
 
 @pytest.fixture
-def store(tmp_path):
-    return ObjectStore(f"file://{tmp_path}/bucket/inner")
+def store(bucket):
+    return ObjectStore(f"{bucket}/inner")
 
 
 def advance(path, generations=1):
@@ -125,6 +127,7 @@ def test_how_a_run_ended_is_forgotten_when_it_is_tried_again(campaign, label, st
     assert not ended.exists()
 
 
+@pytest.mark.slow
 def test_a_copy_that_breaks_off_anywhere_leaves_a_run_that_goes_on(
     campaign, label, store, tmp_path, undisturbed, monkeypatch
 ):
@@ -208,7 +211,46 @@ def test_what_a_run_no_longer_has_is_no_longer_stored(campaign, label, store, tm
     assert {"checkpoint-a.npz", "checkpoint-b.npz"} <= two
 
 
-@pytest.mark.parametrize("uri", ["nowhere", "xyz://bucket/path"])
+@pytest.mark.parametrize("uri", ["nowhere", "xyz://bucket/path", "s3://"])
 def test_an_address_that_is_none_is_refused(uri):
+    pytest.importorskip("pyarrow")
     with pytest.raises(UsageError, match=f"object store '{uri}'"):
         ObjectStore(uri)
+
+
+class Down:
+    """A store that cannot be reached."""
+
+    def __getattr__(self, name):
+        def refuse(*_, **__):
+            raise OSError("Could not connect\nto server")
+
+        return refuse
+
+
+@pytest.mark.parametrize(
+    ("ask", "words"),
+    [
+        (lambda store, root, label: store.put_plan(root), "write s3://box/in/runs.jsonl"),
+        (lambda store, root, label: store.get_plan(root), "read s3://box/in/runs.jsonl"),
+        (lambda store, root, label: store.has_run(label), "list s3://box/in/runs/rover"),
+        (lambda store, root, label: store.put_run(root, label), "read s3://box/in/runs/rover"),
+        (lambda store, root, label: store.get_run(root, label), "list s3://box/in/runs/rover"),
+        (lambda store, root, label: store.forget_ending(root, label), "read s3://box/in/ended/"),
+    ],
+)
+def test_a_store_that_cannot_be_reached_is_one_line_without_the_password(
+    campaign, label, monkeypatch, ask, words
+):
+    pytest.importorskip("pyarrow")
+    store = ObjectStore("s3://me:hidden@box/in?region=eu-west-1")
+    monkeypatch.setattr(store, "_files", Down())
+    with pytest.raises(EnvironmentFailure, match=words) as caught:
+        ask(store, campaign.path, label)
+    assert str(caught.value).endswith(": Could not connect to server")
+    assert "hidden" not in str(caught.value)
+
+
+def test_a_bucket_that_there_is_not_is_refused_before_anything_starts(campaign, bucket):
+    with pytest.raises(EnvironmentFailure, match=r"-none/inner/runs.jsonl: Bucket .* not found"):
+        ObjectStore(f"{bucket}-none/inner").put_plan(campaign.path)

@@ -9,6 +9,8 @@ work meanwhile: what is newer than its checkpoint is written again when a run is
 from __future__ import annotations
 
 import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -32,6 +34,9 @@ class ObjectStore:
 
     Raises:
         UsageError: pyarrow is not installed, or does not know the address.
+
+    All methods raise EnvironmentFailure if the store cannot be reached or refuses. Messages show an
+    address without the password and the options that it may have.
     """
 
     def __init__(self, uri: str) -> None:
@@ -44,7 +49,10 @@ class ObjectStore:
         except (OSError, ValueError) as error:
             raise UsageError(f"object store {uri!r}: {error}") from error
         self._folder = fs.FileSelector
-        self.uri, self._base = uri.rstrip("/"), base.rstrip("/")
+        self.uri, self._base = uri, base.rstrip("/")
+        self._shown = f"{uri.partition(':')[0]}://{self._base}"
+        if not self._base:
+            raise UsageError(f"object store {uri!r}: it has no bucket")
 
     def put_plan(self, root: Path) -> None:
         """Store what a worker reads of a plan: its runs, its inputs, and who may carry it on."""
@@ -60,7 +68,7 @@ class ObjectStore:
         self._get(root, places.runs)
         for name in self._names(INPUTS):
             self._get(root, root / INPUTS / name)
-        if self._files.get_file_info(f"{self._base}/{places.code.name}").is_file:
+        if self._has(root, places.code):
             self._get(root, places.code)
 
     def put_run(self, root: Path, label: str) -> None:
@@ -72,21 +80,19 @@ class ObjectStore:
                 contents[path] = path.read_bytes()
             except FileNotFoundError:  # gone since it was listed
                 continue
-        seal = f"runs/{label}/DONE"
-        if "DONE" in self._names(f"runs/{label}") and self._read(seal) != contents.get(
-            run / "DONE"
-        ):
-            self._files.delete_file(f"{self._base}/{seal}")  # the run has another length since
+        seal = run / "DONE"
+        if self._has(root, seal) and self._read(f"runs/{label}/DONE") != contents.get(seal):
+            self._delete(f"runs/{label}/DONE")  # the run has another length since
         for path in reversed(contents):
             self._put(root, path, contents[path])
         there = {path.relative_to(run).as_posix() for path in contents}
         for name in set(self._names(f"runs/{label}")) - there if there else ():
-            self._files.delete_file(f"{self._base}/runs/{label}/{name}")
+            self._delete(f"runs/{label}/{name}")
         for path in _beside(root, label):
             if path.is_file():
                 self._put(root, path, path.read_bytes())
             elif "studies" in path.relative_to(root).parts and self._has(root, path):
-                self._files.delete_file(f"{self._base}/{path.relative_to(root).as_posix()}")
+                self._delete(path.relative_to(root).as_posix())
 
     def get_run(self, root: Path, label: str) -> None:
         """Put what is stored of a run into a directory, in place of what is there."""
@@ -110,39 +116,49 @@ class ObjectStore:
         """Remove how a run ended last, since it is tried again."""
         path = Places(root).ended(label)
         if self._has(root, path):
-            self._files.delete_file(f"{self._base}/{path.relative_to(root).as_posix()}")
+            self._delete(path.relative_to(root).as_posix())
 
     def _has(self, root: Path, path: Path) -> bool:
         """Whether a file of a campaign's directory is stored."""
-        return path.name in self._names(path.parent.relative_to(root).as_posix())
+        name = path.relative_to(root).as_posix()
+        with self._asked("read", name):
+            return bool(self._files.get_file_info(f"{self._base}/{name}").is_file)
 
     def _names(self, folder: str) -> list[str]:
         """Return the names of all files in a folder, relative to it."""
         place = f"{self._base}/{folder}"
         below = self._folder(place, recursive=True, allow_not_found=True)
-        found = self._files.get_file_info(below)
+        with self._asked("list", folder):
+            found = self._files.get_file_info(below)
         return sorted(one.path.rpartition(f"{place}/")[2] for one in found if one.is_file)
 
     def _put(self, root: Path, path: Path, content: bytes) -> None:
         name = path.relative_to(root).as_posix()
         place = f"{self._base}/{name}"
-        try:
+        with self._asked("write", name):
             self._files.create_dir(place.rpartition("/")[0], recursive=True)
             with self._files.open_output_stream(place) as stream:
                 stream.write(content)
-        except OSError as error:
-            raise EnvironmentFailure(f"cannot write {self.uri}/{name}: {error}") from error
 
     def _get(self, root: Path, path: Path) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         replace_file(path, self._read(path.relative_to(root).as_posix()))
 
     def _read(self, name: str) -> bytes:
+        with self._asked("read", name), self._files.open_input_stream(f"{self._base}/{name}") as it:
+            return bytes(it.read())
+
+    def _delete(self, name: str) -> None:
+        with self._asked("remove", name):
+            self._files.delete_file(f"{self._base}/{name}")
+
+    @contextmanager
+    def _asked(self, what: str, name: str) -> Iterator[None]:
         try:
-            with self._files.open_input_stream(f"{self._base}/{name}") as stream:
-                return bytes(stream.read())
+            yield
         except OSError as error:
-            raise EnvironmentFailure(f"cannot read {self.uri}/{name}: {error}") from error
+            reason = " ".join(str(error).split())
+            raise EnvironmentFailure(f"cannot {what} {self._shown}/{name}: {reason}") from error
 
 
 def _results(run: Path) -> list[Path]:
