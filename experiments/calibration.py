@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import argparse
 import itertools
-import sys
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -26,8 +25,6 @@ import numpy as np
 import numpy.typing as npt
 
 import conevo
-
-sys.path.append(str(Path(__file__).resolve().parents[1] / "docs"))
 from blind import Blind, kind
 from calibration_tables import ACCURACIES, PAGE_PARTS, PARTS, RANGES, SETTINGS
 from incentives import FINDING, OF_REGION, TESTING

@@ -11,14 +11,12 @@ the tables from the CSV file. Several ``--baseline`` give a table each, ``<!-- B
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-sys.path.append(str(Path(__file__).resolve().parents[1] / "docs"))
 from conevo.campaigns.tables import Tables
 from conevo.cli.lookup import find_campaign, sealed
 from conevo.errors import ConevoError, UsageError

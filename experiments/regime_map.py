@@ -9,7 +9,6 @@ markers; ``--again`` makes tables and figure from the CSV file.
 
 from __future__ import annotations
 
-import sys
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -17,7 +16,6 @@ from typing import Any
 
 import numpy as np
 
-sys.path.append(str(Path(__file__).resolve().parents[1] / "docs"))
 from conevo.campaigns.plan import PlannedRun
 from conevo.campaigns.tables import Tables
 from conevo.cli.lookup import find_campaign, sealed

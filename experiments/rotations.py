@@ -14,13 +14,11 @@ else. Also: where robots are in the second half of an epoch, by the region where
 from __future__ import annotations
 
 import itertools
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
-sys.path.append(str(Path(__file__).resolve().parents[1] / "docs"))
 from compare_levels import level_name
 from conevo.cli.lookup import find_campaign
 from conevo.errors import ConevoError, UsageError

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
-sys.path += [str(ROOT / "experiments"), str(ROOT / "docs")]  # scripts import what they share
+sys.path.append(str(ROOT / "experiments"))  # scripts import what they share
 
 from compare_levels import comparison_table, groups, main, signal_table  # noqa: E402
 from conevo.errors import UsageError  # noqa: E402

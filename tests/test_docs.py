@@ -1,6 +1,5 @@
 """The pages are true: tables are the package's own, examples run, links lead somewhere."""
 
-import csv
 import importlib.util
 import os
 import re
@@ -17,7 +16,6 @@ from conevo.controllers.registry import controller
 from conevo.errors import UsageError
 from conevo.report.sections.metrics import definitions
 from conevo.runs.settings import declared
-from conevo.runs.shaping import start_shaping
 from conevo.specialization.team import METRICS, Activity, Metric, measure
 from conevo.worlds.checks import random_teams
 from conevo.worlds.simulators import simulator
@@ -31,12 +29,12 @@ LINKED = (*EXECUTED, "CONTRIBUTING.md", "docs/index.md", "examples/README.md")
 MARKED = re.compile(r"<!-- ([a-z]+): (\S+) -->\n```\w+\n(.*?)```\n", re.DOTALL)
 
 
-sys.path.append(str(ROOT / "docs"))  # scripts import what they share
+sys.path.append(str(ROOT / "experiments"))  # scripts import what they share
 
 
-def script(name):
-    """Return a script of docs/ as a module."""
-    spec = importlib.util.spec_from_file_location(name, ROOT / "docs" / f"{name}.py")
+def script(name, folder="docs"):
+    """Return a script as a module."""
+    spec = importlib.util.spec_from_file_location(name, ROOT / folder / f"{name}.py")
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
     spec.loader.exec_module(module)
@@ -109,7 +107,7 @@ def test_a_run_can_be_drawn_and_shows_the_rocks_it_detected(tmp_path):
     pytest.importorskip("matplotlib")
     from PIL import Image
 
-    draw_run = script("draw_run")
+    draw_run = script("draw_run", "experiments")
     few = {"run.generations": 2, "run.n_tests": 3, "method.genotypes": 20}
     run = conevo.evolve(
         "rover/complex-1", "homcne", "smoke", out=tmp_path / "run", overrides=few, threads=1
@@ -127,76 +125,8 @@ def test_a_run_can_be_drawn_and_shows_the_rocks_it_detected(tmp_path):
         assert len(picture.convert("RGB").getcolors(2**20)) > 50
 
 
-def test_runs_become_a_results_page_beside_heuristic_predators(tmp_path):
-    pytest.importorskip("matplotlib")
-    make_results = script("make_results")
-    few = {"run.generations": 2, "run.n_tests": 3, "method.genotypes": 10, "world.prey": "random"}
-    runs = [
-        conevo.evolve(
-            "pursuit/team-1", "homcne", "smoke", seed, tmp_path / "runs" / f"homcne-s{seed}",
-            overrides=few, threads=1,
-        )
-        for seed in (1, 2)
-    ]  # fmt: skip
-    page = tmp_path / "page.md"
-    markers = ("results", "behaviours", "compositions", "lesions")
-    page.write_text("".join(f"<!-- {name} -->\n<!-- end -->\n" for name in markers))
-    make_results.main(str(tmp_path / "runs"), str(tmp_path / "page"))
-    with (tmp_path / "page.csv").open() as file:
-        rows = {row["run"]: row for row in csv.DictReader(file)}
-    compared = [f"{kind}-s{k}" for k in (1, 2) for kind in ("heuristic", "random")]
-    assert list(rows) == ["homcne-s1", "homcne-s2", *compared]
-    more = []
-    for seed, run in enumerate(runs, start=1):
-        test = run.test_result["champion"]["performance"]["capture_time"]
-        assert float(rows[f"homcne-s{seed}"]["capture_time"]) == pytest.approx(test["mean"], 1e-5)
-        more.append(test["mean"] - float(rows[f"heuristic-s{seed}"]["capture_time"]))
-    text = page.read_text()
-    assert f"| {sum(more) / 2:.1f} ± " in text
-    assert text.count("| HomCNE |") == 4
-    assert (tmp_path / "page.png").stat().st_size > 5000
-
-
-def test_construction_runs_and_shapings_become_a_results_page(tmp_path, monkeypatch):
-    pytest.importorskip("matplotlib")
-    make_results = script("make_results")
-    monkeypatch.setattr(sys.modules["mixes"], "ROUNDS", ((12, 2), (2, 2)))
-    few = {"run.generations": 2, "run.n_tests": 3, "method.genotypes": 10, "world.iterations": 200}
-    place = tmp_path / "runs"
-    run = conevo.evolve(
-        "gacc/complex-1", "homcne", "smoke", out=place / "complex-1-homcne-1", overrides=few,
-        threads=1,
-    )  # fmt: skip
-    shaping = start_shaping(
-        ["gacc/complex-1", "gacc/complex-2"], "homcne", "smoke", 1, place / "shaped-homcne-1", few,
-        threads=1,
-    ).resume(threads=1)  # fmt: skip
-    page = tmp_path / "page.md"
-    page.write_text("<!-- results -->\n<!-- end -->\n<!-- shaped -->\n<!-- end -->\n")
-    make_results.main(str(place), str(tmp_path / "page"))
-    with (tmp_path / "page.csv").open() as file:
-        rows = {row["run"]: row for row in csv.DictReader(file)}
-    assert list(rows) == [run.path.name, "best mix-s1", "non-specialized-s1", "random-s1"]
-    assert rows[run.path.name]["method"] == "homcne"
-    with (tmp_path / "page-shaped.csv").open() as file:
-        rows = list(csv.DictReader(file))
-    for row, stage, first in zip(rows, shaping.stages, (0, 2), strict=True):
-        test = stage.test_result["champion"]
-        assert row["environment"] == stage.config.environment
-        assert int(row["first_generation"]) == first
-        delivered = test["performance"]["delivered"]["mean"]
-        assert float(row["delivered"]) == pytest.approx(delivered, 1e-5)
-    own = rows[-1]
-    assert own["delivered_of_last"] == own["delivered"]
-    text = page.read_text()
-    assert text.count("| HomCNE |") == 1
-    assert "| 2 | `complex-2` | 2–3 |" in text
-    for name in ("page.png", "page-shaped.png"):
-        assert (tmp_path / name).stat().st_size > 5000
-
-
 def test_a_page_without_markers_is_refused(tmp_path):
-    pages = script("pages")
+    pages = script("pages", "experiments")
     page = tmp_path / "page.md"
     page.write_text("<!-- results -->\nold\n<!-- end -->\n<!-- results -->\n<!-- end -->\n")
     for name in ("results", "behaviours"):

@@ -10,7 +10,7 @@ import pytest
 import conevo
 
 ROOT = Path(__file__).resolve().parent.parent
-sys.path += [str(ROOT / "experiments"), str(ROOT / "docs")]  # scripts import what they share
+sys.path.append(str(ROOT / "experiments"))  # scripts import what they share
 
 import calibration  # noqa: E402
 import calibration_tables as tables  # noqa: E402

@@ -14,7 +14,7 @@ from conevo.campaigns.plan_file import read_plan
 from conevo.runs.run import Run
 
 ROOT = Path(__file__).resolve().parent.parent
-sys.path += [str(ROOT / "experiments"), str(ROOT / "docs")]  # scripts import what they share
+sys.path.append(str(ROOT / "experiments"))  # scripts import what they share
 
 import pages  # noqa: E402
 import regime_map  # noqa: E402

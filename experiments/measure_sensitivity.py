@@ -1,6 +1,6 @@
 """Measure what the multi-rover world's chosen parameters change, for teams that stay the same.
 
-    python docs/measure_sensitivity.py --run RUN_DIRECTORY [--run RUN_DIRECTORY] [--seed 1]
+    python experiments/measure_sensitivity.py --run RUN_DIRECTORY [--run RUN_DIRECTORY] [--seed 1]
 
 plays fixed teams (heuristic controllers, random networks, the champions of the given runs) in the
 same scenarios with one parameter changed at a time. Writes ``docs/results/sensitivity.csv`` (every
@@ -38,7 +38,7 @@ from teams import (
 
 ENVIRONMENT = "rover/complex-5"
 N_RANDOM = 20
-PAGE = Path(__file__).parent / "results" / "sensitivity.md"
+PAGE = Path(__file__).parents[1] / "docs" / "results" / "sensitivity.md"
 DEFAULTS = RoverParams()
 RANGES = ("low_range", "med_range", "hi_range")
 GROUPS = {

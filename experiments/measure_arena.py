@@ -1,6 +1,6 @@
 """Measure whether predators ever meet prey, in arenas of several sizes and at two speeds.
 
-    python docs/measure_arena.py [--prey heuristic shaped] [--run RUN_DIRECTORY] [--seed 1]
+    python experiments/measure_arena.py [--prey heuristic shaped] [--run RUN_DIRECTORY] [--seed 1]
 
 plays teams of random networks, of heuristic predators and the champions of the given pursuit runs
 in arenas of 100 to the printed 1000 cm, at Khepera speed and at the largest that makes physical
@@ -29,7 +29,7 @@ import pages
 from pages import Row
 from teams import Numbers, Teams, champion, controlled, error, keys_of, play, random_networks
 
-PAGE = Path(__file__).parent / "results" / "arena.md"
+PAGE = Path(__file__).parents[1] / "docs" / "results" / "arena.md"
 ENVIRONMENTS = ("team-1", "team-3", "team-5")
 ARENAS = (100, 200, 400, 1000)
 SPEEDS = (0.8, 5.0)

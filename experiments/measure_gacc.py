@@ -1,6 +1,6 @@
 """Measure what gathering and construction is like for teams that do not learn, and why.
 
-    python docs/measure_gacc.py [--run RUN_DIRECTORY ...] [--seed 1]
+    python experiments/measure_gacc.py [--run RUN_DIRECTORY ...] [--seed 1]
 
 In each of ``CASES``: every heuristic controller alone, the best mix of them that a search finds,
 teams of random networks and of their clones, the champions of the given runs (of preset desk). In
@@ -57,7 +57,7 @@ HALVED_AND_DOUBLED = (
 NARROW = {"home_side": 0.2, "home_sight": 0.05, "grip_distance": 0.02, "needs_detection": True}
 HOME_SIDES = (0.2, 0.5)
 DEFAULTS = GaccParams()
-PAGE = Path(__file__).parent / "results" / "gacc.md"
+PAGE = Path(__file__).parents[1] / "docs" / "results" / "gacc.md"
 
 
 def world_of(environment: str, **params: Any) -> GaccWorld:

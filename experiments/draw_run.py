@@ -1,6 +1,6 @@
 """Draw one run of the multi-rover world, and another next to it if one is named.
 
-    python docs/draw_run.py RUN [--next-to OTHER] [--out PICTURE]
+    python experiments/draw_run.py RUN [--next-to OTHER] [--out PICTURE]
 
 Left: the task performance of each generation's fittest team, and which settings the champion's
 rovers use in the testing phase, by the region where they begin. Right: the champion in one
@@ -29,7 +29,7 @@ from conevo.worlds.rover import rocks
 from conevo.worlds.rover.sites import N_REGIONS, rock_sites
 
 matplotlib.rcParams.update({"hatch.color": "white", "hatch.linewidth": 0.6})
-PICTURES = Path(__file__).parent / "pictures"
+PICTURES = Path(__file__).parents[1] / "docs" / "pictures"
 # Setting by setting: colour (Okabe and Ito 2008), line, marker, hatch. Colours differ in lightness
 # too, so the picture can be read in grey and by readers who see few colours.
 STYLES = {

@@ -1,6 +1,6 @@
 """Measure what the other reading of the demand signal in gathering and construction would change.
 
-    python docs/measure_demand.py [--seeds 4]
+    python experiments/measure_demand.py [--seeds 4]
 
 Equations 6.4 to 6.6 divide a type's demand by the parts of it that are missing. The world divides
 by their number; the other reading is their share of all planned parts of the type. This plays the

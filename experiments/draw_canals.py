@@ -1,4 +1,4 @@
-"""Draw the ten canal layouts on one sheet: ``python docs/draw_canals.py``."""
+"""Draw the ten canal layouts on one sheet: ``python experiments/draw_canals.py``."""
 
 import io
 from pathlib import Path
@@ -11,7 +11,7 @@ import matplotlib.pyplot as plt
 
 from conevo.worlds.rover.canals import N_LAYOUTS, load
 
-PICTURE = Path(__file__).parent / "pictures" / "canals.png"
+PICTURE = Path(__file__).parents[1] / "docs" / "pictures" / "canals.png"
 
 
 def main() -> None:

@@ -1,4 +1,4 @@
-"""Draw a Khepera's sensors and an epoch of pursuit-evasion: ``python docs/draw_arena.py``.
+"""Draw a Khepera's sensors and an epoch of pursuit-evasion: ``python experiments/draw_arena.py``.
 
 Left: where the eight infrared (and, on predators, eight light) sensors sit and the cone each one
 sees. Right: the first iterations of an epoch of four heuristic predators and the default prey, up
@@ -23,7 +23,7 @@ from conevo.kernels import khepera
 from conevo.rng import fold
 from teams import controlled
 
-PICTURE = Path(__file__).parent / "pictures" / "arena.png"
+PICTURE = Path(__file__).parents[1] / "docs" / "pictures" / "arena.png"
 PREDATORS = ("#0072B2", "#56B4E9", "#2B2B50", "#7A9A4B", "#5E4B8B", "#3B7A78")
 PREY = "#D55E00"
 RADIUS = float(khepera.RADIUS)

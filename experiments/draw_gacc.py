@@ -1,4 +1,4 @@
-"""Draw a scenario of gathering and construction: ``python docs/draw_gacc.py [--run RUN]``.
+"""Draw a scenario of gathering and construction: ``python experiments/draw_gacc.py [--run RUN]``.
 
 Left: how an epoch begins: home area, construction zone, obstacles, objects, robots. Right: the same
 epoch at its end, with what was carried where and what was built; played by a mix of heuristic
@@ -23,7 +23,7 @@ from conevo.rng import fold
 from conevo.worlds.gacc.state import CARRIED, DELIVERED, DROPPED, HELPED, LYING, WAITING
 from teams import champion, controlled
 
-PICTURE = Path(__file__).parent / "pictures" / "gacc.png"
+PICTURE = Path(__file__).parents[1] / "docs" / "pictures" / "gacc.png"
 ENVIRONMENT = "complex-5"
 # Colours of Okabe and Ito (2008), which differ in lightness too; every type has its own marker.
 TYPES = (("A", "#0072B2", "o"), ("B", "#E69F00", "s"), ("C", "#B3446C", "^"))

@@ -1,6 +1,8 @@
-"""Put what a campaign says into its results page: ``python docs/campaign_page.py CAMPAIGN FOLDER``.
+"""Put what a campaign says into its results page.
 
-Writes the report of a finished campaign into ``FOLDER/report``, and tables between the markers of
+    python experiments/campaign_page.py CAMPAIGN FOLDER
+
+writes the report of a finished campaign into ``FOLDER/report``, and tables between the markers of
 ``FOLDER/README.md``: what was run and what it cost, performance, comparisons with CONE, castes and
 the claims of the thesis.
 """

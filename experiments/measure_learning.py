@@ -1,6 +1,7 @@
 """Measure what type C fitness and scenarios per round do to how well methods learn.
 
-    python docs/measure_learning.py TASK [--part example] [--budget N] [--seeds 5] [--only NAME ...]
+    python experiments/measure_learning.py TASK [--part example] [--budget N] [--seeds 5]
+        [--only NAME ...]
 
 evolves TASK with the preset ``desk`` in every variant of ``VARIANTS`` at the same number of team
 evaluations, and adds a row per run to ``docs/results/learning-PART.csv``: the champion's main task
@@ -21,7 +22,7 @@ import numpy as np
 import conevo
 from pages import Row, put, table, write
 
-RESULTS = Path(__file__).parent / "results"
+RESULTS = Path(__file__).parents[1] / "docs" / "results"
 PAGE = RESULTS / "learning.md"
 SAME: Row = {"method.fresh_rounds": False}
 OWN, TEAM, ONE = {"method.type_c": "own"}, {"method.type_c": "team"}, {"method.type_c_rounds": 1}

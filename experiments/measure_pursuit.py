@@ -1,6 +1,6 @@
 """Measure what pursuit-evasion's chosen parameters change, for teams that stay the same.
 
-    python docs/measure_pursuit.py --run RUN_DIRECTORY [--run RUN_DIRECTORY] [--seed 1]
+    python experiments/measure_pursuit.py --run RUN_DIRECTORY [--run RUN_DIRECTORY] [--seed 1]
 
 plays fixed teams (heuristic predators, random networks, the champions of the given runs of
 ``pursuit/team-3``) in the same scenarios with one parameter changed at a time. Writes
@@ -24,7 +24,7 @@ from teams import champion, controlled, error, keys_of, play, random_networks, r
 
 ENVIRONMENT = "pursuit/team-3"
 N_SCENARIOS, N_RANDOM = 200, 100
-PAGE = Path(__file__).parent / "results" / "sensitivity-pursuit.md"
+PAGE = Path(__file__).parents[1] / "docs" / "results" / "sensitivity-pursuit.md"
 DEFAULTS = PursuitParams()
 FACTORS = {
     "sensor_angle_deg": (0.7, 1.3),

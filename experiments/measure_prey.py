@@ -1,6 +1,6 @@
 """Measure how hard evolved prey are to catch: shaped, evolved directly, heuristic, random.
 
-    python docs/measure_prey.py --work runs/prey [--seeds 1 2 3] [--evolve 5000]
+    python experiments/measure_prey.py --work runs/prey [--seeds 1 2 3] [--evolve 5000]
 
 makes, for every seed, a prey that was shaped (experiments 1 to 3 in turn) and one that evolved
 directly in experiment 3 from random genotypes, with the same method and as many team evaluations
@@ -27,7 +27,7 @@ from conevo.worlds.pursuit.prey_sets import PreySet, load, save
 from pages import Row
 from teams import Numbers, champion, controlled, error, keys_of, play, random_networks
 
-PAGE = Path(__file__).parent / "results" / "prey.md"
+PAGE = Path(__file__).parents[1] / "docs" / "results" / "prey.md"
 ENVIRONMENTS = ("team-1", "team-3", "team-5")
 N_SCENARIOS = 1000
 N_RANDOM = 20  # random networks as prey, each in its share of the scenarios
