@@ -30,7 +30,6 @@ NOT_YET = (
     "docs/fidelity.md",
     "docs/method.md",
     "docs/replay.md",
-    "docs/worlds.md",
     "docs/results/calibration.md",
     "docs/results/gacc.md",
     "docs/results/learning.md",
