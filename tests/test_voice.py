@@ -26,10 +26,8 @@ CHECKED = (
 NOT_YET = (
     "CHANGELOG.md",
     "benchmarks/README.md",
-    "docs/campaigns.md",
     "docs/fidelity.md",
     "docs/method.md",
-    "docs/replay.md",
     "docs/results/calibration.md",
     "docs/results/gacc.md",
     "docs/results/learning.md",
