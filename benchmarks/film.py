@@ -34,7 +34,7 @@ from pathlib import Path
 epoch, path, size, teams = Path(sys.argv[1]), Path(sys.argv[2]), *map(int, sys.argv[3:])
 began = time.perf_counter()
 from conevo.replay.film import frames_of, write_film
-from conevo.replay.picture import Painter
+from conevo.replay.film_frame import Painter
 from conevo.replay.playback import playback_of
 from conevo.replay.trajectory import Trajectory
 painter = Painter([playback_of(Trajectory.load(epoch))] * teams, size)

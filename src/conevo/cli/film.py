@@ -61,7 +61,7 @@ def film(
     """
     from conevo.cli.epoch_options import REPLAYS, bar, name_of, playbacks, trajectories
     from conevo.replay.film import SIZES, choose_format, frames_of, write_film, write_poster
-    from conevo.replay.picture import Painter
+    from conevo.replay.film_frame import Painter
     from conevo.runs.durable import refuse_file
 
     wanted = {"gif": gif, "mp4": mp4, "png": poster is not None}

@@ -11,17 +11,18 @@ import re
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 import numpy as np
-import numpy.typing as npt
-from PIL import GifImagePlugin, Image
+from PIL import Image
 
 from conevo.errors import EnvironmentFailure, UsageError
-from conevo.replay.picture import Painter
+from conevo.playback.look import SPEED
+from conevo.replay.film_frame import Painter
 from conevo.runs.drafts import draft_of
 from conevo.runs.durable import refuse_file, sync_directory, sync_file, writing
 
@@ -39,12 +40,10 @@ __all__ = [
 
 Progress = Callable[[int, int], None]
 
-FPS = {"gif": 20, "mp4": 60}  # Choice: 60 iterations per second, as the viewer begins with
+FPS = {"gif": 20, "mp4": SPEED}  # Choice: browsers show a GIF no faster
 SIZES = {"gif": 480, "mp4": 720, "png": 720}  # Choice: of a world in pixels; GIFs are for slides
 GIF_FRAMES = 250  # Choice: a GIF has about so many frames unless told otherwise
 _SAMPLES = 16  # frames that a GIF's colours are taken from
-_EXACT = 128  # of its 255 colours are the most frequent ones as they are, others near those left
-_SAME = 255  # the index that leaves a pixel as it was
 _NO_FFMPEG = "MP4 needs ffmpeg: install it, or conevo[video], or make a GIF with --gif"
 
 
@@ -138,12 +137,13 @@ def write_gif(
 ) -> None:
     """Write an animated GIF that repeats for ever.
 
-    All frames share 255 colours, so none flickers; a frame holds only the pixels that change.
+    All frames share 255 colours, so none flickers; a frame holds only the pixels that change. Until
+    they are written all frames are in memory, about a megabyte each.
 
     Args:
         painter: of the frames.
         path: where to.
-        frames: their numbers, at least one.
+        frames: their numbers, at least one; equal ones in a row become one that lasts longer.
         fps: frames per second; GIF counts in hundredths of a second, so 50 at most.
         progress: told the frames done and all.
 
@@ -153,19 +153,20 @@ def write_gif(
     """
     if not frames:
         raise UsageError("the film has no frames")
-    duration = 10 * max(round(100 / fps), 2)
-    palette = _Palette([painter.frame(t) for t in _spread(frames, _SAMPLES)])
-    with _appearing(path) as draft, draft.open("xb") as file:
-        file.write(_gif_head(painter.size, palette))
-        before: npt.NDArray[np.uint8] | None = None
+    palette = _palette(painter.frame(t) for t in frames[:: -(-len(frames) // _SAMPLES)])
+
+    def pictures() -> Iterator[Image.Image]:
         for done, t in enumerate(frames, start=1):
-            pixels = palette.of(painter.frame(t))
-            for part in _gif_frame(pixels, before, duration):
-                file.write(part)
-            before = pixels
+            yield painter.frame(t).quantize(palette=palette, dither=Image.Dither.NONE)
             if progress:
                 progress(done, len(frames))
-        file.write(b";")
+
+    with _appearing(path) as draft, draft.open("xb") as file:
+        rest = pictures()
+        next(rest).save(
+            file, "GIF", save_all=True, append_images=rest, loop=0, disposal=1, optimize=True,
+            duration=10 * max(round(100 / fps), 2),
+        )  # fmt: skip
 
 
 def write_mp4(
@@ -203,7 +204,7 @@ def write_mp4(
             assert pipe is not None
             with suppress(BrokenPipeError):  # it reads no more: what it said tells why
                 for done, t in enumerate(frames, start=1):
-                    pipe.write(painter.video(t))
+                    pipe.write(painter.frame(t).tobytes())
                     if progress:
                         progress(done, len(frames))
                 pipe.close()
@@ -250,10 +251,11 @@ def _appearing(path: Path) -> Iterator[Path]:
 
 
 def _command(ffmpeg: str, size: tuple[int, int], fps: int, draft: Path) -> list[str]:
-    """Return the call of ffmpeg that reads frames of ``Painter.video`` from its input."""
-    colours = ["-color_range", "tv", "-colorspace", "bt709"]
+    """Return the call of ffmpeg that reads frames in red, green and blue from its input."""
+    frames = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size[0]}x{size[1]}"]
+    colours = ["-vf", "scale=out_color_matrix=bt709:out_range=tv,format=yuv420p"]
+    colours += ["-color_range", "tv", "-colorspace", "bt709"]
     colours += ["-color_primaries", "bt709", "-color_trc", "bt709"]
-    frames = ["-f", "rawvideo", "-pix_fmt", "yuv420p", "-s", f"{size[0]}x{size[1]}"]
     # Choice: "veryfast" at quality 20 with a simple search for motion: slower settings gain little
     # on drawn pictures. Two threads on every machine, so that the bytes are the same.
     video = ["-c:v", "libx264", "-preset", "veryfast", "-crf", "20", "-threads", "2"]
@@ -261,8 +263,8 @@ def _command(ffmpeg: str, size: tuple[int, int], fps: int, draft: Path) -> list[
     exact = ["-map_metadata", "-1", "-fflags", "+bitexact", "-flags:v", "+bitexact"]
     return [
         *(ffmpeg, "-nostdin", "-hide_banner", "-loglevel", "error", "-y"),
-        *(*frames, *colours, "-r", str(fps), "-i", "pipe:0"),
-        *(*video, "-pix_fmt", "yuv420p", *colours, *exact, "-movflags", "+faststart"),
+        *(*frames, "-r", str(fps), "-i", "pipe:0", *colours),
+        *(*video, *exact, "-movflags", "+faststart"),
         *("-f", "mp4", f"file:{draft.absolute()}"),
     ]
 
@@ -299,84 +301,21 @@ def _why(path: Path, said: str, draft: Path) -> str:
 # --- GIF ------------------------------------------------------------------------------------------
 
 
-def _spread(frames: Sequence[int], most: int) -> list[int]:
-    """Return at most so many of the frames, first and last among them."""
-    picked = np.unique(np.linspace(0, len(frames) - 1, most).round().astype(int))
-    return [frames[k] for k in picked]
+def _palette(samples: Iterable[Image.Image]) -> Image.Image:
+    """Return a picture whose palette has at most 255 colours, the most frequent of some pictures.
 
-
-class _Palette:
-    """The 255 colours that serve some pictures best.
-
-    The most frequent colours are kept exactly, so that areas and robots have the colours of the
-    legend; the rest stands for the shades between them. A colour of a picture becomes the nearest
-    of these, the same in every frame.
+    No two are nearly alike, since Pillow would take one for the other: areas and robots have the
+    colours of the legend.
     """
-
-    def __init__(self, samples: Sequence[Image.Image]) -> None:
-        numbers = np.concatenate([_numbers(sample).ravel() for sample in samples])
-        found, counts = np.unique(numbers, return_counts=True)
-        found = found[np.argsort(-counts, kind="stable")]
-        self.colours = _parts(found[:_EXACT])
-        if len(found) > _EXACT:
-            rest = Image.fromarray(_parts(found[_EXACT:])[None])
-            shades = rest.quantize(_SAME - _EXACT).getpalette() or []
-            few = np.array(shades, np.uint8).reshape(-1, 3)[: _SAME - _EXACT]
-            self.colours = np.concatenate([self.colours, few])
-        self._index = np.full(1 << 24, _SAME, np.uint8)  # of every colour; _SAME: not known yet
-
-    def of(self, picture: Image.Image) -> npt.NDArray[np.uint8]:
-        """Return a picture's pixels as indices [height, width]."""
-        numbers = _numbers(picture)
-        new = np.unique(numbers[self._index[numbers] == _SAME])
-        for k in range(0, len(new), 4096):
-            some = new[k : k + 4096]
-            apart = _parts(some)[:, None].astype(np.int32) - self.colours
-            self._index[some] = (apart**2).sum(axis=-1).argmin(axis=-1)
-        return self._index[numbers]
-
-
-def _numbers(picture: Image.Image) -> npt.NDArray[np.uint32]:
-    """Return the colours of a picture as numbers 0xrrggbb."""
-    parts = np.asarray(picture).astype(np.uint32)
-    return parts @ np.array([1 << 16, 1 << 8, 1], np.uint32)
-
-
-def _parts(numbers: npt.NDArray[np.uint32]) -> npt.NDArray[np.uint8]:
-    """Return the red, green and blue [n, 3] of such numbers [n]."""
-    return np.stack([numbers >> 16, numbers >> 8 & 255, numbers & 255], axis=-1).astype(np.uint8)
-
-
-def _gif_head(size: tuple[int, int], palette: _Palette) -> bytes:
-    """Return a GIF's beginning: its size, the colours of all frames, and that it repeats."""
-    width, height = (side.to_bytes(2, "little") for side in size)
-    colours = palette.colours.tobytes().ljust(3 * 256, b"\0")
-    return (
-        b"GIF89a" + width + height + b"\xf7\0\0" + colours + b"!\xff\x0bNETSCAPE2.0\x03\x01\0\0\0"
-    )
-
-
-def _gif_frame(
-    pixels: npt.NDArray[np.uint8], before: npt.NDArray[np.uint8] | None, duration: int
-) -> list[bytes]:
-    """Return a frame's bytes: the rectangle that has changed, transparent where it has not."""
-    if before is None:
-        return GifImagePlugin.getdata(_indexed(pixels), duration=duration, disposal=1)
-    changed = pixels != before
-    rows, columns = np.flatnonzero(changed.any(axis=1)), np.flatnonzero(changed.any(axis=0))
-    if not len(rows):  # at least a pixel, or viewers would lose the time
-        rows = columns = np.zeros(1, np.int64)
-    box = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
-    piece = np.where(changed[box], pixels[box], np.uint8(_SAME))
-    return GifImagePlugin.getdata(
-        _indexed(piece),
-        (int(columns[0]), int(rows[0])),
-        duration=duration,
-        disposal=1,
-        transparency=_SAME,
-    )
-
-
-def _indexed(pixels: npt.NDArray[np.uint8]) -> Image.Image:
-    height, width = pixels.shape
-    return Image.frombytes("P", (width, height), pixels.tobytes())
+    counts: Counter[Any] = Counter()
+    for sample in samples:
+        found: Any = sample.getcolors(1 << 24)
+        counts.update({colour: n for n, colour in found})
+    left = np.array([colour for colour, _ in counts.most_common()])
+    kept: list[int] = []
+    while len(left) and len(kept) < 3 * 255:
+        kept += left[0].tolist()
+        left = left[np.abs(left - left[0]).max(axis=1) > 7]
+    palette = Image.new("P", (1, 1))
+    palette.putpalette(kept)
+    return palette

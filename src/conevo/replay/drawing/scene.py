@@ -3,110 +3,90 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
 from PIL import Image, ImageDraw
 
 from conevo.palette import FAINT, GROUND, INK
-from conevo.playback.schema import Playback, Things
-from conevo.replay.drawing.planes import (
-    Colours,
-    Mask,
-    Planes,
-    body_masks,
-    disc_mask,
-    line_mask,
-    ring_mask,
-    square_mask,
-)
-from conevo.replay.drawing.trails import Trails
+from conevo.playback import look
+from conevo.playback.schema import Playback
+from conevo.replay.drawing.mask import Mask
+from conevo.replay.drawing.things import Heap
 
-__all__ = ["Scene", "colours_of"]
+__all__ = ["Scene"]
 
 Floats = npt.NDArray[np.float64]
-_LEAST_RADIUS = 3.5  # px, of a body
-_RING_FRAMES = 15  # a ring says so long, at most until it has faded, that something is gone
-_SETTLED = 0.12  # opacity of what has been gone for long
-_ORDINARY, _FADING, _FAINT = range(3)
-
-
-def colours_of(playback: Playback, colour_by: str) -> list[list[str]]:
-    """Return the colours [T][R] that robots have, by "action" or by "caste"."""
-    if colour_by == "caste":
-        own = [playback.castes[robot.caste].colour for robot in playback.robots]
-        return [own] * playback.iterations
-    known = [*(action.colour for action in playback.actions), FAINT]  # -1 is the last
-    return [[known[a] for a in row] for row in playback.action.values.tolist()]
 
 
 class Scene:
     """Paints the world of a playback.
 
-    Order: backdrop, what stands still, trails, what moves, rings, bodies, what robots hold.
+    Order: backdrop, what stands still, trails, what moves, ranges, bodies, what robots hold.
 
     Args:
         playback: to be painted.
-        width: of the picture in px, even.
-        height: in px, even; both follow from the playback's bounds.
-        colours: planes to paint.
+        size: width and height of the picture in px; they follow from the playback's bounds.
         colour_by: "action" or "caste".
     """
 
-    def __init__(
-        self, playback: Playback, width: int, height: int, colours: Colours, colour_by: str
-    ) -> None:
-        self.playback = playback
-        self._size = (width, height)
+    def __init__(self, playback: Playback, size: tuple[int, int], colour_by: str) -> None:
+        self.playback, self._size, self._colour_by = playback, size, colour_by
         x0, y0, x1, y1 = playback.bounds
-        self._scale = max(width, height) / max(x1 - x0, y1 - y0)
-        self._own = colours_of(playback, colour_by)
-        self._others = [
-            playback.body_kinds[k].colour or INK for k in playback.body[len(playback.robots) :]
-        ]
+        self._scale = max(size) / max(x1 - x0, y1 - y0)
         self._places = self._pixels(playback.x.values, playback.y.values)  # [T, B, 2]
+        steps = np.abs(np.diff(self._places, axis=0)) / size
+        farthest: Floats = steps.max(axis=-1)
+        self._jumps = [np.flatnonzero(column > look.JUMP) + 1 for column in farthest.T]
         self._heading = playback.heading.values if playback.heading is not None else None
         self._action = playback.action.values
         self._held = playback.held.values if playback.held is not None else None
         self._groups = [
-            _Group(
-                things, self._pixels(things.x.values, things.y.values), self._length(things.size)
-            )
-            for things in playback.things
+            Heap(one, self._pixels(one.x.values, one.y.values), self._length(one.size))
+            for one in playback.things
         ]
-        floor = Planes.of(self._floor(), colours)
-        still = [group for group in self._groups if group.stands]
-        self._standing = _Standing(still[:1], floor)
-        self._trails = Trails(self._places, self._size, colours)
+        self._still = next((group for group in self._groups if group.is_still), None)
+        self._floor = self._painted_floor()
+        self._ground = self._floor.copy()
+        self._phase: npt.NDArray[np.int64] | None = None  # of what stands still on the ground
 
-    def at(self, t: int) -> Planes:
+    def at(self, t: int) -> Image.Image:
         """Return the world after iteration t."""
-        planes = self._standing.at(t).copy()
-        colours = [*self._own[t], *self._others]
-        self._trails.paint(planes, colours, t)
+        image, colours = self._ground_at(t), self._colours(t)
+        self._paint_trails(image, colours, t)
         for group in self._groups:
-            group.paint_moving(planes, t, has_standing=group is self._standing.group)
-        self._paint_rings(planes, t)
-        self._paint_bodies(planes, colours, t)
-        self._paint_held(planes, t)
-        return planes
+            group.paint_all(image, t, only_fading=group is self._still)
+        self._paint_ranges(image, t)
+        self._paint_bodies(image, colours, t)
+        self._paint_held(image, t)
+        return image
+
+    def _colours(self, t: int) -> list[str]:
+        """Return the colours of all bodies."""
+        playback, n = self.playback, len(self.playback.robots)
+        kinds = (playback.body_kinds[k] for k in playback.body[n:])
+        if self._colour_by == "caste":
+            own = [playback.castes[robot.caste].colour for robot in playback.robots]
+        else:
+            known = [*(action.colour for action in playback.actions), FAINT]  # -1 is the last
+            own = [known[a] for a in self._action[t].tolist()]
+        return [*own, *(kind.colour or INK for kind in kinds)]
 
     def _pixels(self, x: Floats, y: Floats) -> Floats:
         """Return places in px [..., 2] from the upper left corner, at most a world outside."""
         left, top = self.playback.bounds[0], self.playback.bounds[3]
         places = np.stack([(x - left) * self._scale, (top - y) * self._scale], axis=-1)
-        longer = max(self._size)
-        return places.clip(-longer, 2 * longer)
+        return places.clip(-max(self._size), 2 * max(self._size))
 
     def _length(self, length: float) -> float:
         """Return a length in px; more than the world is as good as the world."""
         return min(length * self._scale, float(max(self._size)))
 
-    def _floor(self) -> Image.Image:
+    def _painted_floor(self) -> Image.Image:
         """Return what never changes."""
         sharper = 4 if max(self._size) <= 1080 else 2  # drawn larger, then reduced
-        size = (self._size[0] * sharper, self._size[1] * sharper)
-        image = Image.new("RGB", size, GROUND)
+        image = Image.new("RGB", (self._size[0] * sharper, self._size[1] * sharper), GROUND)
         draw = ImageDraw.Draw(image)
         for part in self.playback.backdrop:
             fill, line = part.fill or None, part.line or None
@@ -129,146 +109,100 @@ class Scene:
                 image.paste(fill, (*at, at[0] + goal[0], at[1] + goal[1]), mask)
         return image.reduce(sharper)
 
-    def _paint_rings(self, planes: Planes, t: int) -> None:
+    def _ground_at(self, t: int) -> Image.Image:
+        """Return the floor with what stands still on it; only what has changed is painted again.
+
+        A pixel is the floor and the things over it in order of number, whatever was painted before.
+        """
+        if self._still is None:
+            return self._floor.copy()
+        before, phase = self._phase, self._still.phase(t)
+        boxes = [[0, 0, *self._size]]
+        if before is not None:
+            boxes = self._still.boxes[before != phase].tolist()
+        self._phase = phase
+        for x0, y0, x1, y1 in boxes:
+            if x0 < x1 and y0 < y1:
+                piece = self._floor.crop((x0, y0, x1, y1))
+                self._still.paint_within(piece, x0, y0, phase)
+                self._ground.paste(piece, (x0, y0))
+        return self._ground.copy()
+
+    def _paint_trails(self, image: Image.Image, colours: list[str], t: int) -> None:
+        """Paint where bodies have been lately, fainter the longer ago."""
+        first, long = max(t - look.TRAIL, 0), look.TRAIL // look.TRAIL_PIECES
+        for b, colour in enumerate(colours):
+            jumps = self._jumps[b]
+            cuts = [first, *jumps[(jumps > first) & (jumps <= t)].tolist(), t + 1]
+            for begin, end in pairwise(cuts):
+                path = self._places[begin:end, b]
+                low, high = path.min(axis=0), path.max(axis=0)
+                if (high - low).max() < 0.5:
+                    continue  # it stands still
+                mask = Mask(image, (*low, *high))
+                for k in reversed(range(look.TRAIL_PIECES)):
+                    some = slice(
+                        max(t - (k + 1) * long - begin, 0), max(t - k * long + 1 - begin, 0)
+                    )
+                    opacity = look.TRAIL_OPACITY * (1 - k / look.TRAIL_PIECES)
+                    mask.line(path[some], 1.0, opacity)
+                mask.paint(colour)
+
+    def _paint_ranges(self, image: Image.Image, t: int) -> None:
         for ring in self.playback.rings:
             if ring.when != "action" or ring.of != "robots":
                 continue
-            for r, a in enumerate(self._action[t].tolist()):
+            for (x, y), a in zip(self._places[t].tolist(), self._action[t].tolist(), strict=False):
                 radius = self._length(ring.radius[a]) if a >= 0 else 0.0
                 if radius > 0:
-                    colour = self.playback.actions[a].colour
-                    x, y = self._places[t, r]
-                    planes.paint(colour, *ring_mask(x, y, radius, 1.2, line=0.4, fill=0.1))
+                    mask = Mask(image, _around(x, y, radius + 1))
+                    mask.disc(x, y, radius + 0.5, look.RANGE_LINE)
+                    mask.disc(x, y, max(radius - 0.5, 0), look.RANGE_FILL)
+                    mask.paint(self.playback.actions[a].colour)
 
-    def _paint_bodies(self, planes: Planes, colours: list[str], t: int) -> None:
-        kinds = self.playback.body_kinds
+    def _paint_bodies(self, image: Image.Image, colours: list[str], t: int) -> None:
         # The team's robots come last, above all others.
         for b in reversed(range(len(colours))):
-            kind = kinds[self.playback.body[b]]
-            radius = max(self._length(kind.radius), _LEAST_RADIUS)
-            heading = None if self._heading is None else float(self._heading[t, b])
-            x, y = self._places[t, b]
-            surface, rim, at_x, at_y = body_masks(x, y, radius, kind.shape, heading)
-            planes.paint(colours[b], surface, at_x, at_y)
-            planes.paint(INK, rim, at_x, at_y)
+            kind = self.playback.body_kinds[self.playback.body[b]]
+            radius = max(self._length(kind.radius), look.LEAST_BODY)
+            angle = None if self._heading is None else float(self._heading[t, b])
+            x, y = self._places[t, b].tolist()
+            box = _around(x, y, look.KITE_TIP * radius)
+            if kind.shape == "square":
+                kite = _kite(x, y, radius, angle or 0.0)
+                Mask(image, box).polygon(kite).paint(colours[b])
+                Mask(image, box).line([*kite, kite[0]], 1.0).paint(INK)
+                continue
+            Mask(image, box).disc(x, y, radius).paint(colours[b])
+            rim = Mask(image, box).disc(x, y, radius).disc(x, y, radius - 1, 0.0)
+            if angle is not None:
+                ahead = (x + radius * math.cos(angle), y - radius * math.sin(angle))
+                rim.line([(x, y), ahead], 1.0)
+            rim.paint(INK)
 
-    def _paint_held(self, planes: Planes, t: int) -> None:
+    def _paint_held(self, image: Image.Image, t: int) -> None:
         """Paint what robots hold above them, with a line to it if it is elsewhere."""
         if self._held is None or not self._groups:
             return
-        group = self._groups[0]
-        for r, k in enumerate(self._held[t].tolist()):
+        group, held = self._groups[0], self._held[t].tolist()
+        for r, k in enumerate(held):
             if k >= 0:
-                x0, y0 = self._places[t, r]
-                x1, y1 = group.place(t, k)
-                if math.hypot(x1 - x0, y1 - y0) > _LEAST_RADIUS:
-                    planes.paint(INK, *line_mask(x0, y0, x1, y1, 1.2))
-        for k in sorted({k for k in self._held[t].tolist() if k >= 0}):
-            group.paint(planes, t, k)
+                ends = np.array([self._places[t, r], group.place(t, k)])
+                if math.dist(*ends) > look.LEAST_BODY:
+                    Mask(image, (*ends.min(axis=0), *ends.max(axis=0))).line(ends, 1.2).paint(INK)
+        for k in sorted({k for k in held if k >= 0}):
+            group.paint(image, t, k)
 
 
-class _Group:
-    """Things of one kind, ready to be painted; places in px."""
-
-    def __init__(self, things: Things, places: Floats, size: float) -> None:
-        self.things = things
-        self.stands = places.ndim == 2 and things.state is None
-        self.size = max(size, 0.8)
-        self.colours = [things.kinds[k].colour for k in things.kind.values.tolist()]
-        self._places = places
-        self._state = things.state.values if things.state is not None else None
-        if things.gone is not None:
-            self.gone = things.gone.values
-        else:
-            self.gone = np.full(len(self.colours), np.iinfo(np.int64).max)
-
-    def place(self, t: int, k: int) -> tuple[float, float]:
-        """Return where thing k is."""
-        x, y = self._places[k] if self._places.ndim == 2 else self._places[t, k]
-        return float(x), float(y)
-
-    def phase(self, t: int) -> npt.NDArray[np.int8]:
-        """Return whether things [K] are there, fade away or have left a faint mark."""
-        age = t - self.gone
-        return np.where(
-            age < 0, _ORDINARY, np.where(age < self.things.fade, _FADING, _FAINT)
-        ).astype(np.int8)
-
-    def mask(self, t: int, k: int, opacity: float, larger: float = 0.0) -> tuple[Mask, int, int]:
-        """Return thing k's mask and where to paint it."""
-        form = square_mask if self.things.shape == "square" else disc_mask
-        return form(*self.place(t, k), self.size + larger, opacity)
-
-    def paint(self, planes: Planes, t: int, k: int) -> None:
-        """Paint thing k, as faint as it is."""
-        age = t - int(self.gone[k])
-        part = min(max(age, 0) / self.things.fade, 1.0)
-        opacity = round((1.0 + (_SETTLED - 1.0) * part) * 32) / 32 if age >= 0 else 1.0
-        if age >= self.things.fade:
-            opacity = _SETTLED
-        if self._state is not None and age < 0:
-            rim = self.things.states[int(self._state[t, k])].colour
-            if rim:
-                planes.paint(rim, *self.mask(t, k, 1.0, larger=2.0))
-        planes.paint(self.colours[k], *self.mask(t, k, opacity))
-        if 0 <= age < _RING_FRAMES:
-            shown = 1 - age / _RING_FRAMES
-            radius = self.size + 2 + 1.2 * age
-            planes.paint(self.colours[k], *ring_mask(*self.place(t, k), radius, 1.5, line=shown))
-
-    def paint_moving(self, planes: Planes, t: int, has_standing: bool) -> None:
-        """Paint all things, or those that fade if the others are there already."""
-        phase = self.phase(t)
-        wanted = np.flatnonzero(phase == _FADING) if has_standing else range(len(phase))
-        for k in wanted:
-            self.paint(planes, t, int(k))
+def _around(x: float, y: float, reach: float) -> tuple[float, float, float, float]:
+    return x - reach, y - reach, x + reach, y + reach
 
 
-class _Standing:
-    """Things that cannot be moved, on the floor: only what changes is painted again.
-
-    A pixel is the floor and the things over it in order of number, whatever was painted before.
-    """
-
-    def __init__(self, groups: list[_Group], floor: Planes) -> None:
-        self.group = groups[0] if groups else None
-        self._floor = floor
-        self._planes = floor.copy()
-        self._shown: npt.NDArray[np.int8] | None = None
-        if self.group is not None:
-            width, height = floor.size
-            masks = (self.group.mask(0, k, 1.0) for k in range(len(self.group.colours)))
-            corners = np.array([(x + m.x, y + m.y, *m.full.size) for m, x, y in masks])
-            corners = corners.reshape(-1, 4)
-            corners[:, 2:] += corners[:, :2]
-            self._boxes = np.clip(corners, 0, (width, height, width, height))
-
-    def at(self, t: int) -> Planes:
-        """Return floor and things after iteration t; not to be changed."""
-        if self.group is None:
-            return self._floor
-        wanted = self.group.phase(t)
-        shown, self._shown = self._shown, wanted
-        if shown is None:
-            width, height = self._floor.size
-            self._paint_again(t, (0, 0, width, height))
-        else:
-            for k in np.flatnonzero(shown != wanted):
-                x0, y0, x1, y1 = self._boxes[k].tolist()
-                if x0 < x1 and y0 < y1:
-                    self._paint_again(t, (x0, y0, x1, y1))
-        return self._planes
-
-    def _paint_again(self, t: int, box: tuple[int, int, int, int]) -> None:
-        """Paint all that is inside a box."""
-        assert self.group is not None
-        assert self._shown is not None
-        x0, y0, x1, y1 = box
-        piece = self._floor.crop(*box)
-        boxes = self._boxes
-        inside = (boxes[:, 0] < x1) & (boxes[:, 2] > x0) & (boxes[:, 1] < y1) & (boxes[:, 3] > y0)
-        for k in np.flatnonzero(inside & (self._shown != _FADING)).tolist():
-            opacity = 1.0 if self._shown[k] == _ORDINARY else _SETTLED
-            mask, x, y = self.group.mask(t, k, opacity)
-            piece.paint(self.group.colours[k], mask, x - x0, y - y0)
-        self._planes.put(piece, x0, y0)
+def _kite(x: float, y: float, radius: float, angle: float) -> list[tuple[float, float]]:
+    """Return the corners of what is not of the team: it points ahead and looks like no robot."""
+    reaches = (look.KITE_TIP, *(look.KITE_SIDE,) * 3)
+    turns = (angle + k * math.pi / 2 for k in range(4))
+    return [
+        (x + radius * reach * math.cos(turn), y - radius * reach * math.sin(turn))
+        for reach, turn in zip(reaches, turns, strict=True)
+    ]

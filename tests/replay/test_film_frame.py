@@ -11,21 +11,21 @@ from conevo import palette
 from conevo.errors import UsageError
 from conevo.playback.channel import Channel
 from conevo.playback.schema import Backdrop, BodyKind, Kind, Ring, Things
+from conevo.replay.drawing.mask import Mask
 from conevo.replay.drawing.panel import PAGE, Panel
-from conevo.replay.drawing.planes import RGB, YUV, Planes, disc_mask, even
 from conevo.replay.drawing.scene import Scene
-from conevo.replay.drawing.strip import Strip
-from conevo.replay.picture import Painter
+from conevo.replay.drawing.timeline import Timeline
+from conevo.replay.film_frame import Painter
 from replay.filmed import BUILT, GONE, SIZE, T, mixed, near, playback, rgb
 
 
-def world(made, t, colour_by="action", colours=RGB):
-    return Scene(made, SIZE, SIZE, colours, colour_by).at(t)
+def world(made, t, colour_by="action"):
+    return Scene(made, (SIZE, SIZE), colour_by).at(t)
 
 
 def pixel(made, t, x, y, colour_by="action"):
     """Return the colour at a place of the world."""
-    picture = world(made, t, colour_by).picture()
+    picture = world(made, t, colour_by)
     scale = SIZE / 10
     return picture.getpixel((int(x * scale), int((10 - y) * scale)))
 
@@ -47,12 +47,25 @@ def test_a_trail_of_120_positions_stays_behind():
     both = {"x": Channel.of(np.stack([x, x], axis=1)), "y": Channel.of(np.tile([2.0, 5.0], (t, 1)))}
     action = Channel.of(np.ones((t, 2), int))
     made = playback(iterations=t, action=action, things=(), plan=(), **both)
-    # Between two rows of pixels: each has half of a line 1.4 px wide, at opacity 0.4.
-    line = mixed(palette.BLUE, palette.GROUND, 0.28)
-    for x in (2.6, 5.0, 7.5):
-        assert near(pixel(made, t - 1, x, 2), line, by=8)
+    # One of these four rows of pixels, or two of them, hold the line, which fades.
+    shown = np.asarray(world(made, t - 1))[190:194].mean(axis=0)
+    for x, opacity in ((8.0, 0.5), (6.8, 0.375), (5.0, 0.25), (3.3, 0.125)):
+        line = mixed(palette.BLUE, palette.GROUND, opacity / 4)
+        assert near(shown[int(24 * x)], line, by=2)
     assert pixel(made, t - 1, 2.2, 2) == rgb(palette.GROUND)
     assert pixel(made, 60, 7.5, 2) == rgb(palette.GROUND)
+
+
+def test_who_leaves_on_one_side_and_enters_on_the_other_draws_no_line_across():
+    for name, low, high in (("x", 0.5, 9.5), ("y", 9.5, 0.5), ("x", 3.0, 7.5)):
+        still, moves = np.full((T, 1), 5.0), np.where(np.arange(T)[:, None] < 20, low, high)
+        places = {"x": Channel.of(still), "y": Channel.of(still), name: Channel.of(moves)}
+        action = Channel.of(np.ones((T, 1), int))
+        made = playback(
+            action=action, robots=playback().robots[:1], body=(0,), things=(), plan=(), **places
+        )
+        is_crossed = pixel(made, 20, 5, 5) != rgb(palette.GROUND)
+        assert is_crossed == (abs(high - low) <= 5)
 
 
 def test_robots_have_the_colour_of_their_caste_if_wanted():
@@ -75,10 +88,10 @@ def test_rocks_fade_from_the_iteration_in_which_they_are_detected():
 @pytest.mark.parametrize("age", [0, 9])
 def test_a_ring_widens_where_something_was_detected(age):
     made = playback(rings=())
-    bare = np.asarray(world(replace(made, things=()), GONE + age).picture())
-    changed = np.argwhere((np.asarray(world(made, GONE + age).picture()) != bare).any(axis=-1))
+    bare = np.asarray(world(replace(made, things=()), GONE + age))
+    changed = np.argwhere((np.asarray(world(made, GONE + age)) != bare).any(axis=-1))
     around = changed[np.abs(changed - (48, 144)).max(axis=1) < 36]
-    assert np.ptp(around[:, 1]) / 2 == pytest.approx(0.4 * 24 + 2 + 1.2 * age, abs=1.5)
+    assert np.ptp(around[:, 1]) / 2 == pytest.approx(0.4 * 24 + 14 * (age + 1) / 15, abs=1.5)
 
 
 def test_what_stands_still_is_there_below_everything():
@@ -105,8 +118,8 @@ def test_rings_are_filled_faintly_for_the_actions_that_have_one():
 def test_headings_point_counter_clockwise_from_the_right():
     heading = Channel.of(np.full((T, 2), np.pi / 2))
     made = playback(heading=heading, body_kinds=(BodyKind("robot", 1.0),), rings=())
-    # Between two columns of pixels: each has half of a line 1.3 px wide.
-    assert near(pixel(made, 0, 3, 7.5), mixed(palette.INK, palette.ORANGE, 0.65), by=25)
+    # Between two columns of pixels: each has half of a line 1 px wide.
+    assert near(pixel(made, 0, 3, 7.5), mixed(palette.INK, palette.ORANGE, 0.5), by=25)
     for x, y in ((3, 6.5), (2.5, 7), (3.5, 7)):
         assert pixel(made, 0, x, y) == rgb(palette.ORANGE)
 
@@ -142,7 +155,7 @@ def test_what_is_held_lies_above_its_robot_with_a_rim():
 def test_nothing_is_drawn_outside_the_world():
     edge = {name: Channel.of(np.full((T, 2), 9.99)) for name in ("x", "y")}
     frames = [np.asarray(Painter([playback(**edge)], SIZE).frame(t)) for t in (0, 9)]
-    panel = Panel(playback(**edge), SIZE, RGB, "action", alone=True)
+    panel = Panel(playback(**edge), SIZE, "action", alone=True)
     x0, y0, x1, y1 = panel.world
     for frame in frames:
         border = frame[y0 - 1, x0 - 1 : x1 + 1]
@@ -155,25 +168,24 @@ def test_nothing_is_drawn_outside_the_world():
 
 
 def test_the_timeline_shows_every_action_robots_ordered_by_caste():
-    strip = Strip(playback(), RGB, 212, SIZE)
-    page = Planes.of(Image.new("RGB", (212, strip.height), PAGE), RGB)
+    strip = Timeline(playback(), 212, SIZE)
+    page = Image.new("RGB", (212, strip.height), PAGE)
     strip.paint(page, 0, 0, T - 1)
-    picture = page.picture()
     assert strip.order == [1, 0]
     first, second = (k * strip.row + strip.row // 2 for k in (0, 1))
-    assert picture.getpixel((2, first)) == rgb(palette.GREEN)
-    assert picture.getpixel((2, second)) == rgb(palette.FAINT)
-    assert picture.getpixel((100, first)) == rgb(palette.BLUE)
-    assert picture.getpixel((12 + 140, second)) == rgb(palette.ORANGE)
-    assert picture.getpixel((12 + 160, second)) == rgb(palette.FAINT)
+    assert page.getpixel((2, first)) == rgb(palette.GREEN)
+    assert page.getpixel((2, second)) == rgb(palette.FAINT)
+    assert page.getpixel((100, first)) == rgb(palette.BLUE)
+    assert page.getpixel((12 + 140, second)) == rgb(palette.ORANGE)
+    assert page.getpixel((12 + 160, second)) == rgb(palette.FAINT)
 
 
 def test_a_robot_that_switches_all_the_time_never_looks_like_one_that_does_not():
     action = np.stack([np.arange(T) % 2, np.ones(T, int)], axis=1)
-    strip = Strip(playback(action=Channel.of(action)), RGB, 32, SIZE)  # two iterations to a column
-    page = Planes.of(Image.new("RGB", (32, strip.height), PAGE), RGB)
+    strip = Timeline(playback(action=Channel.of(action)), 32, SIZE)  # two iterations to a column
+    page = Image.new("RGB", (32, strip.height), PAGE)
     strip.paint(page, 0, 0, T - 1)
-    rows = np.asarray(page.picture())[:, 12:30]
+    rows = np.asarray(page)[:, 12:30]
     constant, switching = rows[: strip.row - 1], rows[strip.row : 2 * strip.row - 1]
     assert (constant == rgb(palette.BLUE)).all()
     for colour in (palette.ORANGE, palette.BLUE):
@@ -181,35 +193,35 @@ def test_a_robot_that_switches_all_the_time_never_looks_like_one_that_does_not()
 
 
 def test_the_playhead_stands_where_time_is_and_what_is_to_come_is_pale():
-    strip = Strip(playback(), RGB, 212, SIZE)
-    assert [strip.head(t) for t in (9, 19, 39)] == [60, 110, 210]
-    page = Planes.of(Image.new("RGB", (220, strip.height), PAGE), RGB)
+    strip = Timeline(playback(), 212, SIZE)
+    assert [strip.head(t) for t in (9, 19, 39)] == [61, 111, 210]
+    page = Image.new("RGB", (220, strip.height), PAGE)
     strip.paint(page, 4, 0, 19)
-    row = np.asarray(page.picture())[strip.row // 2]
-    assert (row[114:116] == rgb(palette.INK)).all()
-    assert (row[17:114] == rgb(palette.BLUE)).all()
+    row = np.asarray(page)[strip.row // 2]
+    assert (row[115:117] == rgb(palette.INK)).all()
+    assert (row[17:115] == rgb(palette.BLUE)).all()
     pale = mixed(palette.BLUE, "#ffffff", 0.28)
-    assert all(near(one, pale) for one in row[116:216].tolist())
+    assert all(near(one, pale) for one in row[117:216].tolist())
 
 
 def test_the_playhead_is_in_the_frame():
-    panel = Panel(playback(), SIZE, RGB, "action", alone=True)
+    panel = Panel(playback(), SIZE, "action", alone=True)
     frame = Painter([playback()], SIZE).frame(19)
-    x, y = panel.strip_at
-    assert frame.getpixel((x + panel.strip.head(19), y + 1)) == rgb(palette.INK)
+    x, y = panel.timeline_at
+    assert frame.getpixel((x + panel.timeline.head(19), y + 1)) == rgb(palette.INK)
 
 
 def test_the_plan_fills_as_it_is_built():
     painter = Painter([playback(rings=())], SIZE)
     frames = [np.asarray(painter.frame(t)) for t in (BUILT - 1, BUILT)]
-    x = Panel(playback(), SIZE, RGB, "action", alone=True).world[2] + 4
+    x = Panel(playback(), SIZE, "action", alone=True).world[2] + 4
     count = [(f[:, x:] == rgb(palette.VERMILION)).all(axis=-1).sum() for f in frames]
     assert count[1] - count[0] == 10 * 10  # one of two parts
 
 
 def test_numbers_move_with_time():
     painter = Painter([playback()], SIZE)
-    panel = Panel(playback(), SIZE, RGB, "action", alone=True)
+    panel = Panel(playback(), SIZE, "action", alone=True)
     left, top = panel.world[2], panel.world[1]
     number = [np.asarray(painter.frame(t))[top : top + 16, left + 2 :] for t in (3, 4)]
     assert (number[0] != number[1]).any()
@@ -224,21 +236,21 @@ def test_a_frame_does_not_depend_on_those_before(colour_by):
     for t in (0, 30, GONE, 12, GONE - 1, 39, GONE + 3, 0, 21):
         fresh = Painter([playback(), playback(subtitle="MESP")], SIZE, colour_by)
         assert painter.frame(t).tobytes() == fresh.frame(t).tobytes()
-        assert painter.video(t) == fresh.video(t)
 
 
 def test_two_teams_stand_side_by_side_each_under_its_name():
     other = playback(x=Channel.of(np.full((T, 2), 8.0)), subtitle="MESP")
     painter = Painter([playback(), other], SIZE)
-    panel = Panel(playback(), SIZE, RGB, "action", alone=False)
-    assert painter.size[0] == 2 * panel.size[0]
+    panel = Panel(playback(), SIZE, "action", alone=False)
+    wide = panel.background.width
+    assert painter.size[0] == 2 * wide
     frame = painter.frame(0)
     x0, y0, x1, y1 = panel.world
     y = y1 - round(2 * (y1 - y0) / 10)
     scale = (x1 - x0) / 10
     assert frame.getpixel((x0 + round(2 * scale), y)) == rgb(palette.BLUE)
-    assert frame.getpixel((panel.size[0] + x0 + round(8 * scale), y)) == rgb(palette.BLUE)
-    heads = [np.asarray(frame.crop((dx + x0, 0, dx + x1, y0 - 2))) for dx in (0, panel.size[0])]
+    assert frame.getpixel((wide + x0 + round(8 * scale), y)) == rgb(palette.BLUE)
+    heads = [np.asarray(frame.crop((dx + x0, 0, dx + x1, y0 - 2))) for dx in (0, wide)]
     assert (heads[0] != heads[1]).any()
 
 
@@ -253,50 +265,36 @@ def test_a_shorter_epoch_stays_at_its_end():
     assert painter.frame(5).crop(half) != painter.frame(9).crop(half)
 
 
-def test_video_holds_the_same_picture():
-    painter = Painter([playback()], SIZE)
-    width, height = painter.size
-    assert (width % 2, height % 2) == (0, 0)
-    planes = np.frombuffer(painter.video(10), np.uint8)
-    assert planes.size == width * height * 3 // 2
-    luma = planes[: width * height].reshape(height, width).astype(float)
-    weights = np.array([0.2126, 0.7152, 0.0722]) * 219 / 255
-    pixels = np.asarray(painter.frame(10)).astype(float)
-    assert np.abs(luma - (pixels @ weights + 16)).max() <= 2
-    chroma = planes[width * height :].reshape(2, height // 2, width // 2).astype(float)
-    four = pixels.reshape(height // 2, 2, width // 2, 2, 3).mean(axis=(1, 3))
-    for plane, weights in zip(chroma, np.array(YUV.matrix)[1:] / 255, strict=True):
-        off = np.abs(plane - (four @ weights + 128))  # edges are mixed at half the resolution
-        assert off.max() <= 16
-        assert off.mean() < 0.3
-
-
-def test_colours_of_video_are_those_of_bt_709():
-    assert YUV.of("#ffffff") == (235, 128, 128)
-    assert YUV.of("#000000") == (16, 128, 128)
-    assert YUV.of("#0000ff")[1] == 240
-    assert YUV.of("#ff0000")[2] == 240
-
-
-def test_masks_are_where_they_are_said_to_be():
-    for x in (30.0, 30.25, 31.5, 33.75):
-        mask, left, top = disc_mask(x, 20.0, 5.0)
-        shown = np.asarray(mask.full) / 255
+@pytest.mark.parametrize("radius", [5.0, 40.0])
+def test_shapes_are_where_they_are_said_to_be_and_as_large(radius):
+    for x in (50.0, 50.25, 51.5, 53.75):
+        image = Image.new("RGB", (110, 100))
+        Mask(image, (x - radius, 50 - radius, x + radius, 50 + radius)).disc(x, 50, radius).paint(
+            "#fff"
+        )
+        shown = np.asarray(image)[..., 0] / 255
         total = shown.sum()
-        middle = (shown.sum(axis=0) @ (np.arange(shown.shape[1]) + 0.5)) / total
-        assert left % 2 == 0 == top % 2
-        assert left + mask.x + middle == pytest.approx(x, abs=0.02)
-        assert total == pytest.approx(np.pi * 25, rel=0.02)
+        assert shown.sum(axis=0) @ (np.arange(110) + 0.5) / total == pytest.approx(x, abs=0.3)
+        assert total == pytest.approx(np.pi * radius**2, rel=0.04)
+
+
+def test_a_shape_beyond_an_edge_is_cut_and_not_moved():
+    whole, piece = Image.new("RGB", (60, 60)), Image.new("RGB", (60, 60))
+    corner = piece.crop((20, 20, 60, 60))
+    for image, x in ((whole, 25.3), (corner, 5.3)):
+        Mask(image, (x - 20, x - 20, x + 20, x + 20)).disc(x, x, 20).paint("#fff")
+    assert whole.crop((20, 20, 60, 60)).tobytes() == corner.tobytes()
 
 
 @pytest.mark.parametrize("size", [121, 333])
 def test_any_size_and_shape_of_world_fits(size):
     made = playback(bounds=(-5.0, 0.0, 15.0, 10.0))
     painter = Painter([made], size)
-    panel = Panel(made, even(size), RGB, "action", alone=True)
+    panel = Panel(made, size, "action", alone=True)
     x0, y0, x1, y1 = panel.world
-    assert (x1 - x0, y1 - y0) == (even(size), even(even(size) / 2))
+    assert (x1 - x0, y1 - y0) == (size, round(size / 2))
     assert painter.frame(0).size == painter.size
+    assert [side % 2 for side in painter.size] == [0, 0]
 
 
 def test_a_single_iteration_and_a_hostile_range_can_be_drawn():
