@@ -27,7 +27,6 @@ NOT_YET = (
     "CHANGELOG.md",
     "benchmarks/README.md",
     "docs/fidelity.md",
-    "docs/method.md",
     "docs/results/calibration.md",
     "docs/results/gacc.md",
     "docs/results/learning.md",
