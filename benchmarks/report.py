@@ -35,8 +35,9 @@ MEASURED = """
 import json, resource, sys, time
 from pathlib import Path
 began = time.perf_counter()
+from conevo.campaigns.campaign import Campaign
 from conevo.report.files import write_report
-page = write_report(Path(sys.argv[1]), Path(sys.argv[2]))
+page = write_report(Campaign(Path(sys.argv[1])), Path(sys.argv[2]))
 spent = resource.getrusage(resource.RUSAGE_SELF)
 print(json.dumps({
     "wall": time.perf_counter() - began,

@@ -152,12 +152,12 @@ def made_with(campaign: Campaign) -> str:
 
 def main() -> None:
     """Write the report and the page."""
-    campaign = sealed(Campaign(Path(sys.argv[1])))
+    campaign = Campaign(Path(sys.argv[1]))
     folder = Path(sys.argv[2])
-    write_report(campaign.path, folder / "report")
     shutil.copyfile(campaign.places.plan, folder / "plan.toml")
     page = folder / "README.md"
-    with Tables(campaign.places.tables) as tables:
+    with sealed(campaign) as sources, Tables(sources) as tables:
+        write_report(campaign, folder / "report", sources)
         pages.put(made_with(campaign) + "\n" + cost_table(tables), page, "cost")
         pages.put(performance_table(tables), page, "performance")
         pages.put(comparison_table(tables), page, "comparisons")

@@ -189,7 +189,7 @@ def test_both_stages_are_one_run_in_the_tables(campaign: Campaign, label: str) -
 
 
 def test_the_report_compares_it_with_both(campaign: Campaign, tmp_path: Path) -> None:
-    text = write_report(campaign.path, tmp_path / "report").read_text()
+    text = write_report(campaign, tmp_path / "report").read_text()
     assert "first=homcne" in text
     assert "a stage" not in text
 

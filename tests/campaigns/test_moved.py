@@ -17,7 +17,7 @@ from conevo.campaigns.plan_file import read_plan
 from conevo.campaigns.tables import Tables
 from conevo.cli.main import main
 from conevo.errors import UsageError
-from conevo.report.sections.overview import overview, read_campaign
+from conevo.report.sections.overview import overview
 from conevo.runs.code import current_code
 from conevo.runs.run import Run
 from conevo.runs.store import Store
@@ -147,7 +147,7 @@ def test_other_code_does_not_carry_a_campaign_on_unless_it_is_accepted(
     with pytest.raises(SystemExit, match="0"):
         main(start)
     with Tables(made.places.tables) as tables:
-        text = " ".join(overview(tables, read_campaign(made.path)).text)
+        text = " ".join(overview(tables, made).text)
     assert "runs of rover-v2/complex-1 that are compared here were made by different code" in text
 
 

@@ -15,7 +15,6 @@ from conevo.campaigns.schema import SCHEMA
 from conevo.campaigns.tables import Tables
 from conevo.reading import read_json
 from conevo.report.files import sections_of
-from conevo.report.sections.overview import read_campaign
 from conevo.runs.run import Run
 from conevo.studies.signal import signal_of_run
 
@@ -52,8 +51,8 @@ def test_a_study_that_a_plan_gets_later_is_all_that_is_missing(campaign) -> None
             study = read_json(campaign.places.study(label, "signal"))["signal"]
             rows = [tuple(row[name] for name in columns) for row in study]
             assert tables.query(sql)[1] == rows
-        about = read_campaign(campaign.path, campaign.places.tables)
-        titles = [part.title for section in sections_of(tables, about) for part in section.sections]
+        sections = sections_of(tables, campaign)
+        titles = [part.title for section in sections for part in section.sections]
     assert "Signal" in titles
 
 

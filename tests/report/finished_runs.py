@@ -120,7 +120,8 @@ def write_campaign(
         if name not in without:
             _write(root / "tables" / f"{name}.parquet", SCHEMA[name], parts)
     (root / "plan.toml").write_text(
-        '[campaign]\nname = "made"\ntitle = "Runs that nobody ran"\nproduces = ["figure 5.6"]\n'
+        '[campaign]\nname = "made"\ntitle = "Runs that nobody ran"\nproduces = ["figure 5.6"]\n\n'
+        '[factors]\nworld = ["rover/complex-1"]\nmethod = ["cone"]\n'
     )
     with (root / "runs.jsonl").open("w") as file:
         for label, cell, seed in [
@@ -128,10 +129,12 @@ def write_campaign(
             *((f"failed-{k}", of[0], k) for k in range(len(failed))),
         ]:
             about = {"label": label, "method": cell.method, "seed": seed, "preset": cell.preset}
+            about |= {"world": f"{cell.world}/{cell.environment}", "variant": cell.variant}
+            about |= {"overrides": {}, "shape": False, "studies": [], "run_ids": ["0" * 12]}
             file.write(json.dumps(about) + "\n")
     (root / "ended").mkdir()
     for k, message in enumerate(failed):
-        ended = {"status": "failed", "origin": "machine", "message": message, "traceback": ""}
+        ended = {"status": "failed", "origin": "machine", "message": message, "core_seconds": 0.0}
         (root / "ended" / f"failed-{k}.json").write_text(json.dumps(ended))
     return root
 

@@ -13,6 +13,7 @@ import duckdb
 import numpy as np
 import pytest
 
+from conevo.campaigns.campaign import Campaign
 from conevo.campaigns.tables import Tables
 from conevo.errors import UsageError
 from conevo.report.files import sections_of, write_report
@@ -21,7 +22,6 @@ from conevo.report.sections.behaviours import behaviours
 from conevo.report.sections.castes import castes
 from conevo.report.sections.champions import champions
 from conevo.report.sections.interventions import lesions
-from conevo.report.sections.overview import read_campaign
 from conevo.report.sections.scope import scopes
 from report.finished_runs import Cell, cells, mean_of, write_campaign
 
@@ -40,7 +40,7 @@ def campaign(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def report(campaign: Path) -> Path:
-    return write_report(campaign, campaign / "report").parent
+    return write_report(Campaign(campaign), campaign / "report").parent
 
 
 def rows_of(path: Path) -> list[dict[str, str]]:
@@ -252,7 +252,7 @@ def test_every_exhibit_has_its_numbers_and_every_table_its_latex(report) -> None
 
 
 def test_the_same_tables_give_the_same_bytes(report, campaign, tmp_path) -> None:
-    again = write_report(campaign, tmp_path / "again").parent
+    again = write_report(Campaign(campaign), tmp_path / "again").parent
     for path in report.rglob("*.*"):
         assert path.read_bytes() == (again / path.relative_to(report)).read_bytes(), path.name
 
@@ -270,20 +270,20 @@ def empty(folder: Path) -> Path:
 def test_only_an_unchanged_report_is_replaced(tmp_path) -> None:
     root = empty(tmp_path)
     out = tmp_path / "out"
-    page = write_report(root, out)
-    assert write_report(root, out) == page
+    page = write_report(Campaign(root), out)
+    assert write_report(Campaign(root), out) == page
     page.write_text(page.read_text() + "<!-- mine -->")
     with pytest.raises(UsageError, match=r"index\.html was changed"):
-        write_report(root, out)
+        write_report(Campaign(root), out)
     assert page.read_text().endswith("<!-- mine -->")
-    write_report(root, tmp_path / "other")
+    write_report(Campaign(root), tmp_path / "other")
     (tmp_path / "other" / "notes.txt").write_text("mine")
     with pytest.raises(UsageError, match=r"notes\.txt was changed"):
-        write_report(root, tmp_path / "other")
+        write_report(Campaign(root), tmp_path / "other")
     (tmp_path / "own").mkdir()
     (tmp_path / "own" / "thesis.tex").write_text("mine")
     with pytest.raises(UsageError, match="is not a report"):
-        write_report(root, tmp_path / "own")
+        write_report(Campaign(root), tmp_path / "own")
     assert (tmp_path / "own" / "thesis.tex").read_text() == "mine"
     assert sorted(path.name for path in tmp_path.iterdir()) == ["camp", "other", "out", "own"]
 
@@ -295,7 +295,7 @@ def test_budgets_stand_apart(tmp_path) -> None:
     ]
     root = write_campaign(tmp_path / "c", of, 2, 3)
     with Tables(root / "tables") as tables:
-        sections = sections_of(tables, read_campaign(root))
+        sections = sections_of(tables, Campaign(root))
     groups = [section for section in sections if section.sections]
     assert [section.name for section in groups] == ["rover-complex", "rover-complex-budget-2"]
     assert [section.title for section in groups] == [
@@ -324,7 +324,7 @@ def test_budgets_stand_apart(tmp_path) -> None:
 )
 def test_odd_campaigns_have_a_report_too(of, tmp_path) -> None:
     root = write_campaign(tmp_path / "c", of, 1, 2, without=["behaviours", "robots", "castes"])
-    text = write_report(root, tmp_path / "out").read_text()
+    text = write_report(Campaign(root), tmp_path / "out").read_text()
     assert text.count("There is one run per cell: no deviation, no interval, and nothing") == 1
     assert "Mann-Whitney" not in re.sub(r"(?s)<section id=.section-claims.*?</section>", "", text)
     assert "95 % interval" not in re.sub(r"(?s)<section id=.section-claims.*?</section>", "", text)
@@ -336,7 +336,7 @@ def test_many_variants_are_tables_where_drawings_could_not_be_read(tmp_path) -> 
         for n in (1, 2)
         for k in range(1, 10)
     ]
-    out = write_report(write_campaign(tmp_path / "c", of, 2, 2), tmp_path / "out").parent
+    out = write_report(Campaign(write_campaign(tmp_path / "c", of, 2, 2)), tmp_path / "out").parent
     assert sorted(path.name for path in (out / "figures").glob("*")) == []
     for name in ("runs", "learning", "specialization", "lesion", "clones", "performance"):
         assert (out / f"tables/rover-complex-{name}.tex").is_file(), name
@@ -346,7 +346,7 @@ def test_many_variants_are_tables_where_drawings_could_not_be_read(tmp_path) -> 
 def test_a_world_where_nothing_was_achieved_has_no_losses(tmp_path) -> None:
     of = cells(["rover/complex-1"], ["mesp", "cone"])
     root = write_campaign(tmp_path / "c", of, 2, 3, mean=lambda cell: -1e6)
-    text = write_report(root, tmp_path / "out").read_text()
+    text = write_report(Campaign(root), tmp_path / "out").read_text()
     assert (
         len(re.findall(r"Teams left out, as neither they nor the unchanged ones scored: \d+", text))
         == 2
@@ -355,7 +355,7 @@ def test_a_world_where_nothing_was_achieved_has_no_losses(tmp_path) -> None:
 
 def test_a_campaign_without_a_finished_run_says_so(tmp_path) -> None:
     root = empty(tmp_path)
-    text = write_report(root, tmp_path / "out").read_text()
+    text = write_report(Campaign(root), tmp_path / "out").read_text()
     assert "Runs finished: 0 of 4 planned; failed: 0; not ended: 4." in text
 
 

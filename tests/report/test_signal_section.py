@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from conevo.campaigns.campaign import Campaign
 from conevo.campaigns.tables import Tables
 from conevo.report.files import write_report
 from conevo.report.sections.comparisons import comparisons
@@ -68,7 +69,7 @@ def test_without_a_study_there_is_no_section(tmp_path) -> None:
 
 
 def test_a_report_has_the_table_in_all_its_forms(folder, tmp_path) -> None:
-    report = write_report(folder, tmp_path / "report").parent
+    report = write_report(Campaign(folder), tmp_path / "report").parent
     assert "not tested: no signal" in (report / "index.html").read_text()
     assert (report / "tables" / "rover-complex-signal.tex").is_file()
     head, *rows = (report / "numbers" / "rover-complex-signal.csv").read_text().splitlines()

@@ -7,9 +7,10 @@ from typing import Literal
 
 from typing_extensions import TypedDict
 
+from conevo.errors import ConevoError
 from conevo.reading import DamagedFile, read_json
 
-__all__ = ["Ended", "read_ended"]
+__all__ = ["Ended", "failures", "read_ended"]
 
 
 class Ended(TypedDict):
@@ -37,9 +38,35 @@ def read_ended(path: Path) -> Ended | None:
     if not path.is_file():
         return None
     try:
-        found = read_json(path, Ended)
+        return _read(path)
     except DamagedFile:
         return None
+
+
+def failures(folder: Path) -> tuple[dict[str, Ended], dict[str, str]]:
+    """Return the runs of which the last worker failed, and the files that cannot be read.
+
+    Args:
+        folder: with a file for each run that a worker has left.
+
+    Returns:
+        Label -> how it ended; name of a file -> why it cannot be read.
+    """
+    failed: dict[str, Ended] = {}
+    unread: dict[str, str] = {}
+    for path in sorted(folder.glob("*.json")):
+        try:
+            ended = _read(path)
+        except ConevoError as error:
+            unread[path.name] = str(error)
+        else:
+            if ended["status"] == "failed":
+                failed[path.stem] = ended
+    return failed, unread
+
+
+def _read(path: Path) -> Ended:
+    found = read_json(path, Ended)
     return Ended(
         status=found["status"],
         origin=found["origin"],

@@ -31,7 +31,7 @@ from conevo.runs.store import Store
 from conevo.studies.exchange import exchanged
 from conevo.studies.records import SignalStudy, Study
 
-__all__ = ["is_sealed", "seal_tables"]
+__all__ = ["is_sealed", "left_out", "seal_tables"]
 
 MANIFEST = "tables.json"
 Row = dict[str, Any]
@@ -78,18 +78,18 @@ def seal_tables(
     with writing(folder), draft_of(folder) as draft:
         draft.mkdir()
         files = {name: (draft / f"{name}.jsonl").open("w", encoding="utf-8") for name in SCHEMA}
-        left_out: dict[str, str] = {}
+        damaged: dict[str, str] = {}
         for planned in finished:
             cost = max(spent.get(planned.label, 0.0), _last_cost(places, planned.label))
             try:
                 rows = list(_rows(places, planned, cost))
             except ConevoError as error:
-                left_out[planned.label] = str(error)
+                damaged[planned.label] = str(error)
                 continue
             for table, row in rows:
                 files[table].write(json.dumps(row, allow_nan=False) + "\n")
-        if len(left_out) == len(finished) > 0:
-            raise DamagedFile(next(iter(left_out.values())))
+        if len(damaged) == len(finished) > 0:
+            raise DamagedFile(next(iter(damaged.values())))
         for file in files.values():
             file.close()
         for table, columns in SCHEMA.items():
@@ -99,10 +99,17 @@ def seal_tables(
                 f"columns={columns})) TO {_quoted(target)} (FORMAT parquet, COMPRESSION zstd)"
             )
             source.unlink()
-        replace_file(draft / MANIFEST, as_json(_manifest(finished) | {"left_out": left_out}))
+        replace_file(draft / MANIFEST, as_json(_manifest(finished) | {"left_out": damaged}))
         shutil.rmtree(folder, ignore_errors=True)
         draft.rename(folder)
         sync_directory(folder.parent)
+
+
+def left_out(folder: Path) -> dict[str, str]:
+    """Return the runs that the tables in a folder lack since they are damaged, and why."""
+    manifest = folder / MANIFEST
+    found: dict[str, str] = read_json(manifest)["left_out"] if manifest.is_file() else {}
+    return found
 
 
 def _manifest(finished: Sequence[PlannedRun]) -> Row:

@@ -27,6 +27,8 @@ from pathlib import Path
 
 from typing_extensions import TypedDict
 
+from conevo.campaigns.campaign import Campaign
+from conevo.campaigns.plan import Plan
 from conevo.campaigns.tables import Tables
 from conevo.errors import UsageError
 from conevo.reading import DamagedFile, read_bytes, read_json
@@ -44,7 +46,7 @@ from conevo.report.sections.composed import composed
 from conevo.report.sections.interventions import clones, lesions, rotations
 from conevo.report.sections.learning import learning
 from conevo.report.sections.metrics import definitions, metrics
-from conevo.report.sections.overview import Campaign, overview, read_campaign, repetition
+from conevo.report.sections.overview import overview, repetition
 from conevo.report.sections.performance import performance
 from conevo.report.sections.scope import Scope, scopes
 from conevo.report.sections.signal import signal
@@ -63,13 +65,13 @@ class Manifest(TypedDict):
     files: dict[str, str]
 
 
-def write_report(campaign: Path, out: Path, tables: Path | None = None) -> Path:
+def write_report(campaign: Campaign, out: Path, tables: Path | None = None) -> Path:
     """Write the report of a campaign and return its page.
 
     A report that is there already is replaced as a whole, once the new one is complete.
 
     Args:
-        campaign: its directory, with sealed tables.
+        campaign: with sealed tables.
         out: directory of the report.
         tables: the folder of the sealed tables, if not the campaign's own.
 
@@ -78,11 +80,9 @@ def write_report(campaign: Path, out: Path, tables: Path | None = None) -> Path:
         EnvironmentFailure: it cannot be written.
     """
     _refuse_changed(out)
-    folder = tables or campaign / "tables"
-    about = read_campaign(campaign, folder)
-    with Tables(folder) as opened:
-        sections = sections_of(opened, about)
-        files = dict(_files(about, sections))
+    with Tables(tables or campaign.places.tables) as opened:
+        sections = sections_of(opened, campaign)
+        files = dict(_files(campaign.plan, sections))
         files["marl-eval.json"] = _json(export(opened))
     digests = {name: _digest(content) for name, content in sorted(files.items())}
     files[MANIFEST] = _json({"files": digests})
@@ -136,7 +136,7 @@ def _about(scope: Scope, title: str, spent: Spent) -> Section:
     )
 
 
-def _files(campaign: Campaign, sections: list[Section]) -> Iterator[tuple[str, bytes]]:
+def _files(plan: Plan, sections: list[Section]) -> Iterator[tuple[str, bytes]]:
     """Yield the name and content of every file but marl-eval's and the manifest."""
     exhibits = [one for section in sections for one in section.all_exhibits()]
     for one in exhibits:
@@ -148,11 +148,11 @@ def _files(campaign: Campaign, sections: list[Section]) -> Iterator[tuple[str, b
             yield f"figures/{one.name}.pdf", one.drawing.pdf
     drawn = [one for one in exhibits if isinstance(one, Figure)]
     yield "figures.tex", figures_to_latex(drawn).encode()
-    yield "all.tex", document(campaign.title, sections).encode()
-    yield "index.html", _page(campaign, sections).encode()
+    yield "all.tex", document(plan.title or plan.name, sections).encode()
+    yield "index.html", _page(plan, sections).encode()
 
 
-def _page(campaign: Campaign, sections: list[Section]) -> str:
+def _page(plan: Plan, sections: list[Section]) -> str:
     """Return the page."""
     import jinja2
     from markupsafe import Markup
@@ -179,7 +179,7 @@ def _page(campaign: Campaign, sections: list[Section]) -> str:
     )
     environment.tests["figure"] = _is_figure
     return environment.from_string(template).render(
-        campaign=campaign, sections=sections, drawn=drawn, rows=rows, numbers=number_of()
+        plan=plan, sections=sections, drawn=drawn, rows=rows, numbers=number_of()
     )
 
 

@@ -2,103 +2,39 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from pathlib import Path
-from typing import Any
+from collections.abc import Mapping
 
-from typing_extensions import TypedDict
-
+from conevo.campaigns.campaign import Campaign
+from conevo.campaigns.ended import Ended, failures
+from conevo.campaigns.sealing import left_out
 from conevo.campaigns.tables import Tables
-from conevo.errors import ConevoError
 from conevo.evolution.methods.registry import name_in
-from conevo.reading import parse_toml, read_json, read_json_lines, read_text
+from conevo.reading import read_text
 from conevo.report.exhibits import Column, Section, Table, number, plain
 from conevo.terms import counted
 
-__all__ = ["Campaign", "overview", "read_campaign", "repetition"]
+__all__ = ["overview", "repetition"]
 
 
 MOST_NAMES = 12  # of runs that a sentence may list
-
-
-@dataclass(frozen=True)
-class Campaign:
-    """What the directory of a campaign says beside its tables.
-
-    Attributes:
-        name: of the campaign.
-        title: one line, or the name.
-        produces: tables and figures of the thesis.
-        plan: text of the plan, empty without one.
-        planned: label of every run -> what the plan says of it.
-        failed: label -> origin and message of runs that ended without a result.
-        left_out: run or file -> why it could not be read.
-    """
-
-    name: str
-    title: str
-    produces: tuple[str, ...]
-    plan: str
-    planned: dict[str, dict[str, Any]]
-    failed: dict[str, dict[str, Any]]
-    left_out: dict[str, str] = field(default_factory=dict)
-
-
-class Ending(TypedDict):
-    """What is shown of ``ended/LABEL.json``, see ``campaigns.ended``."""
-
-    status: str
-    origin: str
-    message: str
-
-
-def read_campaign(root: Path, tables: Path | None = None) -> Campaign:
-    """Return what a campaign's directory says next to its tables; missing files say nothing.
-
-    Args:
-        root: the directory.
-        tables: the folder of its tables, by default in the directory.
-    """
-    plan, listed = root / "plan.toml", root / "runs.jsonl"
-    text = read_text(plan) if plan.is_file() else ""
-    head = parse_toml(text, str(plan)).get("campaign", {})
-    lines = read_json_lines(listed) if listed.is_file() else []
-    manifest = (tables or root / "tables") / "tables.json"
-    sealed = read_json(manifest) if manifest.is_file() else {}
-    left_out = {f"runs/{label}": why for label, why in sealed.get("left_out", {}).items()}
-    endings: dict[str, dict[str, Any]] = {}
-    for path in sorted((root / "ended").glob("*.json")):
-        try:
-            endings[path.stem] = read_json(path, Ending)
-        except ConevoError as error:
-            left_out[f"ended/{path.name}"] = str(error)
-    # Of paths below the campaign: the same report wherever it is.
-    left_out = {file: why.replace(f"{root}/", "") for file, why in left_out.items()}
-    name = str(head.get("name", root.resolve().name))
-    return Campaign(
-        name=name,
-        title=str(head.get("title") or name),
-        produces=tuple(map(str, head.get("produces", ()))),
-        plan=text,
-        planned={str(line["label"]): line for line in lines},
-        failed={k: v for k, v in endings.items() if v["status"] != "finished"},
-        left_out=left_out,
-    )
 
 
 def overview(tables: Tables, campaign: Campaign) -> Section:
     """Return what was run, what it cost, what is missing, and with which versions."""
     runs = [run for (run,) in tables.query("SELECT run FROM runs ORDER BY run")[1]]
     finished = {run.partition("/")[0] for run in runs}
-    failed = {label: why for label, why in campaign.failed.items() if label not in finished}
+    failed, unread = failures(campaign.places.ended("").parent)
+    failed = {label: why for label, why in failed.items() if label not in finished}
+    unread = {f"ended/{file}": why for file, why in unread.items()}
+    unread |= {f"runs/{label}": why for label, why in left_out(tables.folder).items()}
     waiting = [x for x in campaign.planned if x not in finished and x not in failed]
     text = []
-    if campaign.produces:
-        text.append(f"Data of the thesis' {', '.join(campaign.produces)}.")
-    planned = f" of {len(campaign.planned):,} planned" if campaign.planned else ""
+    if campaign.plan.produces:
+        text.append(f"Data of the thesis' {', '.join(campaign.plan.produces)}.")
     stages = f" ({counted(len(runs), 'stage')})" if len(runs) > len(finished) else ""
     text.append(
-        f"Runs finished: {len(finished):,}{planned}{stages}; failed: {len(failed):,}; not ended: "
+        f"Runs finished: {len(finished):,} of {len(campaign.planned):,} planned{stages}; "
+        f"failed: {len(failed):,}; not ended: "
         f"{len(waiting):,}. Only finished runs count below. Runs of different "
         "presets or budgets are never in one table or figure."
     )
@@ -109,10 +45,11 @@ def overview(tables: Tables, campaign: Campaign) -> Section:
     exhibits = [_cost(tables), _versions(tables)]
     if failed:
         exhibits.insert(1, _failures(failed, campaign))
-    if campaign.left_out:
-        exhibits.insert(1, _left_out(campaign.left_out))
-        n = len(campaign.left_out)
-        text.append(f"Files that could not be read are left out: {n:,}, see below.")
+    if unread:
+        # Of paths below the campaign: the same report wherever it is.
+        short = {file: why.replace(f"{campaign.path}/", "") for file, why in unread.items()}
+        exhibits.insert(1, _unread(short))
+        text.append(f"Files that could not be read are left out: {len(short):,}, see below.")
     return Section("Runs", text, exhibits)
 
 
@@ -149,8 +86,9 @@ def repetition(tables: Tables, campaign: Campaign) -> Section:
     ]
     if any(preset != "night" for (preset,) in presets):
         text.append("At a larger scale: conevo campaign start plan.toml --preset night")
-    commands = f"conevo campaign start plan.toml\nconevo report {campaign.name}\n\n# plan.toml\n"
-    return Section("How to repeat it", text, preformatted=commands + campaign.plan)
+    commands = f"conevo campaign start plan.toml\nconevo report {campaign.plan.name}\n"
+    plan = read_text(campaign.places.plan)
+    return Section("How to repeat it", text, preformatted=f"{commands}\n# plan.toml\n{plan}")
 
 
 def _cost(tables: Tables) -> Table:
@@ -191,17 +129,13 @@ def _span(value: tuple[int, int]) -> str:
     return number(low) if low == high else f"{low:,} to {high:,}"
 
 
-def _failures(failed: dict[str, dict[str, Any]], campaign: Campaign) -> Table:
-    rows = [
-        {
-            "run": label,
-            "method": name_in(campaign.planned.get(label, {}).get("method") or ""),
-            "seed": campaign.planned.get(label, {}).get("seed"),
-            "origin": why.get("origin"),
-            "message": why.get("message"),
-        }
-        for label, why in failed.items()
-    ]
+def _failures(failed: Mapping[str, Ended], campaign: Campaign) -> Table:
+    rows = []
+    for label, why in failed.items():
+        planned = campaign.planned.get(label)
+        method, seed = (name_in(planned.method), planned.seed) if planned else ("", None)
+        about = {"run": label, "method": method, "seed": seed}
+        rows.append(about | {"origin": why["origin"], "message": why["message"]})
     columns = [
         Column("run", "run", plain),
         Column("method", "method", plain),
@@ -216,9 +150,9 @@ def _failures(failed: dict[str, dict[str, Any]], campaign: Campaign) -> Table:
     return Table("failures", "Runs that failed", note, columns, rows, is_open=len(rows) <= 12)
 
 
-def _left_out(left_out: dict[str, str]) -> Table:
+def _unread(unread: Mapping[str, str]) -> Table:
     columns = [Column("file", "run or file", plain), Column("why", "reason", plain, is_wide=True)]
-    rows = [{"file": file, "why": why} for file, why in left_out.items()]
+    rows = [{"file": file, "why": why} for file, why in unread.items()]
     note = "Damaged files; of a damaged run nothing counts below."
     return Table("left-out", "Files that could not be read", note, columns, rows)
 
