@@ -1,8 +1,12 @@
+import json
+
 import pytest
+import tomli_w
 
 from campaigns.plans import tiny_campaign
 from conevo.campaigns.estimate import remaining_seconds
 from conevo.campaigns.ledger import Entry
+from watch.followed import record, tables
 
 
 @pytest.fixture
@@ -47,9 +51,8 @@ def test_while_none_is_finished_the_progress_of_those_at_work_counts(campaign):
     first = next(iter(campaign.planned))
     log = campaign.places.run(first) / "generations.jsonl"
     log.parent.mkdir(parents=True)
-    (log.parent / "config.toml").write_text("[run]\ngenerations = 2\nbudget_evaluations = 0\n")
-    one = '{"generation": 0, "team_evaluations": 5}\n'
-    log.write_text(f'{one}{{"team_eval')  # one of two generations, one torn
+    (log.parent / "config.toml").write_text(tomli_w.dumps(tables(generations=2)))
+    log.write_text(json.dumps(record(0)) + '\n{"team_eval')  # one of two generations, one torn
     known = standing(campaign, ("running", 0.0, 90.0), WAITS, WAITS, WAITS)
     assert remaining_seconds(campaign, known, 1, 100.0) == pytest.approx(10 + 3 * 20)
 

@@ -12,8 +12,10 @@ from conevo.campaigns.executors.registry import make_executor
 from conevo.campaigns.progress import RunProgress, last_written, progress_of
 from conevo.campaigns.work import carry_out
 from conevo.runs.directory import Directory
+from watch.followed import record
 
-CONFIG = "[run]\ngenerations = 10\nbudget_evaluations = {budget}\n"
+NAMES = 'world = "rover/complex-2"\nmethod = "cone"\npreset = "smoke"\nseed = 1\n'
+CONFIG = "[run]\n" + NAMES + "generations = 10\nbudget_evaluations = {budget}\n"
 NOTHING = RunProgress(0, 0, 0, 0, 0.0, None)
 
 
@@ -25,7 +27,7 @@ def campaign(tmp_path):
 def write_log(path, n, budget=0, more=""):
     path.mkdir(parents=True, exist_ok=True)
     (path / "config.toml").write_text(CONFIG.format(budget=budget))
-    lines = [json.dumps({"generation": k, "team_evaluations": 7 * (k + 1)}) for k in range(n)]
+    lines = [json.dumps(record(k, team_evaluations=7 * (k + 1))) for k in range(n)]
     (path / "generations.jsonl").write_text("".join(f"{line}\n" for line in lines) + more)
 
 
@@ -168,7 +170,7 @@ def test_a_shaping_is_as_far_as_its_stages(tmp_path):
     write_log(run / "stage-1", 10, 70)
     write_log(run / "stage-2", 5, 140)
     stages = "".join(
-        f"[[stages]]\n[stages.run]\ngenerations = 10\nbudget_evaluations = {budget}\n"
+        f"[[stages]]\n[stages.run]\n{NAMES}generations = 10\nbudget_evaluations = {budget}\n"
         for budget in (70, 140)
     )
     (run / "shaping.toml").write_text(stages)

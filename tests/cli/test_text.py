@@ -141,20 +141,21 @@ def test_numbers_stand_to_the_right_and_words_to_the_left() -> None:
 def test_pace_counts_down_to_the_last_generation_or_the_end_of_the_budget(tmp_path: Path) -> None:
     run = evolve_tiny(tmp_path / "run", run__budget_evaluations=1000, run__generations=2)
     pace = Pace(run)
-    pace.spent = 0
-    for generation in range(2):
-        pace.add({"team_evaluations": 100 * (generation + 1), "seconds": 2.0})
-    assert pace.rate == 50
-    pace.settings = replace(pace.settings, generations=250, budget_evaluations=1000)
-    assert pace.remaining(1) == 16  # 800 evaluations left at 50 per second
-    pace.settings = replace(pace.settings, generations=5, budget_evaluations=1000)
-    assert pace.remaining(1) == 6  # three generations of two seconds
+    for k in range(2):  # made again
+        pace.add({"generation": k, "team_evaluations": 100 * (k + 1), "seconds": 2.0})
+    assert (pace.rate, pace.place) == (50, "generation 2/2")
+    pace.outline = replace(pace.outline, generations=250, budget_evaluations=1000)
+    assert pace.remaining == 16  # 800 evaluations left at 50 per second
+    assert pace.place == "generation 2, 200/1,000 evaluations"
+    pace.outline = replace(pace.outline, generations=5, budget_evaluations=1050)
+    assert pace.remaining == 6  # three generations of two seconds
+    pace.outline = replace(pace.outline, generations=250, budget_evaluations=1050)
+    assert pace.remaining == 16  # the ninth generation cannot be paid
 
 
 def test_the_live_view_names_all_that_is_asked_of_it(tmp_path: Path) -> None:
     run = evolve_tiny(tmp_path / "run")
     display = Display(run)
-    display.records = []
     for record in run.generations():
         display.add(run, record)
     console = Console(file=io.StringIO(), width=120)

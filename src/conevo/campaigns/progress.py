@@ -17,6 +17,9 @@ from conevo.errors import ConevoError
 from conevo.reading import parse_json, read_last_line, read_toml
 from conevo.runs import locks
 from conevo.runs.directory import CONFIG, LOCK, SHAPING
+from conevo.runs.outline import Outline, outline_of
+from conevo.runs.progress import Done, share_of
+from conevo.runs.records import Generation
 from conevo.runs.store import GENERATIONS
 
 __all__ = ["RunProgress", "is_held", "last_written", "progress_of"]
@@ -64,40 +67,33 @@ def last_written(places: Places, label: str) -> float | None:
 
 def progress_of(places: Places, planned: PlannedRun) -> RunProgress:
     """Return how far a run is; what is missing or damaged counts as not done."""
-    lengths = _lengths(places.run(planned.label), planned.in_stages)
-    done, spent, share = 0, 0, 0.0
+    outlines = _outlines(places.run(planned.label), planned.in_stages)
+    done: list[Done] = []
     written: list[float] = []
-    names = [part for parts in planned.courses.values() for part in parts]
-    for k, name in enumerate(names):
-        generations, evaluations, at = _last_generation(places.run(name) / GENERATIONS)
+    for name in (part for parts in planned.courses.values() for part in parts):
+        *found, at = _last_generation(places.run(name) / GENERATIONS)
         if at is None:
             break
+        done.append(Done(*found))
         written.append(at)
-        done, spent = done + generations, spent + evaluations
-        if k < len(lengths):
-            planned_generations, budget = lengths[k]
-            over = generations / planned_generations
-            share += min(max(over, evaluations / budget if budget else 0.0), 1.0)
-    budgets = [budget for _, budget in lengths]
+    budgets = [outline.budget_evaluations for outline in outlines]
     return RunProgress(
-        generations=done,
-        of=sum(length for length, _ in lengths),
-        evaluations=spent,
+        generations=sum(one.generations for one in done),
+        of=sum(outline.generations for outline in outlines),
+        evaluations=sum(one.evaluations for one in done),
         budget=sum(budgets) if all(budgets) else 0,
-        share=share / len(names),
+        share=share_of(outlines, done),
         written=max(written, default=None),
     )
 
 
-def _lengths(path: Path, in_stages: bool) -> list[tuple[int, int]]:
-    """Return the generations and the budget of a run, or of each stage; none if unreadable."""
+def _outlines(path: Path, in_stages: bool) -> list[Outline]:
+    """Return what a run, or each stage, is planned to be; none if that cannot be read."""
     try:
         tables = read_toml(path / (SHAPING if in_stages else CONFIG))
-        runs = [stage["run"] for stage in (tables["stages"] if in_stages else [tables])]
-        found = [(int(run["generations"]), int(run["budget_evaluations"])) for run in runs]
-    except (ConevoError, KeyError, TypeError, ValueError):
+        return [outline_of(stage) for stage in (tables["stages"] if in_stages else [tables])]
+    except (ConevoError, KeyError, TypeError):
         return []
-    return found if all(n >= 1 and budget >= 0 for n, budget in found) else []
 
 
 def _last_generation(path: Path) -> tuple[int, int, float | None]:
@@ -106,7 +102,7 @@ def _last_generation(path: Path) -> tuple[int, int, float | None]:
         line = read_last_line(path)
         if not line:
             return 0, 0, None
-        record = parse_json(line, str(path))
-        return int(record["generation"]) + 1, int(record["team_evaluations"]), path.stat().st_mtime
-    except (ConevoError, OSError, KeyError, TypeError, ValueError):
+        record = parse_json(line, str(path), Generation)
+        return record["generation"] + 1, record["team_evaluations"], path.stat().st_mtime
+    except (ConevoError, OSError):
         return 0, 0, None

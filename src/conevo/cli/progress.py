@@ -12,6 +12,7 @@ import click
 
 from conevo.cli.run_text import declared, heading_of, measures_text
 from conevo.cli.text import bars, castes, count, duration, favourites, neurons, number
+from conevo.runs.progress import RECENT, Done, seconds_left, share_of
 from conevo.runs.run import Run
 from conevo.terms import S_MEANS, SHARE_SCALE, counted
 from conevo.worlds.measures import Measure
@@ -59,45 +60,49 @@ class Pace:
     """How fast a run goes: team evaluations per second and the time to its end."""
 
     def __init__(self, run: Run) -> None:
-        records = run.generations()
-        self.settings = run.outline
-        self.spent = records[-1]["team_evaluations"] if records else 0
-        self.recent: list[tuple[float, int]] = []  # seconds and evaluations of a generation
+        self.outline, self.records = run.outline, run.generations()
 
     def add(self, record: Record) -> None:
-        """Note a finished generation."""
-        cost = record["team_evaluations"] - self.spent
-        self.spent = record["team_evaluations"]
-        self.recent = [*self.recent[-9:], (record["seconds"], cost)]
+        """Note a finished generation; one that was there before it was made again."""
+        self.records[record["generation"] :] = [record]
+
+    @property
+    def spent(self) -> int:
+        """Team evaluations so far."""
+        return int(self.records[-1]["team_evaluations"]) if self.records else 0
+
+    @property
+    def done(self) -> Done:
+        """What is finished."""
+        return Done(len(self.records), self.spent)
+
+    @property
+    def share(self) -> float:
+        """The share of the run that is over, by generations or by budget."""
+        return share_of([self.outline], [self.done])
 
     @property
     def rate(self) -> float:
-        """Team evaluations per second over the last ten generations."""
-        seconds = sum(s for s, _ in self.recent)
-        return sum(n for _, n in self.recent) / seconds if seconds else 0.0
+        """Team evaluations per second over the last generations."""
+        seconds = sum(record["seconds"] for record in self.records[-RECENT:])
+        before = self.records[-RECENT - 1]["team_evaluations"] if self.records[RECENT:] else 0
+        return (self.spent - before) / seconds if seconds else 0.0
 
-    def done(self, generation: int) -> float:
-        """Return the share of the run that is over, by generations or by budget."""
-        budget = self.settings.budget_evaluations
-        share = (generation + 1) / self.settings.generations
-        return max(share, self.spent / budget) if budget else share
+    @property
+    def place(self) -> str:
+        """Where the run stands: its generation, and the budget if that will end it."""
+        budget, planned = self.outline.budget_evaluations, self.outline.generations
+        if budget and self.spent / budget > len(self.records) / planned:
+            spent = f"{count(self.spent)}/{count(budget)} evaluations"
+            return f"generation {len(self.records)}, {spent}"
+        return f"generation {len(self.records)}/{planned}"
 
-    def place(self, generation: int) -> str:
-        """Return where the run stands: its generation, and the budget if that will end it."""
-        budget = self.settings.budget_evaluations
-        if budget and self.spent / budget > (generation + 1) / self.settings.generations:
-            return f"generation {generation + 1}, {count(self.spent)}/{count(budget)} evaluations"
-        return f"generation {generation + 1}/{self.settings.generations}"
-
-    def remaining(self, generation: int) -> float:
-        """Return the seconds until the last generation, or until the budget is spent."""
-        if not self.recent:
-            return 0.0
-        left: float = self.settings.generations - generation - 1
-        if self.settings.budget_evaluations:
-            cost = sum(n for _, n in self.recent) / len(self.recent)
-            left = min(left, (self.settings.budget_evaluations - self.spent) / cost)
-        return max(0.0, left) * sum(s for s, _ in self.recent) / len(self.recent)
+    @property
+    def remaining(self) -> float:
+        """The seconds until the last generation, or until the budget is spent."""
+        columns = zip(*((r["seconds"], r["team_evaluations"]) for r in self.records), strict=True)
+        seconds, evaluations = columns if self.records else ((), ())
+        return seconds_left([self.outline], [self.done], seconds, evaluations)
 
 
 class Lines:
@@ -109,17 +114,16 @@ class Lines:
     def add(self, run: Run, record: Record) -> None:
         """Print a generation if it is time to."""
         self.pace.add(record)
-        total, generation = run.outline.generations, record["generation"]
-        if time.monotonic() < self.next and generation + 1 < total:
+        if time.monotonic() < self.next and record["generation"] + 1 < run.outline.generations:
             return
         self.next = time.monotonic() + self.pause
         measures = "  ".join(f"{k} {number(v)}" for k, v in record["performance"].items())
         click.echo(
-            f"{self.pace.place(generation)}  {measures}  "
+            f"{self.pace.place}  {measures}  "
             f"fitness best {number(record['best_fitness'])} mean {number(record['mean_fitness'])}  "
             f"S {number(record['specialization'])}  {castes(record['castes'])}  "
             f"{number(self.pace.rate)} evaluations/s  "
-            f"{duration(self.pace.remaining(generation))} left"
+            f"{duration(self.pace.remaining)} left"
         )
 
 
@@ -128,13 +132,12 @@ class Display:
 
     def __init__(self, run: Run, heading: str = "") -> None:
         self.run, self.heading, self.pace = run, heading or heading_of(run), Pace(run)
-        self.records, self.started = run.generations(), time.monotonic()
+        self.records, self.started = self.pace.records, time.monotonic()
         self.measures = declared(run.provenance)
 
     def add(self, run: Run, record: Record) -> None:
         """Show a finished generation."""
         self.pace.add(record)
-        self.records = [*self.records, record]
 
     def render(self) -> Any:
         """Return the view of this moment."""
@@ -142,17 +145,16 @@ class Display:
         from rich.progress_bar import ProgressBar
         from rich.table import Table
 
-        done = len(self.records)
         bar = Table.grid()  # a bar by itself does not end its line
-        bar.add_row(ProgressBar(total=1.0, completed=self.pace.done(done - 1), width=60))
+        bar.add_row(ProgressBar(total=1.0, completed=self.pace.share, width=60))
         grid = Table.grid(padding=(0, 2))
         for label, text in self._rows() if self.records else [("", "running the first generation")]:
             grid.add_row(f"[bold]{label}[/bold]", text)
         return Group(
             f"[bold]{self.heading}[/bold]\n{self.run.path}",
             bar,
-            f"{self.pace.place(done - 1)}, {duration(time.monotonic() - self.started)} so far, "
-            f"{duration(self.pace.remaining(done - 1))} left",
+            f"{self.pace.place}, {duration(time.monotonic() - self.started)} so far, "
+            f"{duration(self.pace.remaining)} left",
             grid,
         )
 
