@@ -42,6 +42,7 @@ __all__ = [
     "read_json",
     "read_json_lines",
     "read_last_line",
+    "read_part",
     "read_text",
     "read_toml",
     "refuse_wide",
@@ -199,6 +200,18 @@ def read_json_lines(
         parse_json(line, f"{path}", model, f" in line {number}")
         for number, line in enumerate(lines, 1)
     ]
+
+
+def read_part(path: Path, offset: int, limit: int) -> bytes:
+    """Return what a file has from an offset on, at most ``limit`` bytes.
+
+    Raises:
+        DamagedFile: it is not a regular file.
+        EnvironmentFailure: it cannot be read.
+    """
+    with _opened(path, str(path)) as file:
+        file.seek(offset)
+        return file.read(limit)
 
 
 def read_last_line(path: Path, limit: int = MIB) -> bytes:

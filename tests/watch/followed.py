@@ -10,6 +10,7 @@ import tomli_w
 
 from conevo.campaigns.campaign import create
 from conevo.campaigns.plan_file import read_plan
+from conevo.runs.outline import digest_of, identify
 
 PLAN = """
 [campaign]
@@ -51,10 +52,28 @@ def record(generation, **changes):
     } | changes
 
 
-def tables(method="cone", seed=1, world="rover-v2/complex-1", generations=10, budget=0):
-    """Return the part of a run's configuration that is shown."""
+def tables(method="cone", seed=1, world="rover-v2/complex-1", generations=10, budget=0, **settings):
+    """Return the configuration of a run, as far as it is shown; settings as in method__gst=0.2."""
     names = {"world": world, "method": method, "preset": "desk", "seed": seed}
-    return {"run": names | {"generations": generations, "budget_evaluations": budget}}
+    run = names | {"generations": generations, "budget_evaluations": budget}
+    found = {"run": run, "world": {}, "method": {}}
+    for key, value in settings.items():
+        part, _, name = key.partition("__")
+        found[part][name] = value
+    return found
+
+
+def provenance(config, **changes):
+    """Return what a run's provenance says, given the text of its configuration."""
+    names = ("preset", "command", "device", "created", "conevo", "python", "numpy", "warp")
+    about = dict.fromkeys((*names, "platform", "cpu"), "made up")
+    about |= {"run_id": "0" * 12, "kernel_hash": "0" * 16, "sessions": []}
+    return about | {"config_digest": digest_of(config.encode())} | changes
+
+
+def session(**made):
+    """Return one session of a run."""
+    return {"started": "now", "from_generation": 0, "threads": 1} | made
 
 
 def append(path, *records, torn=""):
@@ -63,16 +82,23 @@ def append(path, *records, torn=""):
         file.write("".join(f"{json.dumps(one)}\n" for one in records) + torn)
 
 
-def write_run(path, n=3, is_finished=False, torn="", **settings):
-    """Write a run of n generations."""
+def write_run(path, n=3, is_finished=False, torn="", about=None, **settings):
+    """Write a run of n generations; about: what its provenance says besides."""
     path.mkdir(parents=True)
-    (path / "config.toml").write_text(tomli_w.dumps(tables(**settings)))
-    (path / "provenance.json").write_text("{}")
+    ending = {"finished": "now", "stopped_by": "generations"} if is_finished else {}
+    configure(path, (about or {}) | ending, **settings)
     (path / "generations.jsonl").touch()
     append(path, *(record(k) for k in range(n)), torn=torn)
     if is_finished:
         (path / "DONE").write_text('{"files": {}}')
     return path
+
+
+def configure(path, about, **settings):
+    """Write the configuration and the provenance of a run."""
+    config = tomli_w.dumps(tables(**settings))
+    (path / "config.toml").write_text(config)
+    (path / "provenance.json").write_text(json.dumps(provenance(config, **about)))
 
 
 def write_shaping(path, stages):
@@ -82,7 +108,9 @@ def write_shaping(path, stages):
     planned = [
         tables(world=world, generations=of) for world, (of, _) in zip(worlds, stages, strict=True)
     ]
-    (path / "shaping.toml").write_text(tomli_w.dumps({"format": 1, "stages": planned}))
+    ids = [identify(one, one["run"]["world"]) for one in planned]
+    head = {"format": 1, "command": "made up", "device": "cpu", "tasks": worlds, "run_ids": ids}
+    (path / "shaping.toml").write_text(tomli_w.dumps(head | {"stages": planned}))
     for k, (of, done) in enumerate(stages, start=1):
         if done is not None:
             write_run(path / f"stage-{k}", done, world=worlds[k - 1], generations=of)

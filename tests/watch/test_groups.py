@@ -58,8 +58,9 @@ def test_runs_of_a_campaign_stand_as_its_ledger_and_their_files_say(campaign):
 
 def plan_run(campaign, label):
     """Let a run be the one that is planned."""
-    about = {"run_id": campaign.planned[label].run_ids[0]}
-    (campaign.places.run(label) / "provenance.json").write_text(json.dumps(about))
+    file = campaign.places.run(label) / "provenance.json"
+    about = json.loads(file.read_text()) | {"run_id": campaign.planned[label].run_ids[0]}
+    file.write_text(json.dumps(about | {"finished": "now", "stopped_by": "generations"}))
 
 
 def test_a_finished_run_that_is_not_in_the_ledger_yet_is_finished(campaign):
@@ -134,8 +135,7 @@ def test_methods_are_compared_by_medians_over_team_evaluations(tmp_path):
 
 def test_presets_and_environments_are_never_mixed(tmp_path):
     write_run(tmp_path / "a")
-    path = write_run(tmp_path / "b")
-    (path / "config.toml").write_text((path / "config.toml").read_text().replace("desk", "night"))
+    write_run(tmp_path / "b", run__preset="night")
     write_run(tmp_path / "c", world="rover-v2/complex-2")
     panels = Watched(folders=[tmp_path]).snapshot()["panels"]
     assert [(p["task"], p["preset"]) for p in panels] == [

@@ -1,23 +1,13 @@
 """Runs with other settings have curves, medians and names of their own."""
 
-import json
-import tomllib
-
-import tomli_w
-
 from conevo.watch.settings import comparisons, differences, factors
 from conevo.watch.state import Watched
-from watch.followed import write_run, write_shaping
+from watch.followed import session, write_run, write_shaping
 
 
-def with_settings(path, method="cone", seed=1, **settings):
+def with_settings(path, method="cone", **settings):
     """Write a run of two generations with settings: method__gst=0.2."""
-    write_run(path, 2, method=method, seed=seed)
-    found = tomllib.loads((path / "config.toml").read_text())
-    for key, value in settings.items():
-        part, _, name = key.partition("__")
-        found.setdefault(part, {})[name] = value
-    (path / "config.toml").write_text(tomli_w.dumps(found))
+    write_run(path, 2, method=method, **settings)
 
 
 def panels_in(folder):
@@ -80,18 +70,18 @@ def test_a_shaping_is_not_a_run_of_its_last_stage(tmp_path):
     ]
 
 
-def declare(path, **about):
-    """Write what a run's provenance says."""
-    (path / "provenance.json").write_text(json.dumps(about))
+def begun_with(path, digit):
+    """Return the origin of a run."""
+    return {"path": path, "run_id": "0" * 12, "generation": 9, "checkpoint": digit * 32}
 
 
 def test_runs_from_other_origins_have_medians_of_their_own(tmp_path):
-    begun = [("a", 1, "A", "aaaaaaaa"), ("b", 2, "A", "aaaaaaaa"), ("c", 1, "B", "bbbbbbbb")]
+    begun = [("a", 1, "A", "a"), ("b", 2, "A", "a"), ("c", 1, "B", "b")]
     for name, seed, origin, checkpoint in begun:
-        path = write_run(tmp_path / name, 2, seed=seed)
-        declare(path, origin={"path": f"runs/{origin}", "checkpoint": checkpoint})
-    champion = {"path": "runs/A", "checkpoint": "cccccccc", "of": "champion"}
-    declare(write_run(tmp_path / "d", 2), origin=champion)
+        about = {"origin": begun_with(f"runs/{origin}", checkpoint)}
+        write_run(tmp_path / name, 2, seed=seed, about=about)
+    champion = begun_with("runs/A", "c") | {"of": "champion"}
+    write_run(tmp_path / "d", 2, about={"origin": champion})
     write_run(tmp_path / "e", 2)
     assert panels_in(tmp_path) == [
         (
@@ -108,22 +98,16 @@ def test_runs_from_other_origins_have_medians_of_their_own(tmp_path):
 
 
 def test_runs_by_other_code_have_medians_of_their_own_once_they_have_begun(tmp_path):
-    sessions = {name: [{"conevo": "0.2", "code": name}] for name in "xy"}
+    sessions = {name: [session(conevo="0.2", code=name)] for name in "xy"}
     for name, made in (("a", "x"), ("b", "x"), ("c", "y")):
-        declare(write_run(tmp_path / name, 2), sessions=sessions[made])
-    declare(write_run(tmp_path / "d", 2), sessions=sessions["x"] + sessions["y"] * 2)
+        write_run(tmp_path / name, 2, about={"sessions": sessions[made]})
+    write_run(tmp_path / "d", 2, about={"sessions": sessions["x"] + sessions["y"] * 2})
     assert panels_in(tmp_path)[0][2] == {
         "code=0.2 (x)": ["a", "b"],
         "code=0.2 (y)": ["c"],
         "code=0.2 (x) + 0.2 (y)": ["d"],
     }
     assert differences(["cone"] * 2, [(("run.code", "x"),), ()]) == [{}, {}]
-
-
-def test_a_damaged_provenance_sets_nothing_apart(tmp_path):
-    for k, about in enumerate(({"origin": 5, "sessions": {}}, {"sessions": [7, {"code": [1]}]})):
-        declare(write_run(tmp_path / f"r{k}", 2), **about)
-    assert sum(len(lines) for _, _, of in panels_in(tmp_path) for lines in of.values()) == 2
 
 
 def test_factors_of_some_runs_of_a_plan_are_compared_with_the_others():

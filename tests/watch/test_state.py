@@ -89,9 +89,10 @@ def test_units_and_directions_are_those_that_the_provenance_declares(tmp_path):
     assert (panel["about"], panel["larger_is_better"]) == ("larger is better", True)
     assert one(watched)["declared"] == {}
 
-    other = write_run(tmp_path / "other", 2)
     declared = {"name": "value", "unit": "cm", "larger_is_better": False}
-    (other / "provenance.json").write_text(json.dumps({"world": {"measures": [declared]}}))
+    header = {"name": "rover-v2", "environment": "complex-1", "castes": [], "n_robots": 3}
+    header |= {"measures": [declared], "iterations": 10, "optimum": None}
+    other = write_run(tmp_path / "other", 2, about={"world": header})
     watched = Watched([other])
     (panel,) = watched.snapshot()["panels"]
     assert (panel["measure"], panel["about"]) == ("value", "cm, smaller is better")
@@ -99,23 +100,17 @@ def test_units_and_directions_are_those_that_the_provenance_declares(tmp_path):
     assert one(watched)["declared"] == {"value": "cm, smaller is better"}
 
 
-@pytest.mark.parametrize(
-    "content",
-    [
-        "",
-        "[]",
-        "{",
-        '{"world": 1}',
-        '{"world": {"measures": [3]}}',
-        '{"world": {"measures": [{"name": 1}]}}',
-        "[" * 50_000,
-    ],
-)
-def test_a_damaged_provenance_declares_nothing(tmp_path, content):
+@pytest.mark.parametrize("content", ["", "[]", "{", '{"world": 1}', "{}", "[" * 50_000])
+def test_a_damaged_provenance_is_one_line(tmp_path, content):
     path = write_run(tmp_path / "run", 2)
+    good = (path / "provenance.json").read_text()
     (path / "provenance.json").write_text(content)
-    run = one(Watched([path]))
-    assert (run["declared"], run["problem"], run["generation"]) == ({}, "", 2)
+    watched = Watched([path])
+    run = one(watched)
+    assert (run["status"], run["declared"]) == ("damaged", {})
+    assert run["problem"].startswith("provenance.json is damaged: ")
+    (path / "provenance.json").write_text(good)
+    assert (one(watched)["problem"], one(watched)["generation"]) == ("", 2)
 
 
 def test_very_many_generations_are_thinned_evenly_with_the_first_and_the_last(tmp_path):
@@ -148,23 +143,21 @@ def damaged(**changes):
     ("line", "why"),
     [
         ("what?\n", "Expecting value"),
-        ("[1]\n", "list indices"),
-        ("null\n", "NoneType"),
-        ('{"generation": 3}\n', "no 'team_evaluations'"),
+        ("[1]\n", "an object expected"),
+        ("null\n", "an object expected"),
+        ('{"generation": 3}\n', "team_evaluations is missing"),
         (json.dumps(record(4)) + "\n", "generation 3 expected"),
-        (damaged(seconds="2"), "a number expected, not '2'"),
-        (damaged(seconds=True), "a number expected, not 'True'"),
-        (damaged(seconds=None), "seconds must be a number from 0 on"),
-        (damaged(seconds=1e300), "seconds must be a number from 0 on"),
-        (damaged(team_evaluations=-1), "team_evaluations must be a number from 0 on"),
-        (damaged(castes={"low": "two"}), "a number expected, not 'two'"),
-        (damaged(favourites={"low": "two"}), "a number expected, not 'two'"),
-        (damaged(favourite_share="1"), "a number expected, not '1'"),
-        (damaged(performance=[1]), "has no attribute"),
-        (damaged(castes={f"{k}": 1 for k in range(63)}), "more than 64 names"),
-        (damaged(n_hidden=3), "not iterable"),
-        (damaged(seconds=10**400), "too large"),
-        ("[" * 100_000 + "\n", "recursion"),
+        (damaged(seconds="2"), "seconds = '2': must be a valid number"),
+        (damaged(seconds=None), "seconds = None: must be a valid number"),
+        (damaged(seconds=math.nan), "NaN is not a finite number"),
+        (damaged(team_evaluations=-1), "team_evaluations = -1: must be greater than or equal to 0"),
+        (damaged(castes={"low": "two"}), "castes.low = 'two': must be a valid integer"),
+        (damaged(favourites={"low": "two"}), "favourites.low = 'two': must be a valid integer"),
+        (damaged(favourite_share="1"), "favourite_share = '1': must be a valid number"),
+        (damaged(performance=[1]), "performance = [1]: must be a valid dictionary"),
+        (damaged(n_hidden=3), "n_hidden = 3: must be a valid list"),
+        (damaged(seconds=10**400), "is beyond 64 bits"),
+        ("[" * 100_000 + "\n", "nested too deeply"),
     ],
 )
 def test_a_damaged_line_is_one_line_and_the_others_go_on(tmp_path, line, why):
@@ -188,12 +181,12 @@ def test_a_damaged_line_is_one_line_and_the_others_go_on(tmp_path, line, why):
 @pytest.mark.parametrize(
     ("content", "why"),
     [
-        (b"[run", "config.toml is damaged: "),
-        (b"\xff", "config.toml is damaged: "),
-        (b"", "config.toml is damaged: no 'run'"),
-        (b"[run]\nworld = 'w'\n", "config.toml is damaged: no 'method'"),
+        (b"[run", "config.toml is not valid TOML: "),
+        (b"\xff", "config.toml is not valid TOML: "),
+        (b"", "config.toml is damaged: it has no table [run]"),
+        (b"[run]\nworld = 'w'\n", "config.toml is damaged: run.method must be text"),
         (b"run = 3", "config.toml is damaged: "),
-        (b"#" * (16 * 2**20 + 1), "config.toml is larger than 16 MiB"),
+        (b"#" * (2 * 2**20 + 1), "config.toml is too large"),
     ],
 )
 def test_a_damaged_configuration_is_one_line(tmp_path, content, why):
@@ -217,7 +210,7 @@ def test_settings_of_the_wrong_kind_are_damage(tmp_path):
         text.replace('"cone"', "7"),
     ):
         (path / "config.toml").write_text(wrong)
-        assert one(Watched([path]))["problem"].startswith("config.toml is damaged: [run] ")
+        assert one(Watched([path]))["problem"].startswith("config.toml is damaged: run.")
 
 
 def test_only_what_was_appended_is_read(tmp_path):
@@ -395,9 +388,6 @@ def test_links_are_not_followed(tmp_path):
     (mine / "generations.jsonl").unlink()
     (mine / "generations.jsonl").symlink_to(secret / "generations.jsonl")
     assert by_label(Watched(folders=[folder]))["mine"]["generation"] == 0
-    (mine / "lock").symlink_to(secret / "lock")
-    with at_work(secret):
-        assert by_label(Watched(folders=[folder]))["mine"]["status"] == "interrupted"
     shaping = write_shaping(folder / "shaping", [(3, None)])
     (shaping / "stage-1").symlink_to(secret)
     assert by_label(Watched(folders=[folder]))["shaping"]["generation"] == 0
@@ -406,7 +396,7 @@ def test_links_are_not_followed(tmp_path):
 
 def test_pipes_do_not_stop_the_page(tmp_path):
     path = write_run(tmp_path / "run")
-    for name in ("generations.jsonl", "lock", "DONE"):
+    for name in ("generations.jsonl", "lock"):
         (path / name).unlink(missing_ok=True)
         os.mkfifo(path / name)
     run = one(Watched([path]))
@@ -431,7 +421,7 @@ def test_a_world_in_a_file_is_named_and_its_file_is_not_run(tmp_path):
 
 def test_numbers_are_always_json(tmp_path):
     path = write_run(tmp_path / "run", 0)
-    append(path, record(0, team_fitness=math.nan, performance={"value": math.inf}, sst=None))
+    append(path, record(0, team_fitness=None, performance={"value": None}, sst=None))
     for name in ("large", "larger"):  # whose sum is infinite
         append(write_run(tmp_path / name, 0, method="mesp"), record(0, team_fitness=1.7e308))
     watched = Watched(folders=[tmp_path])

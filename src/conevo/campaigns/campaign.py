@@ -201,7 +201,7 @@ class Campaign:
         is_coordinated = self.is_running
         found = {}
         for label in self.planned:
-            entry = known.get(label, Entry(label, "pending", 0, "", 0, None, 0.0))
+            entry = known.get(label, Entry(label))
             if self.is_finished(label):
                 entry = dataclasses.replace(entry, state="finished")
             elif is_held(self.places, label):

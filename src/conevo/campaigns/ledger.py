@@ -50,12 +50,12 @@ class Entry:
     """
 
     label: str
-    state: str
-    attempts: int
-    reason: str
-    threads: int
-    began: float | None
-    core_seconds: float
+    state: str = "pending"
+    attempts: int = 0
+    reason: str = ""
+    threads: int = 0
+    began: float | None = None
+    core_seconds: float = 0.0
 
 
 class Ledger:

@@ -124,7 +124,7 @@ TABLES = {"worlds": _worlds, "controllers": _controllers, "methods": _methods}
 
 def _runs(folder: str | None) -> Rows:
     from conevo.cli.lookup import directories, open_directory
-    from conevo.cli.shaping_text import span
+    from conevo.runs.outline import span
     from conevo.runs.run import RUNS, Run
 
     place = Path(folder) if folder else RUNS
@@ -138,7 +138,7 @@ def _runs(folder: str | None) -> Rows:
             outlines = [found.outline] if isinstance(found, Run) else found.outlines
             count = _progress(runs, outlines)
             status, last = found.status, outlines[-1]
-            task = last.task if isinstance(found, Run) else span(found)
+            task = last.task if isinstance(found, Run) else span(found.tasks)
             about = (task, last.method, last.preset, str(last.seed))
         except ConevoError as error:
             count, status, about = "", f"damaged: {error}", ("", "", "", "")

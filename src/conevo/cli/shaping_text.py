@@ -11,20 +11,13 @@ from conevo.cli.run_text import controlled, generations_table, spaced, title
 from conevo.cli.text import castes, count, duration, number, progress, spread, table
 from conevo.evolution.methods.registry import title_of
 from conevo.runs.code import changes_text
+from conevo.runs.outline import span
 from conevo.runs.run import Run
 from conevo.runs.shaping import Shaping
 from conevo.terms import S_SCALE, counted, quoted
 from conevo.worlds.registry import product_of
 
-__all__ = ["print_shaping_end", "shaping_text", "span", "stage_summary", "stages_test_text"]
-
-
-def span(shaping: Shaping) -> str:
-    """Return the tasks of a shaping in short: "rover-v2/complex-1 to complex-3"."""
-    first, last = shaping.outlines[0], shaping.outlines[-1]
-    if first.task == last.task:
-        return last.task
-    return f"{first.task} to {last.environment}"
+__all__ = ["print_shaping_end", "shaping_text", "stage_summary", "stages_test_text"]
 
 
 def print_shaping_end(shaping: Shaping, style: str) -> None:
@@ -57,7 +50,7 @@ def shaping_text(shaping: Shaping, n_rows: int = 0) -> str:
     records = shaping.generations()
     seconds = sum(record["seconds"] for record in records)
     parts = [
-        title(shaping.outlines[-1]).replace(shaping.outlines[-1].task, span(shaping))
+        title(shaping.outlines[-1]).replace(shaping.outlines[-1].task, span(shaping.tasks))
         + _after(shaping)
         + (controlled(stages[0]) if stages else ""),
         f"{shaping.path}: {state}",

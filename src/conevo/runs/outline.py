@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Collection, Mapping
+import re
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import PurePath
 from typing import Any
@@ -17,7 +18,16 @@ from conevo.evolution.methods.registry import name_in, remember_title
 from conevo.reading import DamagedFile, parse_toml
 from conevo.terms import quoted
 
-__all__ = ["LENGTH", "Outline", "digest_of", "identify", "outline_of", "read_outline"]
+__all__ = [
+    "LENGTH",
+    "Outline",
+    "digest_of",
+    "flattened",
+    "identify",
+    "outline_of",
+    "read_outline",
+    "span",
+]
 
 Tables = Mapping[str, Mapping[str, Any]]
 NAMES = ("world", "method", "preset")
@@ -77,6 +87,11 @@ def digest_of(content: bytes) -> str:
     return hashlib.blake2b(content, digest_size=16).hexdigest()
 
 
+def flattened(tables: Tables) -> dict[str, Any]:
+    """Return the settings in tables by their names: "method.gst" -> 0.2."""
+    return {f"{part}.{key}": table[key] for part, table in tables.items() for key in table}
+
+
 def outline_of(tables: Tables, task: str = "", place: str = "config.toml") -> Outline:
     """Return the outline in the tables of a configuration.
 
@@ -133,3 +148,9 @@ def read_outline(content: bytes, provenance: Mapping[str, Any], place: str) -> O
             f"'conevo run --config {quoted(place)} --out DIR'"
         )
     return outline
+
+
+def span(tasks: Sequence[str]) -> str:
+    """Return the tasks of a run or shaping in short: "rover-v2/complex-1 to complex-3"."""
+    last = re.split("[/:]", tasks[-1])[-1]
+    return tasks[0] if tasks[0] == tasks[-1] else f"{tasks[0]} to {last}"

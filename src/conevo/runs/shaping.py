@@ -31,7 +31,7 @@ from conevo.reading import check, read_bytes, read_toml
 from conevo.runs.code import last_code, refuse_other_code, sessions_of
 from conevo.runs.directory import CONFIG, SHAPING, Directory, appearing, refuse_existing
 from conevo.runs.durable import is_there, replace_file
-from conevo.runs.outline import Outline, identify, outline_of
+from conevo.runs.outline import Outline, flattened, identify, outline_of
 from conevo.runs.provenance import device_of
 from conevo.runs.run import RUNS, Record, Run, Watch, start
 from conevo.runs.time_limit import TimeLimit
@@ -185,7 +185,7 @@ class Shaping:
         self.path = self._directory.path
         about = _read(self.path / SHAPING)
         self._command, self._device = str(about["command"]), str(about["device"])
-        self._settings: list[Record] = about["settings"]
+        self.settings: list[Record] = about["settings"]
         self.run_ids: tuple[str, ...] = tuple(about["run_ids"])
         self.outlines: list[Outline] = about["outlines"]
 
@@ -199,7 +199,7 @@ class Shaping:
         from conevo.runs.config import resolve
 
         place, folder = f"in {self.path / SHAPING}", self.path.resolve()
-        return [resolve(overrides=one, place=place, folder=folder) for one in self._settings]
+        return [resolve(overrides=one, place=place, folder=folder) for one in self.settings]
 
     def __repr__(self) -> str:
         return f"Shaping({str(self.path)!r})"
@@ -449,10 +449,7 @@ def _read(path: Path) -> dict[str, Any]:
         check(about, ShapingText, f"{path} is damaged")
         stages, run_ids = about["stages"], about["run_ids"]
         tasks = about.get("tasks", ["" for _ in stages])
-        settings = [
-            {f"{part}.{key}": stage[part][key] for part in stage for key in stage[part]}
-            for stage in stages
-        ]
+        settings = [flattened(stage) for stage in stages]
         found = {name: about[name] for name in ("command", "device")}
         outlines = [
             outline_of(stage, task, str(path)) for stage, task in zip(stages, tasks, strict=True)

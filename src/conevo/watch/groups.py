@@ -16,10 +16,11 @@ from conevo.campaigns.inputs import shown_as
 from conevo.campaigns.ledger import Entry
 from conevo.errors import ConevoError, UsageError
 from conevo.evolution.methods.registry import name_in
-from conevo.runs.directory import LOCK, kind_of
+from conevo.runs.directory import kind_of
+from conevo.runs.outline import span
 from conevo.watch.comparisons import CurvePanel, panels_of
-from conevo.watch.subjects import Standing, Subject, span
-from conevo.watch.tail import Stamp, is_locked, readable, stamp
+from conevo.watch.subjects import Subject
+from conevo.watch.tail import Stamp, readable, stamp
 
 __all__ = ["Experiment", "Followed", "Names", "FollowedRuns", "children"]
 
@@ -163,8 +164,7 @@ class Experiment(Followed):
         except Exception as error:  # whatever the files hold: all others are shown
             self._problem = readable(f"is damaged: {' '.join(repr(error).split())[:200]}")
         for label, one in self._by_label.items():
-            entry = self._entries.get(label)
-            one.look(Standing(entry.state, entry.reason) if entry else Standing("pending"), go_on)
+            one.look(self._entries.get(label, Entry(label)), go_on)
         self._arrange()
 
     def _read(self) -> None:
@@ -173,7 +173,7 @@ class Experiment(Followed):
             self._open()
             self._plan, self._ledger = files, None
         assert self._campaign is not None
-        self._is_running = is_locked(self._path / LOCK)
+        self._is_running = self._campaign.is_running
         versions = sum(one.version for one in self.subjects)
         ledger = (stamp(self._campaign.ledger.path), self._is_running, versions)
         if ledger != self._ledger:

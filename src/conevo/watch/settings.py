@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
 
 from conevo.watch.tail import readable
 
@@ -17,15 +16,9 @@ LISTED = 4  # settings that a label names
 LONGEST = 120  # characters of a label
 
 
-def choices_of(tables: Mapping[str, Any]) -> Choices:
-    """Return the settings in the tables of a configuration, as text."""
-    found = {
-        f"{part}.{key}": str(value)
-        for part, table in tables.items()
-        if isinstance(table, Mapping)
-        for key, value in table.items()
-    }
-    return tuple((key, value) for key, value in sorted(found.items()) if key not in NAMES)
+def choices_of(settings: Mapping[str, object]) -> Choices:
+    """Return settings, "method.gst" -> 0.2, as text."""
+    return tuple((key, str(value)) for key, value in sorted(settings.items()) if key not in NAMES)
 
 
 def differences(methods: Sequence[str], settings: Sequence[Choices]) -> list[dict[str, str]]:

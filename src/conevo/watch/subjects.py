@@ -1,86 +1,113 @@
-"""A run or a shaping as it stands by its files: how far, until when, and what it came to."""
+"""A run or a shaping as it stands by its files: how far, until when, and its last generation."""
 
 from __future__ import annotations
 
 import math
-import re
-import tomllib
 from array import array
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from statistics import fmean
+from pathlib import Path, PurePath
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from conevo.campaigns.ledger import Entry
 from conevo.errors import ConevoError, UsageError
-from conevo.evolution.methods.registry import name_in
+from conevo.runs import locks
 from conevo.runs.directory import CONFIG, LOCK, SEAL, SHAPING, kind_of
-from conevo.watch.declared import NOTHING, Declaration, Declared
+from conevo.runs.outline import Outline, flattened, span
+from conevo.runs.progress import Done, seconds_left, share_of
+from conevo.runs.run import Run
+from conevo.runs.shaping import Shaping
+from conevo.runs.store import GENERATIONS, PROVENANCE
 from conevo.watch.settings import CODE, FROM, Choices, choices_of, factors
-from conevo.watch.tail import Log, Whole, is_locked, readable, stamp
+from conevo.watch.tail import Log, Whole, readable, stamp
 from conevo.worlds.measures import Measure
 
-__all__ = ["Settings", "Standing", "Subject", "plain", "span"]
+__all__ = ["Subject", "plain"]
 
-RECENT = 10  # generations by which the pace is judged
 SHOWN = 2000  # generations of a run in its details, at most
+LAST = ("fitness", "best", "specialization", "favourite_share", "sst", "gst")
+COLUMN = {"fitness": "team_fitness", "best": "best_fitness"}  # where it is called otherwise
 
 
 @dataclass(frozen=True)
-class Settings:
-    """What a run was started with, as far as it is shown.
+class About:
+    """What the files of a run say of it; no world is loaded, so that no Python file is run.
 
-    The file is read as it stands and no world is loaded, so that following a run never runs the
-    Python file of a world outside the package.
+    Attributes:
+        outline: what names it.
+        choices: its settings.
+        measures: by name; none of a run that conevo 0.1.0 made.
+        origin: the run whose populations or champion it began with, and their digest, or nothing.
+        codes: every conevo that evolved it.
     """
 
-    task: str
-    method: str
-    preset: str
-    seed: int
-    generations: int
-    budget: int
-    choices: Choices = ()
+    outline: Outline
+    choices: Choices
+    measures: Mapping[str, Measure]
+    origin: str
+    codes: str
 
     @staticmethod
-    def of(tables: Mapping[str, Any]) -> Settings:
-        """Return the settings in the tables of a configuration.
+    def of(path: Path) -> About:
+        """Return what the files of a run say.
 
         Raises:
-            KeyError, TypeError: something is missing or not what it should be.
+            UsageError: they are damaged, or were changed since it was started.
         """
-        run = tables["run"]
-        texts = [run[name] for name in ("world", "method", "preset")]
-        numbers = [run[name] for name in ("seed", "generations", "budget_evaluations")]
-        if not all(isinstance(text, str) for text in texts):
-            raise TypeError("[run] names must be texts")
-        if not all(type(number) is int and 0 <= number < 2**63 for number in numbers):
-            raise TypeError("[run] numbers must be whole numbers from 0 on")
-        if not numbers[1]:
-            raise TypeError("[run] a run has one generation at least")
-        return Settings(
-            task=texts[0].rpartition("/")[2] if ".py:" in texts[0] else texts[0],
-            method=name_in(texts[1]),
-            preset=texts[2],
-            seed=numbers[0],
-            generations=numbers[1],
-            budget=numbers[2],
-            choices=choices_of(tables),
+        run = Run(path)
+        provenance = run.provenance
+        listed = provenance.get("world", {"measures": ()})["measures"]
+        codes = [
+            f"{one['conevo']} ({one['code']})" for one in provenance["sessions"] if "code" in one
+        ]
+        return About(
+            outline=run.outline,
+            choices=choices_of(flattened(run.tables())),
+            measures={
+                readable(one["name"]): Measure(
+                    one["name"], readable(one["unit"]), one["larger_is_better"]
+                )
+                for one in listed
+            },
+            origin=_origin(provenance.get("origin")),
+            codes=readable(" + ".join(dict.fromkeys(codes))),
         )
 
 
-@dataclass(frozen=True)
-class Standing:
-    """How a run stands in what it belongs to, if something besides its own files knows.
+def _origin(origin: Mapping[str, str] | None) -> str:
+    if origin is None:
+        return ""
+    whose = "champion of " if origin.get("of") == "champion" else ""
+    return readable(f"{whose}{PurePath(origin['path']).name} ({origin['checkpoint'][:6]})")
 
-    state: "pending", "running", "finished" or "failed". reason: why it failed.
-    """
 
-    state: str
-    reason: str = ""
+class Stage:
+    """A run, or a stage of a shaping, that has begun."""
+
+    def __init__(self, path: Path) -> None:
+        self.path, self.log = path, Log(path / GENERATIONS)
+        files = (path / CONFIG, path / PROVENANCE)
+        self._files = Whole(files, lambda: About.of(path))
+        self.about: About | None = None
+
+    def look(self, go_on: Callable[[], bool]) -> None:
+        """Read what has changed.
+
+        Raises:
+            ConevoError: it is damaged, or cannot be read; a damaged log has a problem instead.
+        """
+        self.about = None
+        self.about = self._files.read()
+        self.log.read(go_on)
+
+    @property
+    def done(self) -> Done:
+        """What it has finished."""
+        spent = self.log.generations.numbers["team_evaluations"]
+        return Done(len(spent), int(spent[-1]) if spent else 0)
 
 
 class Subject:
@@ -101,43 +128,40 @@ class Subject:
         self.is_behind = False
         self._about, self._is_planned = dict(about or {}), about is not None
         self._kind = ""
-        self._config: Whole[list[Settings]] | None = None
-        self._settings: list[Settings] = []
-        self._logs: list[Log] = []
-        self._declared: Declared | None = None
+        self._shaping: Whole[Shaping] | None = None
+        self._outlines: list[Outline] = []
+        self._stages: list[Stage] = []
         self._key: tuple[Any, ...] = ()
         self._status, self._reason, self._problem = "pending", "", ""
         self._summary: dict[str, Any] = {}
 
     # --- looking ----------------------------------------------------------------------------------
 
-    def look(
-        self, standing: Standing | None = None, go_on: Callable[[], bool] = lambda: True
-    ) -> None:
+    def look(self, entry: Entry | None = None, go_on: Callable[[], bool] = lambda: True) -> None:
         """Read what has changed; whatever is wrong becomes the run's problem.
 
         Args:
-            standing: what a campaign's ledger says.
+            entry: what a campaign's ledger says.
             go_on: asked before each further piece of a log.
         """
         self._problem = ""
         try:
             self._read(go_on)
         except ConevoError as error:
-            self._problem = readable(str(error))
-        except OSError as error:
-            self._problem = f"cannot be read: {error.strerror}"
+            self._problem = readable(str(error).replace(f"{self.path}/", ""))
         except Exception as error:  # whatever the files hold: all others are shown
             self._problem = readable(f"is damaged: {' '.join(repr(error).split())[:200]}")
-        self._problem = next((log.problem for log in self._logs if log.problem), self._problem)
-        self.is_behind = any(log.is_behind for log in self._logs)
-        self._status, self._reason = self._stand(standing)
+        logs = [stage.log for stage in self._stages]
+        self._problem = next((log.problem for log in logs if log.problem), self._problem)
+        self.is_behind = any(log.is_behind for log in logs)
+        self._status, self._reason = self._stand(entry)
         key = (
             self._status,
             self._reason,
             self._problem,
-            tuple(self._settings),
-            *(log.version for log in self._logs),
+            *self._outlines,
+            *(stage.about for stage in self._stages),
+            *(log.version for log in logs),
         )
         if key != self._key:
             self._key = key
@@ -145,8 +169,8 @@ class Subject:
             self._summary = {}
 
     def _read(self, go_on: Callable[[], bool]) -> None:
-        if self._config is None or self._config.stamp is None:
-            self._kind, self._config, self._settings, self._logs = "", None, [], []
+        if not self._kind or stamp(self.path / (SHAPING if self._shaping else CONFIG)) is None:
+            self._kind, self._shaping, self._outlines, self._stages = "", None, [], []
             if self.path.is_symlink():
                 raise UsageError("is a link, and links are not followed: watch its target")
             if not (kind := kind_of(self.path)):
@@ -156,48 +180,42 @@ class Subject:
             if kind == "campaign":
                 raise UsageError("is a campaign, not a run")
             self._kind = kind
-            self._config = Whole(self.path / (CONFIG if kind == "run" else SHAPING), _configs)
-        self._settings = self._config.read() or []
-        del self._logs[len(self._settings) :]
-        for number in range(len(self._logs), len(self._settings)):
-            folder = self._folder(number)
+            if kind == "shaping":
+                self._shaping = Whole((self.path / SHAPING,), lambda: Shaping(self.path))
+            else:
+                self._stages = [Stage(self.path)]
+        self._outlines = []
+        if self._shaping is not None:
+            self._read_stages(self._shaping)
+        for stage in self._stages:
+            stage.look(go_on)
+        if self._shaping is None and (about := self._stages[0].about) is not None:
+            self._outlines = [about.outline]
+
+    def _read_stages(self, file: Whole[Shaping]) -> None:
+        """Find the stages that have begun."""
+        found = file.read()
+        self._outlines = found.outlines if found else []
+        del self._stages[len(self._outlines) :]
+        for number in range(len(self._stages), len(self._outlines)):
+            folder = self.path / f"stage-{number + 1}"
             if folder.is_symlink() or stamp(folder / CONFIG) is None:
                 break
-            self._logs.append(Log(folder / "generations.jsonl"))
-            self._declared = Declared(folder)
-        for log in self._logs:
-            log.read(go_on)
+            self._stages.append(Stage(folder))
 
-    def _folder(self, number: int) -> Path:
-        """The directory of a run, or of the stage of this number, from 0."""
-        return self.path if self._kind == "run" else self.path / f"stage-{number + 1}"
-
-    def _stand(self, standing: Standing | None) -> tuple[str, str]:
+    def _stand(self, entry: Entry | None) -> tuple[str, str]:
         """Return the status, and why a run has failed."""
-        if standing is not None and standing.state == "failed":
-            return "failed", standing.reason
+        if entry is not None and entry.state == "failed":
+            return "failed", entry.reason
         if self._problem:
             return "damaged", ""
-        if standing is None and self._kind and stamp(self.path / SEAL) is not None:
+        if entry is None and self._kind and stamp(self.path / SEAL) is not None:
             return "finished", ""
-        if standing is not None and standing.state == "finished":
-            return "finished", ""
-        if standing is not None and standing.state == "running":
-            return "running", ""  # maybe on another machine
-        if self._kind and is_locked(self.path / LOCK):
+        if entry is not None and entry.state in ("finished", "running"):
+            return entry.state, ""  # running: maybe on another machine
+        if self._kind and locks.is_held(self.path / LOCK):
             return "running", ""
-        return (
-            "pending" if standing is not None and not self._n_generations else "interrupted"
-        ), ""
-
-    @property
-    def measures(self) -> dict[str, Measure]:
-        """The measures that it declares, by name; of a shaping those of its last stage begun."""
-        return self._found.measures
-
-    @property
-    def _found(self) -> Declaration:
-        return self._declared.read() if self._declared is not None else NOTHING
+        return ("pending" if entry is not None and not self._n_generations else "interrupted"), ""
 
     # --- what is said -----------------------------------------------------------------------------
 
@@ -215,9 +233,9 @@ class Subject:
             "variant": "",
         }
         found |= self._about
-        if self._settings:
-            last = self._settings[-1]
-            found |= {"task": span([one.task for one in self._settings]), "method": last.method}
+        if self._outlines:
+            last = self._outlines[-1]
+            found |= {"task": span([one.task for one in self._outlines]), "method": last.method}
             found |= {"preset": last.preset, "seed": last.seed}
         for name, none in (("task", ""), ("method", ""), ("preset", ""), ("seed", None)):
             found.setdefault(name, none)
@@ -226,50 +244,64 @@ class Subject:
             "reason": self._reason,
             "problem": self._problem,
             "kind": self._kind or "run",
-            "stage": len(self._logs) if self._kind == "shaping" else 0,
-            "n_stages": len(self._settings) if self._kind == "shaping" else 0,
+            "stage": len(self._stages) if self._shaping else 0,
+            "n_stages": len(self._outlines) if self._shaping else 0,
         }
 
     def _last(self) -> dict[str, Any]:
-        """Return what the last generation came to; of a shaping of the last stage that has one."""
-        stage = next((log.generations for log in reversed(self._logs) if log.generations), None)
+        """Return the last generation; of a shaping that of the last stage that has one."""
         found: dict[str, Any] = {"champion": None, "champion_stage": 0}
         found |= {"performance": {}, "declared": {}, "castes": {}, "favourites": {}}
-        found |= dict.fromkeys(
-            ("fitness", "best", "specialization", "favourite_share", "sst", "gst")
-        )
-        if stage is None:
+        found |= dict.fromkeys(LAST)
+        if (fittest := self._fittest) is None:
             return found
-        names = {"fitness": "team_fitness", "best": "best_fitness"}
-        number, generation = self._champion or (0, None)
-        return found | {
+        number, generation = fittest
+        last = self._stages[number].log.generations
+        return {
             "champion": generation,
-            "champion_stage": number + 1 if self._kind == "shaping" else 0,
-            "performance": {name: _plain(c[-1]) for name, c in stage.performance.items()},
+            "champion_stage": number + 1 if self._shaping else 0,
+            "performance": {name: _plain(c[-1]) for name, c in last.performance.items()},
             "declared": {name: one.about for name, one in self.measures.items()},
-            "castes": {name: int(c[-1]) for name, c in stage.castes.items() if c[-1] > 0},
-            "favourites": {name: int(c[-1]) for name, c in stage.favourites.items() if c[-1] > 0},
-            **{
-                name: _plain(stage.numbers[names.get(name, name)][-1])
-                for name in ("fitness", "best", "specialization", "favourite_share", "sst", "gst")
-            },
+            "castes": {name: int(c[-1]) for name, c in last.castes.items() if c[-1] > 0},
+            "favourites": {name: int(c[-1]) for name, c in last.favourites.items() if c[-1] > 0},
+            **{name: _plain(last.numbers[COLUMN.get(name, name)][-1]) for name in LAST},
         }
 
     def _prospects(self) -> dict[str, Any]:
         """Return how far it is, and the time (seconds since 1970) when it will be finished."""
-        stages = [log.generations for log in self._logs]
-        ends_at = None
-        if self._status == "running" and self._n_generations:
-            ends_at = round(max(log.written for log in self._logs) + self._seconds_left(), 1)
+        logs = [stage.log for stage in self._stages]
+        done = [stage.done for stage in self._stages]
+        budgets = [one.budget_evaluations for one in self._outlines]
+        share = 1.0 if self._status == "finished" else share_of(self._outlines, done)
         return {
             "generation": self._n_generations,
-            "generations": sum(one.generations for one in self._settings),
-            "evaluations": int(sum(_last(s.numbers["team_evaluations"]) for s in stages)),
-            "budget": sum(s.budget for s in self._settings) if self._has_budget else 0,
-            "seconds": round(sum(sum(s.numbers["seconds"]) for s in stages), 1),
-            "share": round(self._share(), 4),
-            "ends_at": ends_at,
+            "generations": sum(one.generations for one in self._outlines),
+            "evaluations": sum(one.evaluations for one in done),
+            "budget": sum(budgets) if all(budgets) else 0,
+            "seconds": round(sum(sum(log.generations.numbers["seconds"]) for log in logs), 1),
+            "share": round(share, 4),
+            "ends_at": self._ends_at(done),
         }
+
+    def _ends_at(self, done: Sequence[Done]) -> float | None:
+        """Return when it will be finished; None if it is not running, or nothing is known yet."""
+        if self._status != "running" or self._fittest is None:
+            return None
+        at = self._fittest[0]
+        numbers = self._stages[at].log.generations.numbers
+        columns = (numbers["seconds"], numbers["team_evaluations"])
+        left = seconds_left(self._outlines, done[: at + 1], *columns)
+        written = max(stage.log.written for stage in self._stages)
+        return round(written + (left if math.isfinite(left) else 0.0), 1)
+
+    @property
+    def measures(self) -> Mapping[str, Measure]:
+        """The measures that it declares, by name; of a shaping those of its last stage begun."""
+        return about.measures if (about := self._last_about) else {}
+
+    @property
+    def _last_about(self) -> About | None:
+        return self._stages[-1].about if self._stages else None
 
     @property
     def apart(self) -> Choices:
@@ -277,78 +309,40 @@ class Subject:
 
         Of a plan only its factors, instead of all settings. A shaping has those of every stage.
         """
-        declared = self._found
-        # The stages of a shaping begin with each other's populations.
-        origin = declared.origin if self._kind == "run" else ""
-        made = [(k, v) for k, v in ((FROM, origin), (CODE, declared.codes)) if v]
+        made = []
+        if (about := self._last_about) is not None:
+            # The stages of a shaping begin with each other's populations.
+            origin = "" if self._shaping else about.origin
+            made = [(k, v) for k, v in ((FROM, origin), (CODE, about.codes)) if v]
         if self._is_planned:
             levels = factors(str(self._about["variant"])).items()
             return (*((f"plan.{k}", v) for k, v in levels), *made)
-        if self._kind == "run":
-            return (*(self._settings[0].choices if self._settings else ()), *made)
-        stages = enumerate(self._settings, start=1)
-        found = [(f"stage-{n}.{key}", value) for n, one in stages for key, value in one.choices]
-        return (("shaping.stages", str(len(self._settings))), *found, *made)
+        if self._shaping is None:
+            return (*(about.choices if about else ()), *made)
+        shaping = self._shaping.read() if self._outlines else None
+        stages = enumerate(shaping.settings if shaping else (), start=1)
+        found = [(f"stage-{n}.{key}", value) for n, one in stages for key, value in choices_of(one)]
+        return (("shaping.stages", str(len(self._outlines))), *found, *made)
 
     @property
     def _n_generations(self) -> int:
-        return sum(len(log.generations) for log in self._logs)
-
-    @property
-    def _has_budget(self) -> bool:
-        return bool(self._settings) and all(one.budget for one in self._settings)
-
-    def _share(self) -> float:
-        """Return how much of it is over: of each stage's generations, or of its budget."""
-        if self._status == "finished":
-            return 1.0
-        shares = [0.0] * len(self._settings)
-        for k, (settings, log) in enumerate(zip(self._settings, self._logs, strict=False)):
-            over = len(log.generations) / settings.generations
-            if settings.budget:
-                spent = _last(log.generations.numbers["team_evaluations"])
-                over = max(over, spent / settings.budget)
-            begun_next = k + 1 < len(self._logs)
-            shares[k] = 1.0 if begun_next else min(over, 1.0)
-        return fmean(shares) if shares else 0.0
-
-    def _seconds_left(self) -> float:
-        """Return the seconds from the last generation's end to the last one's.
-
-        By the pace of the last generations; stages to come are taken to be as fast.
-        """
-        at = next(k for k in reversed(range(len(self._logs))) if self._logs[k].generations)
-        recent = self._logs[at].generations.numbers
-        pace = fmean(recent["seconds"][-RECENT:])
-        spent = [0.0, *recent["team_evaluations"]]
-        n = min(RECENT, len(spent) - 1)
-        cost = (spent[-1] - spent[-1 - n]) / n
-        left = 0.0
-        for k in range(at, len(self._settings)):
-            done = len(self._logs[k].generations) if k == at else 0
-            used = spent[-1] if k == at else 0.0
-            more = float(self._settings[k].generations - done)
-            if self._settings[k].budget and cost > 0:
-                # What the budget cannot pay is not begun.
-                more = min(more, math.floor((self._settings[k].budget - used) / cost))
-            left += max(more, 0.0)
-        return left * pace if math.isfinite(left * pace) else 0.0
+        return sum(len(stage.log.generations) for stage in self._stages)
 
     @property
     def champion(self) -> tuple[Path, int] | None:
         """The directory and the generation of its fittest team so far, None before the first."""
-        found = self._champion
-        return None if found is None else (self._folder(found[0]), found[1])
+        found = self._fittest
+        return None if found is None else (self._stages[found[0]].path, found[1])
 
     @property
-    def _champion(self) -> tuple[int, int] | None:
+    def _fittest(self) -> tuple[int, int] | None:
         """The stage, from 0, and the generation of the fittest team so far.
 
         Of a shaping the last stage's that has one. As the run itself chooses it: the highest mean
         credit, the earlier one if equal.
         """
-        for number in reversed(range(len(self._logs))):
-            fitness = np.array(self._logs[number].generations.numbers["team_fitness"])
+        for number in reversed(range(len(self._stages))):
+            fitness = np.array(self._stages[number].log.generations.numbers["team_fitness"])
             if fitness.size:
                 return number, int(np.argmax(np.where(np.isfinite(fitness), fitness, -np.inf)))
         return None
@@ -361,8 +355,8 @@ class Subject:
             over: "generation" (finished ones) or "evaluations" (of teams so far).
         """
         xs, ys, before = [np.zeros(0)], [np.zeros(0)], 0.0
-        for log in self._logs:
-            found = log.generations
+        for stage in self._stages:
+            found = stage.log.generations
             if not found:
                 break
             x = np.arange(1.0, len(found) + 1)
@@ -387,12 +381,12 @@ class Subject:
         )
         rows = np.array(shown, dtype=np.int64) if shown else np.arange(n)
         stages, first = [], 0
-        for number, (settings, log) in enumerate(zip(self._settings, self._logs, strict=False), 1):
-            stages.append({"stage": number, "task": settings.task, "first": first})
-            first += len(log.generations)
+        for number, (one, stage) in enumerate(zip(self._outlines, self._stages, strict=False), 1):
+            stages.append({"stage": number, "task": one.task, "first": first})
+            first += len(stage.log.generations)
         return {
             **self.summary,
-            "stages": stages if self._kind == "shaping" else [],
+            "stages": stages if self._shaping else [],
             "number": rows.tolist(),
             "columns": {
                 name: plain(column[rows]) for name, column in self._columns("numbers", math.nan)
@@ -406,7 +400,8 @@ class Subject:
     def _columns(self, kind: str, none: float) -> Iterator[tuple[str, npt.NDArray[np.float64]]]:
         """Yield the columns of all stages, one after the other."""
         parts: list[tuple[int, Mapping[str, Sequence[float]]]] = [
-            (len(log.generations), getattr(log.generations, kind)) for log in self._logs
+            (len(found), getattr(found, kind))
+            for found in (stage.log.generations for stage in self._stages)
         ]
         for name in dict.fromkeys(name for _, part in parts for name in part):
             yield (
@@ -420,12 +415,6 @@ class Subject:
             )
 
 
-def span(tasks: Sequence[str]) -> str:
-    """Return the tasks of a run or shaping in short: "rover-v2/complex-1 to complex-3"."""
-    last = re.split("[/:]", tasks[-1])[-1]
-    return tasks[0] if len(set(tasks)) == 1 else f"{tasks[0]} to {last}"
-
-
 def plain(values: npt.NDArray[np.float64]) -> list[float | None]:
     """Return numbers as JSON has them, to six digits; none for what is not finite."""
     return [None if not math.isfinite(v) else float(f"{v:.6g}") for v in values.tolist()]
@@ -433,13 +422,3 @@ def plain(values: npt.NDArray[np.float64]) -> list[float | None]:
 
 def _plain(value: float) -> float | None:
     return value if math.isfinite(value) else None
-
-
-def _last(column: Sequence[float]) -> float:
-    return column[-1] if column else 0.0
-
-
-def _configs(content: bytes) -> list[Settings]:
-    """Return the settings of a run, or of a shaping's stages."""
-    tables = tomllib.loads(content.decode())
-    return [Settings.of(stage) for stage in tables.get("stages", [tables])]
