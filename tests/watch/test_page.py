@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 
 from conevo.replay.page import replay_page
+from conevo.runs.outline import digest_of
 from conevo.watch.server import LiveServer
 from conevo.watch.state import Watched
 from replay.synthetic import made_up
@@ -272,8 +273,11 @@ def test_names_never_become_markup(tab, tmp_path, evolved):
     record = records_of(worse)[-1] | {"generation": 5, "castes": {HOSTILE: 3}}
     record["performance"] = {HOSTILE: 1.5, "__proto__": 2.5}
     (worse / "generations.jsonl").write_text(json.dumps(record | {"generation": 0}) + "\n")
-    config = (worse / "config.toml").read_text()
-    (worse / "config.toml").write_text(config.replace('"cone"', json.dumps(HOSTILE), 1))
+    config = (worse / "config.toml").read_text().replace('"cone"', json.dumps(HOSTILE), 1)
+    (worse / "config.toml").write_text(config)
+    about = json.loads((worse / "provenance.json").read_text())
+    about["config_digest"] = digest_of(config.encode())
+    (worse / "provenance.json").write_text(json.dumps(about))
     with served(tmp_path / "runs") as address:
         tab.goto(address)
         tab.wait_for_selector("#runs tr[data-label]")

@@ -33,7 +33,7 @@ COLUMN = {"fitness": "team_fitness", "best": "best_fitness"}  # where it is call
 
 
 @dataclass(frozen=True)
-class About:
+class Declared:
     """What the files of a run say of it; no world is loaded, so that no Python file is run.
 
     Attributes:
@@ -51,7 +51,7 @@ class About:
     codes: str
 
     @staticmethod
-    def of(path: Path) -> About:
+    def of(path: Path) -> Declared:
         """Return what the files of a run say.
 
         Raises:
@@ -63,7 +63,7 @@ class About:
         codes = [
             f"{one['conevo']} ({one['code']})" for one in provenance["sessions"] if "code" in one
         ]
-        return About(
+        return Declared(
             outline=run.outline,
             choices=choices_of(flattened(run.tables())),
             measures={
@@ -90,8 +90,8 @@ class Stage:
     def __init__(self, path: Path) -> None:
         self.path, self.log = path, Log(path / GENERATIONS)
         files = (path / CONFIG, path / PROVENANCE)
-        self._files = Whole(files, lambda: About.of(path))
-        self.about: About | None = None
+        self._files = Whole(files, lambda: Declared.of(path))
+        self.about: Declared | None = None
 
     def look(self, go_on: Callable[[], bool]) -> None:
         """Read what has changed.
@@ -300,7 +300,7 @@ class Subject:
         return about.measures if (about := self._last_about) else {}
 
     @property
-    def _last_about(self) -> About | None:
+    def _last_about(self) -> Declared | None:
         return self._stages[-1].about if self._stages else None
 
     @property
