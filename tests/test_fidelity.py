@@ -139,7 +139,7 @@ def test_every_default_is_the_codes() -> None:
     for row in rows("Default"):
         values = [ast.literal_eval(text) for text in re.findall(r"`([^`]+)`", row["Default"])]
         places = PLACE.findall(row["Place"])
-        assert len(values) <= len(places), row["What"]
+        assert len(values) <= len(places), row["Rule"]
         for value, (file, name) in zip(values, places, strict=False):
             assert value in default(lookup(file, name)), f"{file}::{name} is not {value!r}"
             checked += 1
@@ -150,10 +150,10 @@ def test_every_rule_is_marked_and_every_choice_explained() -> None:
     found = rows("Mark")
     assert {row["Mark"] for row in found} == {"T", "D", "C"}
     for row in found:
-        assert PLACE.search(row["Place"]), row["What"]
-        assert row["Thesis"], row["What"]
+        assert PLACE.search(row["Place"]), row["Rule"]
+        assert row["Thesis"], row["Rule"]
         for column in ("Why", "Sensitivity"):
-            assert bool(row[column]) == (row["Mark"] == "C"), f"{column} of: {row['What']}"
+            assert bool(row[column]) == (row["Mark"] == "C"), f"{column} of: {row['Rule']}"
 
 
 def enclosing(path: Path, line: int) -> str:

@@ -26,7 +26,6 @@ CHECKED = (
 NOT_YET = (
     "CHANGELOG.md",
     "benchmarks/README.md",
-    "docs/fidelity.md",
     "docs/results/calibration.md",
     "docs/results/gacc.md",
     "docs/results/learning.md",
