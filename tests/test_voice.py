@@ -25,16 +25,7 @@ CHECKED = (
 )
 NOT_YET = (
     "CHANGELOG.md",
-    "benchmarks/README.md",
-    "docs/results/calibration.md",
-    "docs/results/gacc.md",
-    "docs/results/learning.md",
-    "docs/results/mixed.md",
-    "docs/results/prey.md",
     "docs/results/regimes.md",
-    "docs/results/sensitivity.md",
-    "docs/results/sensitivity-pursuit.md",
-    "docs/results/specialists.md",
 )
 # Each phrase, a regular expression in which a space is any white space, and what to write.
 REFUSED = (
