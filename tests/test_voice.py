@@ -23,10 +23,7 @@ CHECKED = (
     "examples/*.md",
     "examples/*.py",
 )
-NOT_YET = (
-    "CHANGELOG.md",
-    "docs/results/regimes.md",
-)
+NOT_YET = ("docs/results/regimes.md",)  # it is being rewritten
 # Each phrase, a regular expression in which a space is any white space, and what to write.
 REFUSED = (
     (r"(?<!there\s)\b(is|are|was|were) no (?!longer|more|less|better|worse)", "is not a"),
