@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from conevo import palette
-from conevo.playback.channel import Channel
+from conevo.playback.quantized import Channel
 from conevo.playback.schema import Backdrop, BodyKind, Kind, PlanRow, Playback, Ring, Robot, Things
 
 T = 40

@@ -1,8 +1,14 @@
 """Trajectories with changes made by hand, and what a playback of them says."""
 
+import json
 from dataclasses import replace
+from pathlib import Path
 
-from conevo.playback.channel import Channel
+import numpy as np
+
+from conevo.playback.quantized import Channel
+from conevo.replay.playback import playback_of
+from conevo.replay.trajectory import Trajectory
 from replay.epochs import TASKS
 
 GACC, LIGHT = TASKS[3], TASKS[4]
@@ -22,6 +28,15 @@ def changed(trajectory, **arrays):
         else:
             channels[name] = array if isinstance(array, Channel) else Channel.of(array)
     return replace(trajectory, channels=channels)
+
+
+def opened(trajectory):
+    """What is drawn of a file that holds a trajectory, whatever is in it."""
+    kept = {name: {"low": c.low, "step": c.step} for name, c in trajectory.channels.items()}
+    about = json.dumps(trajectory.about | {"channels": kept})
+    arrays = {name: channel.codes for name, channel in trajectory.channels.items()}
+    arrays["about"] = np.frombuffer(about.encode(), np.uint8)
+    return playback_of(Trajectory.of_arrays(arrays, Path("epoch.npz")))
 
 
 def told(playback, kind=None):

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from conevo import palette
-from conevo.playback.channel import Channel
+from conevo.playback.quantized import Channel
 from conevo.playback.schema import (
     Backdrop,
     BodyKind,

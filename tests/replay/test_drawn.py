@@ -11,7 +11,7 @@ from conevo.playback.drawn import Area, Drawn, Objects, Signal
 from conevo.replay.playback import playback_of
 from conevo.replay.trajectory import Trajectory
 from replay.epochs import epoch, renamed
-from replay.staging import told, values
+from replay.staging import opened, told, values
 
 BALL = f"{Path(__file__).resolve().parents[2] / 'examples' / 'ball.py'}:near-1"
 SUBCLASS = """
@@ -116,6 +116,14 @@ def test_a_subclass_is_drawn_like_the_world_it_inherits(tmp_path):
         (Drawn(areas=(Area("goal", "places", 0.5, 0.1),)), "goal is not drawn: x is [6, 2]"),
         (Drawn(areas=(Area("goal", 0.5, 0.5),)), "a radius, or a width and a height"),
         (Drawn(signals=(Signal("push", "places"),)), "not recorded in every iteration"),
+        (
+            Drawn(objects=(Objects("ball", "ball[0]", "ball[1]", kind="n_robots"),)),
+            "1 names",
+        ),
+        (
+            Drawn(objects=(Objects("a", "x", "y", state="action", states=("a",)),)),
+            "0 to 1, and",
+        ),
         ({"object": []}, "drawn.object: "),
         ({"unit": 3}, "drawn.unit: "),
     ],
@@ -134,7 +142,7 @@ def test_damaged_descriptions_are_refused():
                 {"bounds": [1, 1, 0, 0]}, {"colours": {"rest": "red"}},
                 {"areas": [{"name": "a", "x": 0, "y": 0, "radius": 1e999}]}):  # fmt: skip
         with pytest.raises(UsageError) as error:
-            playback_of(with_drawn(odd))
+            opened(with_drawn(odd))
         assert "\n" not in str(error.value)
 
 

@@ -9,7 +9,7 @@ from PIL import Image
 
 from conevo import palette
 from conevo.errors import UsageError
-from conevo.playback.channel import Channel
+from conevo.playback.quantized import Channel
 from conevo.playback.schema import Backdrop, BodyKind, Kind, Ring, Things
 from conevo.replay.drawing.mask import Mask
 from conevo.replay.drawing.panel import PAGE, Panel

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from conevo.errors import EnvironmentFailure, UsageError
-from conevo.playback.channel import Channel
+from conevo.playback.quantized import Channel
 from conevo.replay.trajectory import Trajectory
 from conevo.rng import fold
 from conevo.worlds.protocol import setting_columns
@@ -228,6 +228,9 @@ HOSTILE = {
     "favourites without shares": {"about": {"favourites": []}},
     "a share above 1": {"about": {"favourite_shares": [1.5] * 20}},
     "something more": {"about": {"script": "alert(1)"}},
+    "a text in two lines": {"about": {"label": "a\nb"}},
+    "a text too long": {"about": {"environment": "x" * 3000}},
+    "no actions": {"about": {"actions": []}},
     "nested params": {"about": {"params": {"a": {"b": []}}}},
     "not a number": {"about": {"fitness": [float("nan")] * 20}},
     "a missing array": {"drop": ("x",)},
@@ -291,6 +294,6 @@ def test_what_is_no_archive_is_refused(tmp_path):
 
 
 def test_words_about_it_are_kept_as_they_are(tmp_path):
-    words = renamed(epoch("rover/complex-5"), label="</script><b>\u2028\n", task="a/../b")
+    words = renamed(epoch("rover/complex-5"), label="</script><b>\u00e9&amp;", task="a/../b")
     words.save(tmp_path / "epoch.npz")
     assert Trajectory.load(tmp_path / "epoch.npz").about == words.about

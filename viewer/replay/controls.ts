@@ -2,8 +2,7 @@
 
 import { find, make, named, say, swatch } from "../shared/dom";
 import type { Clock } from "./clock";
-import { FAINT } from "./paint";
-import type { Kind } from "./stage";
+import { FAINT, type Kind } from "./playback";
 import { SPEEDS, type State, type Store } from "./state";
 
 export class Controls {
@@ -61,8 +60,8 @@ export class Controls {
 
   private fillLegend({ colourBy }: State): void {
     const kinds = new Map<string, Kind>();
-    for (const stage of this.store.stages) {
-      const all = colourBy === "action" ? stage.actions : stage.castes;
+    for (const playback of this.store.playbacks) {
+      const all = colourBy === "action" ? playback.actions : playback.castes;
       for (const kind of all) kinds.set(`${kind.name} ${kind.colour}`, kind);
     }
     const entries = [...kinds.values()].map(({ name, colour }) => {

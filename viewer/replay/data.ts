@@ -1,11 +1,8 @@
 // Numbers of a trajectory as they are kept: small codes, each standing for a value.
 
-const LARGEST = 1e15; // of a value: beyond it even whole numbers would not be exact
+import type { Playback } from "./playback";
 
 type Codes = Uint8Array | Uint16Array | Uint32Array;
-
-/** The data are not what they should be; the message is for the reader of the page. */
-export class Damaged extends Error {}
 
 /** An array of numbers: value = low + step * code. Of [T, I, J] time runs fastest. */
 export class Channel {
@@ -39,35 +36,30 @@ export class Channel {
   }
 }
 
-/** All channels of a page in one piece of memory. */
-export class Pool {
-  constructor(private readonly memory: ArrayBuffer) {}
-
-  /** Return the channel at a place. Throws Damaged if it reaches beyond the memory. */
-  channel(at: number, bytes: number, shape: readonly number[], low: number, step: number): Channel {
-    const count = shape.reduce((product, size) => product * size, 1);
-    const kinds = { 1: Uint8Array, 2: Uint16Array, 4: Uint32Array };
-    const Kind = kinds[bytes as 1 | 2 | 4];
-    if (!Kind || at % bytes || at + bytes * count > this.memory.byteLength) {
-      throw new Damaged("a channel lies outside of the data");
-    }
-    const top = low + step * (2 ** (8 * bytes) - 1);
-    if (!(Math.abs(low) <= LARGEST && Math.abs(top) <= LARGEST)) {
-      throw new Damaged("a channel has numbers beyond all measure");
-    }
-    return new Channel(new Kind(this.memory, at, count), shape, low, step);
-  }
+/** A channel as JSON has it: where its codes lie in the page's memory. */
+interface Place {
+  readonly at: number;
+  readonly bytes: 1 | 2 | 4;
+  readonly shape: readonly number[];
+  readonly low: number;
+  readonly step: number;
 }
 
-/** Return the pool of a page's text: base64 of zlib-compressed bytes. Throws Damaged. */
-export async function inflate(base64: string): Promise<Pool> {
-  try {
-    const text = atob(base64);
-    const bytes = new Uint8Array(text.length);
-    for (let k = 0; k < text.length; k++) bytes[k] = text.charCodeAt(k);
-    const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
-    return new Pool(await new Response(stream).arrayBuffer());
-  } catch {
-    throw new Damaged("its numbers cannot be unpacked");
-  }
+/** Return what a page's JSON says is drawn of its teams, with the channels in its memory. */
+export function readPlaybacks(json: string, memory: ArrayBuffer): Playback[] {
+  const kinds = { 1: Uint8Array, 2: Uint16Array, 4: Uint32Array };
+  const revive = (_: string, value: unknown) => {
+    if (typeof value !== "object" || value === null || !("bytes" in value)) return value;
+    const { at, bytes, shape, low, step } = value as Place;
+    const count = shape.reduce((product, size) => product * size, 1);
+    return new Channel(new kinds[bytes](memory, at, count), shape, low, step);
+  };
+  return JSON.parse(json, revive).teams;
+}
+
+/** Return the memory of a page's text: base64 of zlib-compressed bytes. */
+export async function inflate(base64: string): Promise<ArrayBuffer> {
+  const bytes = Uint8Array.from(atob(base64), (sign) => sign.charCodeAt(0));
+  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
+  return new Response(stream).arrayBuffer();
 }

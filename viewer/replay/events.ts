@@ -1,8 +1,7 @@
 // What happened, as a list: the kinds that are looked for, and a click jumps there.
 
 import { make, named, say, swatch } from "../shared/dom";
-import { INK } from "./paint";
-import type { Event, Stage } from "./stage";
+import { INK, type Event, type Playback } from "./playback";
 import type { Store } from "./state";
 
 /** Events that are listed at once; all are on the timeline and can be reached with "," and ".". */
@@ -19,17 +18,17 @@ export class Events {
   private current: HTMLElement | null = null;
 
   constructor(
-    private readonly stage: Stage,
+    private readonly playback: Playback,
     team: number,
     private readonly store: Store,
   ) {
-    this.sorted = stage.events.map((_, k) => k);
-    this.sorted.sort((a, b) => stage.events[a]!.t - stage.events[b]!.t || a - b);
+    this.sorted = playback.events.map((_, k) => k);
+    this.sorted.sort((a, b) => playback.events[a]!.t - playback.events[b]!.t || a - b);
     this.list = make("div", { id: `events-${team}`, class: "events", role: "group" });
     this.list.setAttribute("aria-label", "events, the first to happen first");
     this.element = make("section", { class: "card of-events" }, make("h3", {}, "Events"));
     const filters = make("div", { class: "filters" });
-    stage.event_kinds.forEach((_, kind) => filters.append(this.filter(kind)));
+    playback.event_kinds.forEach((_, kind) => filters.append(this.filter(kind)));
     this.element.append(filters, this.list, this.note);
     this.fill();
     store.listen(({ t, playing }) => this.follow(t, playing));
@@ -38,7 +37,7 @@ export class Events {
   /** Return the iterations at which something happened that is not filtered out, in order. */
   get times(): number[] {
     return this.sorted
-      .map((k) => this.stage.events[k]!)
+      .map((k) => this.playback.events[k]!)
       .filter((one) => this.isWanted(one))
       .map(({ t }) => t);
   }
@@ -48,8 +47,8 @@ export class Events {
   }
 
   private filter(kind: number): HTMLElement {
-    const { name, colour } = this.stage.event_kinds[kind]!;
-    const n = this.stage.events.filter((event) => event.kind === kind).length;
+    const { name, colour } = this.playback.event_kinds[kind]!;
+    const n = this.playback.events.filter((event) => event.kind === kind).length;
     const box = make("input", { type: "checkbox", checked: true, "data-kind": kind });
     box.addEventListener("change", () => {
       if (box.checked) this.hidden.delete(kind);
@@ -60,13 +59,13 @@ export class Events {
   }
 
   private fill(): void {
-    const wanted = this.sorted.filter((k) => this.isWanted(this.stage.events[k]!));
+    const wanted = this.sorted.filter((k) => this.isWanted(this.playback.events[k]!));
     this.shown = wanted.slice(0, MOST).map((k) => {
-      const event = this.stage.events[k]!;
+      const event = this.playback.events[k]!;
       return { t: event.t, button: this.button(event, k) };
     });
     this.list.replaceChildren(...this.shown.map(({ button }) => button));
-    const all = this.stage.events.length;
+    const all = this.playback.events.length;
     if (!all) say(this.note, "Nothing happened in this epoch that would be listed.");
     else if (wanted.length > MOST) say(this.note, `The first ${MOST} of ${wanted.length}.`);
     else say(this.note, wanted.length < all ? `${wanted.length} of ${all}.` : "");
@@ -81,7 +80,7 @@ export class Events {
       "data-t": event.t,
       title: event.text,
     });
-    const { colour } = this.stage.event_kinds[event.kind]!;
+    const { colour } = this.playback.event_kinds[event.kind]!;
     button.append(
       make("b", {}, String(event.t)),
       swatch(colour || INK),

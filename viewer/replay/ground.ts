@@ -1,17 +1,16 @@
 // What stands still: the floor, areas, canals and walls.
 
-import { FAINT, GROUND, INK } from "./paint";
-import type { Backdrop, Stage } from "./stage";
+import { FAINT, GROUND, INK, type Backdrop, type Playback } from "./playback";
 import type { View } from "./view";
 
 type Pen = CanvasRenderingContext2D;
 
 /** Draw the floor and all that stands on it for good. */
-export function drawGround(pen: Pen, stage: Stage, view: View): void {
-  const [x0, y0, x1, y1] = stage.bounds as [number, number, number, number];
+export function drawGround(pen: Pen, playback: Playback, view: View): void {
+  const [x0, y0, x1, y1] = playback.bounds;
   pen.fillStyle = GROUND;
   pen.fillRect(view.x(x0), view.y(y1), view.scale * (x1 - x0), view.scale * (y1 - y0));
-  for (const part of stage.backdrop) {
+  for (const part of playback.backdrop) {
     if (part.shape === "raster") drawRaster(pen, part, view);
     else drawShape(pen, part, view);
   }
@@ -21,8 +20,8 @@ export function drawGround(pen: Pen, stage: Stage, view: View): void {
 }
 
 /** Write the names of areas; nothing else may hide them. */
-export function drawLabels(pen: Pen, stage: Stage, view: View): void {
-  for (const part of stage.backdrop) {
+export function drawLabels(pen: Pen, playback: Playback, view: View): void {
+  for (const part of playback.backdrop) {
     if (part.label && part.fill && part.shape === "rect") drawLabel(pen, part, view);
   }
 }

@@ -44,7 +44,7 @@ export function makeInterface(store: Store, clock: Clock, teams: readonly Team[]
     },
     /** Return the colour that a body is drawn in now. */
     colour(team: number, body: number): string {
-      return colourOf(store.stages[team]!, body, store.now.t, store.now.colourBy);
+      return colourOf(store.playbacks[team]!, body, store.now.t, store.now.colourBy);
     },
     /** Return how many frames were drawn while playing since the last call, and in how long. */
     frames(): { count: number; seconds: number } {

@@ -37,17 +37,17 @@ export function listenToKeys(store: Store, clock: Clock, times: () => number[]):
   const robot = (by: number) => {
     const { selected } = store.now;
     const team = selected?.team ?? 0;
-    const n = store.stages[team]!.robots.length;
+    const n = store.playbacks[team]!.robots.length;
     const next = selected ? selected.robot + by : by > 0 ? 0 : n - 1;
     store.set({ selected: { team, robot: (next + n) % n } });
   };
   const nearer = (factor: number) => {
     const { selected, t, look } = store.now;
-    const stage = selected && store.stages[selected.team];
+    const playback = selected && store.playbacks[selected.team];
     // Around the selected robot, or around what is in the middle.
-    const x = stage ? stage.x.at(t, selected.robot) : look.x;
-    const y = stage ? stage.y.at(t, selected.robot) : look.y;
-    if (stage && factor > 1) store.set({ look: { ...look, x, y } });
+    const x = playback ? playback.x.at(t, selected.robot) : look.x;
+    const y = playback ? playback.y.at(t, selected.robot) : look.y;
+    if (playback && factor > 1) store.set({ look: { ...look, x, y } });
     zoom(store, factor, x, y);
   };
   const actions: Record<string, (event: KeyboardEvent) => void> = {

@@ -7,10 +7,9 @@ import "./narrow.css";
 import { find, make } from "../shared/dom";
 import { Clock } from "./clock";
 import { Controls } from "./controls";
-import { Damaged, inflate } from "./data";
+import { inflate, readPlaybacks } from "./data";
 import { makeInterface } from "./interface";
 import { listenToKeys } from "./keys";
-import { readStages } from "./stage";
 import { Store } from "./state";
 import { Team } from "./team";
 import { Tooltip } from "./tooltip";
@@ -21,17 +20,15 @@ declare global {
   }
 }
 
-/** Show the data of the page. Throws Damaged if they cannot be shown. */
+/** Show the data of the page. */
 async function show(): Promise<void> {
-  const texts = ["about", "data"].map((id) => document.getElementById(id)?.textContent);
-  const [about, data] = texts;
-  if (!about || data === undefined || data === null) throw new Damaged("it carries no data");
-  const store = new Store(readStages(about, await inflate(data)));
+  const [about, data] = [find("about", HTMLElement), find("data", HTMLElement)];
+  const store = new Store(readPlaybacks(about.textContent!, await inflate(data.textContent!)));
   const clock = new Clock(store);
   const tooltip = new Tooltip();
-  const teams = store.stages.map((stage, k) => new Team(stage, k, store, tooltip));
+  const teams = store.playbacks.map((playback, k) => new Team(playback, k, store, tooltip));
 
-  const titles = new Set(store.stages.map((stage) => stage.title));
+  const titles = new Set(store.playbacks.map((playback) => playback.title));
   document.title = `${[...titles].join(" and ")} - conevo`;
   document.body.classList.add(teams.length > 1 ? "two" : "one");
   find("teams", HTMLElement).append(...teams.map((team) => team.element));
@@ -45,11 +42,11 @@ async function show(): Promise<void> {
   document.body.dataset["ready"] = "yes";
 }
 
-/** Say in one line why nothing is shown. */
-function complain(error: unknown): void {
-  const reason = error instanceof Damaged ? error.message : "its data do not fit each other";
+/** Say in one line that nothing can be shown: the file was cut or changed on its way. */
+function complain(): void {
+  const text = "This replay cannot be shown: its data are missing or damaged.";
   find("app", HTMLElement).hidden = true;
-  document.body.append(make("p", { role: "alert" }, `This replay cannot be shown: ${reason}.`));
+  document.body.append(make("p", { role: "alert" }, text));
   document.body.dataset["ready"] = "error";
 }
 

@@ -1,8 +1,8 @@
 // Below the rows of a timeline: when events happened, a lane for each kind, and curves of measures.
 
 import { make, say, swatch } from "../shared/dom";
-import { FAINT, INK, Sheet } from "./paint";
-import type { Event, Measure, Stage } from "./stage";
+import { Sheet } from "./paint";
+import { FAINT, INK, type Event, type Curve, type Playback } from "./playback";
 import type { Store } from "./state";
 import type { Tooltip } from "./tooltip";
 
@@ -23,7 +23,7 @@ export class Marks {
   private readonly lanes: number[];
 
   constructor(
-    private readonly stage: Stage,
+    private readonly playback: Playback,
     team: number,
     private readonly store: Store,
     private readonly tooltip: Tooltip,
@@ -32,11 +32,11 @@ export class Marks {
     this.canvas = make("canvas", { id: `marks-${team}`, role: "img", "aria-label": label });
     this.sheet = new Sheet(this.canvas, false);
     // Two teams have the same lanes and the same scales: they are compared.
-    const happened = new Set(store.stages.flatMap((one) => one.events.map(({ kind }) => kind)));
-    this.lanes = stage.event_kinds.map((_, kind) => kind).filter((kind) => happened.has(kind));
-    this.height = LANE * this.lanes.length + CURVE * stage.measures.length;
-    this.extents = stage.measures.map(({ name }) => {
-      const same = store.stages.flatMap((one) =>
+    const happened = new Set(store.playbacks.flatMap((one) => one.events.map(({ kind }) => kind)));
+    this.lanes = playback.event_kinds.map((_, kind) => kind).filter((kind) => happened.has(kind));
+    this.height = LANE * this.lanes.length + CURVE * playback.measures.length;
+    this.extents = playback.measures.map(({ name }) => {
+      const same = store.playbacks.flatMap((one) =>
         one.measures.filter((measure) => measure.name === name),
       );
       const ranges = same.map(({ values }) => values.range());
@@ -61,25 +61,27 @@ export class Marks {
     this.lanes.forEach((kind, lane) => {
       pen.fillStyle = "#f1f0ec";
       pen.fillRect(0, LANE * lane + 2, width, LANE - 4);
-      pen.fillStyle = this.stage.event_kinds[kind]!.colour || INK;
-      for (const event of this.stage.events) {
+      pen.fillStyle = this.playback.event_kinds[kind]!.colour || INK;
+      for (const event of this.playback.events) {
         if (event.kind === kind)
           pen.fillRect(this.x(event.t) - 0.75, LANE * lane + 2, 1.5, LANE - 4);
       }
     });
     const top = LANE * this.lanes.length;
-    this.stage.measures.forEach((measure, k) => this.drawCurve(measure, k, top + CURVE * k));
+    this.playback.measures.forEach((measure, k) => this.drawCurve(measure, k, top + CURVE * k));
   }
 
   /** Show what the measures are in a frame. */
   update(t: number): void {
-    this.stage.measures.forEach((measure, k) => say(this.values[k]!, short(measure.values.at(t))));
+    this.playback.measures.forEach((measure, k) =>
+      say(this.values[k]!, short(measure.values.at(t))),
+    );
   }
 
   private describe(): void {
     for (const index of this.lanes) {
-      const kind = this.stage.event_kinds[index]!;
-      const n = this.stage.events.filter((event) => event.kind === index).length;
+      const kind = this.playback.event_kinds[index]!;
+      const n = this.playback.events.filter((event) => event.kind === index).length;
       const row = make(
         "span",
         { title: kind.name },
@@ -90,7 +92,7 @@ export class Marks {
       row.style.height = `${LANE}px`;
       this.right.append(row);
     }
-    for (const measure of this.stage.measures) {
+    for (const measure of this.playback.measures) {
       const value = make("b");
       this.values.push(value);
       const row = make(
@@ -104,9 +106,9 @@ export class Marks {
     }
   }
 
-  private drawCurve({ values }: Measure, k: number, top: number): void {
+  private drawCurve({ values }: Curve, k: number, top: number): void {
     const { pen, width } = this.sheet;
-    const T = this.stage.iterations;
+    const T = this.playback.iterations;
     const [low, most] = this.extents[k]!;
     const y = (value: number) =>
       top + CURVE - 2 - ((CURVE - 5) * (value - low)) / (most - low || 1);
@@ -128,7 +130,7 @@ export class Marks {
   }
 
   private x(t: number): number {
-    return (this.sheet.width * (t + 0.5)) / this.stage.iterations;
+    return (this.sheet.width * (t + 0.5)) / this.playback.iterations;
   }
 
   /** Return the event whose mark is below the pointer, if there is one. */
@@ -138,7 +140,7 @@ export class Marks {
     const kind = this.lanes[Math.floor(y / LANE)];
     let best: Event | null = null;
     let least = REACH;
-    for (const one of this.stage.events) {
+    for (const one of this.playback.events) {
       const away = Math.abs(this.x(one.t) - x);
       if (one.kind === kind && away <= least) [best, least] = [one, away];
     }
@@ -147,8 +149,8 @@ export class Marks {
 
   private at(event: MouseEvent): number {
     const box = this.canvas.getBoundingClientRect();
-    const t = Math.floor(((event.clientX - box.left) / box.width) * this.stage.iterations);
-    return Math.min(Math.max(t, 0), this.stage.iterations - 1);
+    const t = Math.floor(((event.clientX - box.left) / box.width) * this.playback.iterations);
+    return Math.min(Math.max(t, 0), this.playback.iterations - 1);
   }
 
   private press(event: PointerEvent): void {
@@ -162,7 +164,7 @@ export class Marks {
     const found = this.below(event);
     this.canvas.style.cursor = found ? "pointer" : "";
     const t = found?.t ?? this.at(event);
-    const measures = this.stage.measures.map((one) => `${one.name} ${short(one.values.at(t))}`);
+    const measures = this.playback.measures.map((one) => `${one.name} ${short(one.values.at(t))}`);
     const text = [`iteration ${t}`, ...(found ? [found.text] : measures)].join(": ");
     this.tooltip.show(event.clientX, event.clientY, text);
   }

@@ -1,23 +1,22 @@
 // Colours of robots, and the few that the page itself uses.
 
-import type { Stage } from "./stage";
+import { FAINT, HUES, type Playback } from "./playback";
 import type { State } from "./state";
-
-// The same as in conevo/palette.py.
-export const INK = "#1c1c22";
-export const FAINT = "#9a9aa5";
-export const GROUND = "#fbfaf7";
-const HUES = ["#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00"];
 
 /** Return a colour for the k-th of some things that have none of their own. */
 export const hue = (k: number): string => HUES[k % HUES.length]!;
 
 /** Return the colour of a body: that of its kind, or of the robot's action or caste. */
-export function colourOf(stage: Stage, body: number, t: number, by: State["colourBy"]): string {
-  const robot = stage.robots[body];
-  if (!robot) return stage.body_kinds[stage.body[body]!]!.colour || FAINT;
-  if (by === "caste") return stage.castes[robot.caste]!.colour || FAINT;
-  return stage.actions[stage.action.at(t, body)]?.colour || FAINT;
+export function colourOf(
+  playback: Playback,
+  body: number,
+  t: number,
+  by: State["colourBy"],
+): string {
+  const robot = playback.robots[body];
+  if (!robot) return playback.body_kinds[playback.body[body]!]!.colour || FAINT;
+  if (by === "caste") return playback.castes[robot.caste]!.colour || FAINT;
+  return playback.actions[playback.action.at(t, body)]?.colour || FAINT;
 }
 
 /** A canvas as sharp as the screen, drawn in CSS pixels. */

@@ -1,7 +1,7 @@
 // How far robots see and reach: rings around them, and what each sensor of one of them reads.
 
-import { colourOf, FAINT, hue, INK } from "./paint";
-import type { Ring, Stage } from "./stage";
+import { colourOf, hue } from "./paint";
+import { FAINT, INK, type Ring, type Playback, RANGE_FILL, RANGE_LINE } from "./playback";
 import type { State } from "./state";
 import type { View } from "./view";
 
@@ -13,38 +13,46 @@ const FULL = 0.55;
 /** Draw the ranges that are to be seen now around the robots of one team. */
 export function drawRings(
   pen: Pen,
-  stage: Stage,
+  playback: Playback,
   view: View,
   state: State,
   selected: number,
 ): void {
   const { t, ranges } = state;
-  const [R, B] = [stage.robots.length, stage.body.length];
-  for (const ring of stage.rings) {
+  const [R, B] = [playback.robots.length, playback.body.length];
+  for (const ring of playback.rings) {
     const [first, last] = ring.of === "robots" ? [0, R] : [R, B];
     for (let b = first; b < last; b++) {
-      if (ring.when === "action") drawAction(pen, stage, view, ring, t, b);
-      else if (ranges || b === selected) drawOutline(pen, stage, view, ring, t, b, b === selected);
+      if (ring.when === "action") drawAction(pen, playback, view, ring, t, b);
+      else if (ranges || b === selected)
+        drawOutline(pen, playback, view, ring, t, b, b === selected);
     }
   }
 }
 
 /** Return a ring's radius in pixels around a body; what is not of the team has no actions. */
-function radius(stage: Stage, view: View, ring: Ring, t: number, b: number): number {
-  const action = b < stage.robots.length ? stage.action.at(t, b) : 0;
+function radius(playback: Playback, view: View, ring: Ring, t: number, b: number): number {
+  const action = b < playback.robots.length ? playback.action.at(t, b) : 0;
   return action < 0 ? 0 : (ring.radius[action] ?? 0) * view.scale;
 }
 
-function drawAction(pen: Pen, stage: Stage, view: View, ring: Ring, t: number, b: number): void {
-  const size = radius(stage, view, ring, t, b);
+function drawAction(
+  pen: Pen,
+  playback: Playback,
+  view: View,
+  ring: Ring,
+  t: number,
+  b: number,
+): void {
+  const size = radius(playback, view, ring, t, b);
   if (size <= 0) return;
-  const colour = colourOf(stage, b, t, "action");
+  const colour = colourOf(playback, b, t, "action");
   pen.beginPath();
-  pen.arc(view.x(stage.x.at(t, b)), view.y(stage.y.at(t, b)), size, 0, 2 * Math.PI);
-  pen.globalAlpha = 0.1;
+  pen.arc(view.x(playback.x.at(t, b)), view.y(playback.y.at(t, b)), size, 0, 2 * Math.PI);
+  pen.globalAlpha = RANGE_FILL;
   pen.fillStyle = colour;
   pen.fill();
-  pen.globalAlpha = 0.35;
+  pen.globalAlpha = RANGE_LINE;
   pen.strokeStyle = colour;
   pen.lineWidth = 1;
   pen.stroke();
@@ -53,35 +61,41 @@ function drawAction(pen: Pen, stage: Stage, view: View, ring: Ring, t: number, b
 
 function drawOutline(
   pen: Pen,
-  stage: Stage,
+  playback: Playback,
   view: View,
   ring: Ring,
   t: number,
   b: number,
   isSelected: boolean,
 ): void {
-  const size = radius(stage, view, ring, t, b);
+  const size = radius(playback, view, ring, t, b);
   if (size <= 0) return;
   pen.strokeStyle = isSelected ? INK : FAINT;
   pen.globalAlpha = 0.6;
   pen.lineWidth = 1;
   pen.setLineDash(isSelected ? [4, 3] : [2, 3]);
   pen.beginPath();
-  pen.arc(view.x(stage.x.at(t, b)), view.y(stage.y.at(t, b)), size, 0, 2 * Math.PI);
+  pen.arc(view.x(playback.x.at(t, b)), view.y(playback.y.at(t, b)), size, 0, 2 * Math.PI);
   pen.stroke();
   pen.setLineDash([]);
   pen.globalAlpha = 1;
 }
 
 /** Draw where a robot's sensors look, each wedge as opaque as its sensor's reading. */
-export function drawWedges(pen: Pen, stage: Stage, view: View, t: number, robot: number): void {
-  if (!stage.sensors) return;
-  const [x, y] = [view.x(stage.x.at(t, robot)), view.y(stage.y.at(t, robot))];
-  const heading = stage.heading?.at(t, robot) ?? 0;
-  stage.sensor_groups.forEach((group, index) => {
+export function drawWedges(
+  pen: Pen,
+  playback: Playback,
+  view: View,
+  t: number,
+  robot: number,
+): void {
+  if (!playback.sensors) return;
+  const [x, y] = [view.x(playback.x.at(t, robot)), view.y(playback.y.at(t, robot))];
+  const heading = playback.heading?.at(t, robot) ?? 0;
+  playback.sensor_groups.forEach((group, index) => {
     const reach = group.reach * view.scale;
     group.angles.forEach((angle, k) => {
-      const reading = Math.min(Math.max(stage.sensors!.at(t, robot, group.first + k), 0), 1);
+      const reading = Math.min(Math.max(playback.sensors!.at(t, robot, group.first + k), 0), 1);
       // Angles turn the other way on a canvas, where y points down.
       const middle = -(angle + (group.turns ? heading : 0));
       pen.beginPath();

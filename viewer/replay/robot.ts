@@ -2,8 +2,8 @@
 
 import { make, say, swatch } from "../shared/dom";
 import type { Channel } from "./data";
-import { FAINT, hue, Sheet } from "./paint";
-import type { Stage } from "./stage";
+import { hue, Sheet } from "./paint";
+import { FAINT, type Playback } from "./playback";
 import type { State, Store } from "./state";
 
 /** A value that changes with time, its text and its bar. */
@@ -23,7 +23,7 @@ export class RobotPanel {
   private readonly head = make("div", { class: "playhead" });
 
   constructor(
-    private readonly stage: Stage,
+    private readonly playback: Playback,
     private readonly team: number,
     private readonly store: Store,
   ) {
@@ -51,20 +51,20 @@ export class RobotPanel {
       bar?.style.setProperty("--part", part(t, robot).toFixed(3));
     }
     this.markHighest(t);
-    this.head.style.left = `${(100 * (t + 0.5)) / this.stage.iterations}%`;
+    this.head.style.left = `${(100 * (t + 0.5)) / this.playback.iterations}%`;
   }
 
   private build(): void {
     this.cells = [];
     this.outputs = [];
-    const { stage, robot } = this;
+    const { playback, robot } = this;
     if (robot < 0) {
       const hint =
         "Click a robot in the world or its row in the timeline, or press the down arrow.";
       this.element.replaceChildren(make("h3", {}, "Robot"), make("p", { class: "note" }, hint));
       return;
     }
-    const { caste } = stage.robots[robot]!;
+    const { caste } = playback.robots[robot]!;
     const close = make(
       "button",
       { type: "button", class: "plain", "aria-label": "deselect the robot" },
@@ -74,7 +74,7 @@ export class RobotPanel {
     const title = make(
       "h3",
       {},
-      swatch(stage.castes[caste]!.colour || FAINT),
+      swatch(playback.castes[caste]!.colour || FAINT),
       `Robot ${robot}`,
       close,
     );
@@ -88,57 +88,60 @@ export class RobotPanel {
   }
 
   private numbers(robot: number): HTMLElement {
-    const { stage } = this;
-    const one = stage.robots[robot]!;
+    const { playback } = this;
+    const one = playback.robots[robot]!;
     const numbers = make("dl", { class: "numbers" });
-    const unit = stage.unit ? ` ${stage.unit}` : "";
+    const unit = playback.unit ? ` ${playback.unit}` : "";
     const add = (name: string, read: ((t: number, robot: number) => string) | string) => {
       const value = make("dd", { "data-field": name });
       if (typeof read === "string") value.textContent = read;
       else this.cells.push({ value, bar: null, read, part: () => 0 });
       numbers.append(make("div", {}, make("dt", {}, name), value));
     };
-    add("action", (t, r) => stage.actions[stage.action.at(t, r)]?.name ?? "none");
-    add("caste", stage.castes[one.caste]!.name);
+    add("action", (t, r) => playback.actions[playback.action.at(t, r)]?.name ?? "none");
+    add("caste", playback.castes[one.caste]!.name);
     add("specialization", one.specialization.toFixed(3));
     const share = `${one.favourite}, ${(100 * one.share).toFixed(0)} %`;
     add("favourite", one.favourite ? share : "–");
     add("fitness", one.fitness.toFixed(Math.abs(one.fitness) < 1000 ? 3 : 1));
-    if (stage.energy) add("energy", (t, r) => stage.energy!.at(t, r).toFixed(1));
-    add("x", (t, r) => stage.x.at(t, r).toFixed(3) + unit);
-    add("y", (t, r) => stage.y.at(t, r).toFixed(3) + unit);
-    if (stage.heading) add("heading", (t, r) => `${degrees(stage.heading!.at(t, r)).toFixed(0)}°`);
-    if (stage.held) add("holding", (t, r) => this.holding(t, r));
+    if (playback.energy) add("energy", (t, r) => playback.energy!.at(t, r).toFixed(1));
+    add("x", (t, r) => playback.x.at(t, r).toFixed(3) + unit);
+    add("y", (t, r) => playback.y.at(t, r).toFixed(3) + unit);
+    if (playback.heading)
+      add("heading", (t, r) => `${degrees(playback.heading!.at(t, r)).toFixed(0)}°`);
+    if (playback.held) add("holding", (t, r) => this.holding(t, r));
     return numbers;
   }
 
   private holding(t: number, robot: number): string {
-    const k = this.stage.held!.at(t, robot);
+    const k = this.playback.held!.at(t, robot);
     if (k < 0) return "nothing";
-    const group = this.stage.things[0]!;
+    const group = this.playback.things[0]!;
     return `${group.kinds[group.kind.at(k)]!.name} ${k}`;
   }
 
   /** Return the strip of the robot's actions and the share of each. */
   private actions(robot: number): HTMLElement[] {
-    const { stage } = this;
-    const counts = new Array<number>(stage.actions.length).fill(0);
+    const { playback } = this;
+    const counts = new Array<number>(playback.actions.length).fill(0);
     let [none, switches] = [0, 0];
-    for (let t = 0; t < stage.iterations; t++) {
-      const action = stage.action.at(t, robot);
+    for (let t = 0; t < playback.iterations; t++) {
+      const action = playback.action.at(t, robot);
       if (action < 0) none += 1;
       else counts[action]! += 1;
-      if (t > 0 && action !== stage.action.at(t - 1, robot)) switches += 1;
+      if (t > 0 && action !== playback.action.at(t - 1, robot)) switches += 1;
     }
     const shares = make("ul", { class: "shares" });
     const add = (name: string, colour: string, n: number) => {
       const bar = make("i", { class: "bar" });
-      bar.style.setProperty("--part", String(n / stage.iterations));
+      bar.style.setProperty("--part", String(n / playback.iterations));
       bar.style.setProperty("--colour", colour);
-      const share = `${((100 * n) / stage.iterations).toFixed(1)} %`;
+      const share = `${((100 * n) / playback.iterations).toFixed(1)} %`;
       shares.append(make("li", {}, make("span", {}, name), bar, make("b", {}, share)));
     };
-    stage.actions.forEach((kind, action) => add(kind.name, kind.colour || FAINT, counts[action]!));
+    playback.actions.forEach((kind, action) =>
+      add(kind.name, kind.colour || FAINT, counts[action]!),
+    );
     if (none) add("none", FAINT, none);
     const times = switches === 1 ? "1 switch" : `${switches} switches`;
     this.history.canvas.setAttribute("aria-label", `actions of robot ${robot} over time, ${times}`);
@@ -151,43 +154,44 @@ export class RobotPanel {
     const [width, height] = [canvas.clientWidth || 300, 16];
     this.history.resize(width, height);
     for (let x = 0; x < width; x++) {
-      const t = Math.floor(((x + 0.5) * this.stage.iterations) / width);
-      pen.fillStyle = this.stage.actions[this.stage.action.at(t, this.robot)]?.colour || FAINT;
+      const t = Math.floor(((x + 0.5) * this.playback.iterations) / width);
+      pen.fillStyle =
+        this.playback.actions[this.playback.action.at(t, this.robot)]?.colour || FAINT;
       pen.fillRect(x, 0, 1, height);
     }
   }
 
   private network(robot: number): HTMLElement[] {
-    const { stage } = this;
-    const { heuristic, neurons } = stage.robots[robot]!;
+    const { playback } = this;
+    const { heuristic, neurons } = playback.robots[robot]!;
     if (heuristic) {
       const text = `Controlled by the heuristic ${heuristic}: it has no network.`;
       return [make("p", { class: "note" }, text), ...this.sensors()];
     }
     const parts = this.sensors();
-    if (stage.hidden) {
+    if (playback.hidden) {
       const names = neurons.map((slot) => `neuron ${slot}`);
       parts.push(
         make("h4", {}, "Hidden layer"),
-        this.values("hidden", stage.hidden, names, neurons, FAINT),
+        this.values("hidden", playback.hidden, names, neurons, FAINT),
       );
     }
-    if (stage.outputs) {
+    if (playback.outputs) {
       const names = Array.from(
-        { length: stage.outputs.shape[2]! },
-        (_, k) => stage.output_names[k] ?? `output ${k}`,
+        { length: playback.outputs.shape[2]! },
+        (_, k) => playback.output_names[k] ?? `output ${k}`,
       );
       const all = names.map((_, k) => k);
       parts.push(
         make("h4", {}, "Outputs"),
-        this.values("output", stage.outputs, names, all, FAINT),
+        this.values("output", playback.outputs, names, all, FAINT),
       );
     }
     return parts;
   }
 
   private sensors(): HTMLElement[] {
-    const { sensors, sensor_groups } = this.stage;
+    const { sensors, sensor_groups } = this.playback;
     if (!sensors) return [];
     return sensor_groups.flatMap((group, index) => {
       const title = make("h4", {}, `Sensors: ${group.name}`);
@@ -202,8 +206,8 @@ export class RobotPanel {
   private values(
     of: string,
     channel: Channel,
-    names: string[],
-    units: number[],
+    names: readonly string[],
+    units: readonly number[],
     colour: string,
   ): HTMLElement {
     const list = make("ul", { class: "values" });
@@ -229,9 +233,10 @@ export class RobotPanel {
 
   /** Mark the highest output: it decides. */
   private markHighest(t: number): void {
-    const { outputs } = this.stage;
+    const { outputs } = this.playback;
     // Where outputs are fewer than actions, they are no votes: wheels have speeds.
-    if (!outputs || !this.outputs.length || this.outputs.length < this.stage.actions.length) return;
+    if (!outputs || !this.outputs.length || this.outputs.length < this.playback.actions.length)
+      return;
     const values = this.outputs.map((_, k) => outputs.at(t, this.robot, k));
     // Several may be as high, as far as kept values tell.
     const most = Math.max(...values);
@@ -241,7 +246,7 @@ export class RobotPanel {
   private seek(event: PointerEvent): void {
     if (!(event.buttons & 1)) return;
     const box = this.history.canvas.getBoundingClientRect();
-    const T = this.stage.iterations;
+    const T = this.playback.iterations;
     this.store.set({ t: Math.floor(((event.clientX - box.left) / box.width) * T) });
   }
 }

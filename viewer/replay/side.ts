@@ -2,20 +2,19 @@
 
 import { make, say, swatch } from "../shared/dom";
 import { short } from "./marks";
-import { FAINT, INK } from "./paint";
-import type { Stage } from "./stage";
+import { FAINT, INK, type Playback } from "./playback";
 import type { Store } from "./state";
 
-/** Return the cards of a stage; what it has nothing for stays out of sight. */
+/** Return the cards of a playback; what it has nothing for stays out of sight. */
 export function cards(
-  stage: Stage,
+  playback: Playback,
   store: Store,
 ): Record<"key" | "gauges" | "plan" | "facts", HTMLElement> {
   return {
-    key: card("key", "In the world", key(stage)),
-    gauges: card("gauges", "Now", gauges(stage, store)),
-    plan: card("plan", "To be built", plan(stage, store)),
-    facts: card("facts", "This epoch", facts(stage)),
+    key: card("key", "In the world", key(playback)),
+    gauges: card("gauges", "Now", gauges(playback, store)),
+    plan: card("plan", "To be built", plan(playback, store)),
+    facts: card("facts", "This epoch", facts(playback)),
   };
 }
 
@@ -30,7 +29,7 @@ function card(name: string, title: string, content: HTMLElement): HTMLElement {
 }
 
 /** What can be seen in the world besides the robots. */
-function key(stage: Stage): HTMLElement {
+function key(playback: Playback): HTMLElement {
   const list = make("ul", { class: "key" });
   const add = (name: string, fill: string, line: string, shape: string) => {
     const sign = swatch(fill || "transparent");
@@ -38,33 +37,33 @@ function key(stage: Stage): HTMLElement {
     if (line) sign.style.borderColor = line;
     list.append(make("li", {}, sign, name));
   };
-  for (const { name, colour, shape } of stage.body_kinds) {
+  for (const { name, colour, shape } of playback.body_kinds) {
     if (colour) add(name, colour, INK, shape === "square" ? "diamond" : "disc");
   }
-  if (stage.action.range()[0] < 0) add("robot without an action", FAINT, INK, "disc");
-  for (const { kinds, shape, states } of stage.things) {
+  if (playback.action.range()[0] < 0) add("robot without an action", FAINT, INK, "disc");
+  for (const { kinds, shape, states } of playback.things) {
     for (const { name, colour } of kinds) add(name, colour, "", shape);
     for (const { name, colour } of states) if (colour) add(name, "", colour, shape);
   }
-  for (const { label, fill, line, shape } of stage.backdrop) {
+  for (const { label, fill, line, shape } of playback.backdrop) {
     if (label && fill) add(label, fill, line, shape);
   }
-  for (const { name, when } of stage.rings) {
+  for (const { name, when } of playback.rings) {
     add(name, when === "action" ? "#e9e9ec" : "", FAINT, when === "action" ? "disc" : "dashed");
   }
   return list;
 }
 
-function gauges(stage: Stage, store: Store): HTMLElement {
+function gauges(playback: Playback, store: Store): HTMLElement {
   const list = make("ul", { class: "values" });
-  const rows = stage.gauges.map(({ name, colour }) => {
+  const rows = playback.gauges.map(({ name, colour }) => {
     const [bar, value] = [make("i", { class: "bar" }), make("b")];
     if (colour) bar.style.setProperty("--colour", colour);
     list.append(make("li", {}, make("span", {}, name), bar, value));
     return { bar, value };
   });
   store.listenSlowly(({ t }) => {
-    stage.gauges.forEach(({ values, most }, k) => {
+    playback.gauges.forEach(({ values, most }, k) => {
       const now = values.at(t);
       const part = most > 0 ? Math.min(Math.max(now / most, 0), 1) : 0;
       rows[k]!.bar.style.setProperty("--part", part.toFixed(3));
@@ -74,12 +73,12 @@ function gauges(stage: Stage, store: Store): HTMLElement {
   return list;
 }
 
-function plan(stage: Stage, store: Store): HTMLElement {
-  const kinds = stage.things[0]?.kinds ?? [];
+function plan(playback: Playback, store: Store): HTMLElement {
+  const kinds = playback.things[0]?.kinds ?? [];
   const list = make("ul", { class: "plan" });
   const parts: { built: number; element: HTMLElement }[] = [];
-  const counts: { built: number[]; element: HTMLElement }[] = [];
-  for (const row of stage.plan) {
+  const counts: { built: readonly number[]; element: HTMLElement }[] = [];
+  for (const row of playback.plan) {
     const line = make("span", { class: "parts" });
     row.parts.forEach((part, k) => {
       const { name, colour } = kinds[part]!;
@@ -102,9 +101,9 @@ function plan(stage: Stage, store: Store): HTMLElement {
   return list;
 }
 
-function facts(stage: Stage): HTMLElement {
+function facts(playback: Playback): HTMLElement {
   const list = make("dl", { class: "facts" });
-  for (const [name, value] of stage.facts as [string, string][]) {
+  for (const [name, value] of playback.facts) {
     list.append(make("div", {}, make("dt", {}, name), make("dd", {}, value)));
   }
   return list;

@@ -1,6 +1,6 @@
 // What the reader of the page has chosen, and who is told when it changes.
 
-import type { Stage } from "./stage";
+import { type Playback, SPEED } from "./playback";
 import { type Look, wholeOf } from "./view";
 
 /** Iterations per second that can be chosen. */
@@ -30,11 +30,11 @@ export class Store {
   private readonly listeners: Listener[] = [];
   private asked = 0;
 
-  constructor(readonly stages: readonly Stage[]) {
+  constructor(readonly playbacks: readonly Playback[]) {
     this.now = this.told = {
       t: 0,
       playing: false,
-      speed: 60,
+      speed: SPEED,
       colourBy: "action",
       order: "number",
       trails: true,
@@ -46,12 +46,12 @@ export class Store {
 
   /** The look at the whole world. */
   get whole(): Look {
-    return wholeOf(this.stages[0]!.bounds);
+    return wholeOf(this.playbacks[0]!.bounds);
   }
 
   /** The number of iterations. */
   get length(): number {
-    return this.stages[0]!.iterations;
+    return this.playbacks[0]!.iterations;
   }
 
   listen(listener: Listener): void {
@@ -74,7 +74,7 @@ export class Store {
     const next = { ...this.now, ...change };
     const t = Math.min(Math.max(Math.floor(next.t) || 0, 0), this.length - 1);
     const { selected } = next;
-    const isThere = selected && this.stages[selected.team]?.robots[selected.robot];
+    const isThere = selected && this.playbacks[selected.team]?.robots[selected.robot];
     let { look } = next;
     if (look !== this.now.look) look = look.zoom > 1 ? this.within(look) : this.whole;
     this.now = { ...next, t, look, selected: isThere ? selected : null };
@@ -83,7 +83,7 @@ export class Store {
 
   /** Return a look that does not leave the world. */
   private within(look: Look): Look {
-    const [x0, y0, x1, y1] = this.stages[0]!.bounds as [number, number, number, number];
+    const [x0, y0, x1, y1] = this.playbacks[0]!.bounds;
     const keep = (value: number, low: number, high: number) => {
       const half = (high - low) / (2 * look.zoom);
       return Math.min(Math.max(value, low + half), high - half);

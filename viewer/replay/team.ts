@@ -5,7 +5,7 @@ import { Events } from "./events";
 import { Marks } from "./marks";
 import { RobotPanel } from "./robot";
 import { cards } from "./side";
-import type { Stage } from "./stage";
+import type { Playback } from "./playback";
 import type { Store } from "./state";
 import { Timeline } from "./timeline";
 import type { Tooltip } from "./tooltip";
@@ -27,30 +27,30 @@ export class Team {
   readonly events: Events;
   readonly timeline: Timeline;
   private readonly marks: Marks;
-  private readonly stageBox = make("div", { class: "world" });
+  private readonly worldBox = make("div", { class: "world" });
   private readonly times: HTMLElement;
   private readonly head = make("div", { class: "playhead" });
   /** Of the timeline, in CSS pixels. */
   private width = 0;
 
   constructor(
-    readonly stage: Stage,
+    readonly playback: Playback,
     team: number,
     private readonly store: Store,
     tooltip: Tooltip,
   ) {
     const canvas = make("canvas", { id: `world-${team}`, role: "img" });
-    canvas.setAttribute("aria-label", `the world of ${stage.title}, seen from above`);
-    this.world = new World(canvas, stage, team, store, tooltip);
-    this.timeline = new Timeline(stage, team, store, tooltip);
-    this.marks = new Marks(stage, team, store, tooltip);
-    this.events = new Events(stage, team, store);
-    const panel = new RobotPanel(stage, team, store);
+    canvas.setAttribute("aria-label", `the world of ${playback.title}, seen from above`);
+    this.world = new World(canvas, playback, team, store, tooltip);
+    this.timeline = new Timeline(playback, team, store, tooltip);
+    this.marks = new Marks(playback, team, store, tooltip);
+    this.events = new Events(playback, team, store);
+    const panel = new RobotPanel(playback, team, store);
 
     const whole = make("button", { type: "button", class: "whole", hidden: true }, "whole world");
     whole.addEventListener("click", () => store.set({ look: store.whole }));
-    this.stageBox.append(canvas, whole);
-    const { key, gauges, plan, facts } = cards(stage, store);
+    this.worldBox.append(canvas, whole);
+    const { key, gauges, plan, facts } = cards(playback, store);
     const about = make("div", {}, panel.element, key, facts);
     const side = make(
       "div",
@@ -82,9 +82,14 @@ export class Team {
       this.times,
       ends,
     );
-    const title = make("h2", {}, make("b", {}, stage.title), make("span", {}, stage.subtitle));
-    this.element = make("section", { class: "team", "aria-label": stage.title }, title);
-    this.element.append(this.stageBox, make("div", { class: "beside" }, side), lines);
+    const title = make(
+      "h2",
+      {},
+      make("b", {}, playback.title),
+      make("span", {}, playback.subtitle),
+    );
+    this.element = make("section", { class: "team", "aria-label": playback.title }, title);
+    this.element.append(this.worldBox, make("div", { class: "beside" }, side), lines);
 
     store.listen((now) => {
       this.world.draw(now);
@@ -95,19 +100,19 @@ export class Team {
 
   /** Move the playhead; by a transform, which lays nothing out again. */
   private placeHead(t: number): void {
-    const x = (this.width * (t + 0.5)) / this.stage.iterations;
+    const x = (this.width * (t + 0.5)) / this.playback.iterations;
     this.head.style.transform = `translateX(${x.toFixed(1)}px)`;
   }
 
   /** Follow the sizes that the page gives; the first drawing comes with them. */
   watch(): void {
-    const { element, stageBox, times, world, timeline, marks, stage } = this;
+    const { element, worldBox, times, world, timeline, marks, playback } = this;
     const resize = () => {
       const isStacked = matchMedia(STACKED).matches;
       const room = times.parentElement!.clientWidth;
       const most = isStacked ? room : Math.max(room - BESIDE, room * 0.4);
       const { aspect } = world.view;
-      const width = Math.max(Math.floor(Math.min(most, stageBox.clientHeight * aspect)), 1);
+      const width = Math.max(Math.floor(Math.min(most, worldBox.clientHeight * aspect)), 1);
       const height = Math.max(Math.floor(width / aspect), 1);
       element.style.setProperty("--world", `${width}px`);
       world.canvas.style.width = `${width}px`;
@@ -115,7 +120,7 @@ export class Team {
       world.resize(width, height);
     };
     const stretch = () => {
-      const rows = stage.robots.length;
+      const rows = playback.robots.length;
       const height = Math.min(Math.max(window.innerHeight * 0.18, 4 * rows), 16 * rows);
       const { width } = times.getBoundingClientRect();
       this.width = width;
@@ -129,6 +134,6 @@ export class Team {
     resize();
     new ResizeObserver(stretch).observe(times);
     const observer = new ResizeObserver(resize);
-    for (const one of [stageBox, times]) observer.observe(one);
+    for (const one of [worldBox, times]) observer.observe(one);
   }
 }

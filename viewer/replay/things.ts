@@ -1,17 +1,10 @@
 // Rocks and objects: as they are, fading when detected or taken away, faint ever after.
 
 import type { Channel } from "./data";
-import type { Things } from "./stage";
+import { GONE_OPACITY, LEAST_THING, RING_FRAMES, RING_GROWTH, type Things } from "./playback";
 import type { View } from "./view";
 
 type Pen = CanvasRenderingContext2D;
-
-/** How opaque a thing stays that is gone. */
-const MARK = 0.12;
-/** Frames for which a ring grows around what has just gone. */
-const GROWTH = 15;
-/** Half the side or the radius of the smallest thing drawn, in pixels. */
-const LEAST = 1.5;
 
 /** Things sorted by how they are drawn, found once: there may be thousands. */
 export class Heap {
@@ -40,7 +33,7 @@ export class Heap {
 
   draw(pen: Pen, view: View, t: number): void {
     const { kinds, state, fade } = this.things;
-    const size = Math.max(this.things.size * view.scale, LEAST);
+    const size = Math.max(this.things.size * view.scale, LEAST_THING);
     const fading: number[] = [];
     kinds.forEach((kind, index) => {
       pen.fillStyle = kind.colour;
@@ -50,11 +43,11 @@ export class Heap {
       for (const k of this.byKind[index]!) {
         const age = this.gone ? t - this.gone[k]! : -1;
         if (age < 0) this.outline(pen, view, t, k, size);
-        else if (age < Math.max(fade, GROWTH)) fading.push(k);
+        else if (age < Math.max(fade, RING_FRAMES)) fading.push(k);
         else marks.push(k);
       }
       pen.fill();
-      pen.globalAlpha = MARK;
+      pen.globalAlpha = GONE_OPACITY;
       pen.beginPath();
       for (const k of marks) this.outline(pen, view, t, k, size);
       pen.fill();
@@ -76,18 +69,24 @@ export class Heap {
   private drawFading(pen: Pen, view: View, t: number, k: number, size: number): void {
     const age = t - this.gone![k]!;
     const colour = this.things.kinds[this.things.kind.at(k)]!.colour;
-    pen.globalAlpha = 1 - (1 - MARK) * Math.min(age / Math.max(this.things.fade, 1), 1);
+    pen.globalAlpha = 1 - (1 - GONE_OPACITY) * Math.min(age / Math.max(this.things.fade, 1), 1);
     pen.fillStyle = colour;
     pen.beginPath();
     this.outline(pen, view, t, k, size);
     pen.fill();
-    if (age < GROWTH) {
-      const part = (age + 1) / GROWTH;
+    if (age < RING_FRAMES) {
+      const part = (age + 1) / RING_FRAMES;
       pen.globalAlpha = 1 - part;
       pen.strokeStyle = colour;
       pen.lineWidth = 1.5;
       pen.beginPath();
-      pen.arc(view.x(this.x(t, k)), view.y(this.y(t, k)), size + 14 * part, 0, 2 * Math.PI);
+      pen.arc(
+        view.x(this.x(t, k)),
+        view.y(this.y(t, k)),
+        size + RING_GROWTH * part,
+        0,
+        2 * Math.PI,
+      );
       pen.stroke();
     }
     pen.globalAlpha = 1;

@@ -1,8 +1,8 @@
 // Every robot's actions over the whole epoch: a row for each, specialists are calm and others busy.
 
 import { make, swatch } from "../shared/dom";
-import { FAINT, Sheet } from "./paint";
-import type { Stage } from "./stage";
+import { Sheet } from "./paint";
+import { FAINT, type Playback } from "./playback";
 import type { State, Store } from "./state";
 import type { Tooltip } from "./tooltip";
 
@@ -18,7 +18,7 @@ export class Timeline {
   private rows: number[] = [];
 
   constructor(
-    private readonly stage: Stage,
+    private readonly playback: Playback,
     private readonly team: number,
     private readonly store: Store,
     private readonly tooltip: Tooltip,
@@ -41,7 +41,7 @@ export class Timeline {
   place(robot: number, t: number): { x: number; y: number } {
     const box = this.canvas.getBoundingClientRect();
     const row = (this.rows.indexOf(robot) + 0.5) / this.rows.length;
-    const x = box.left + (box.width * (t + 0.5)) / this.stage.iterations;
+    const x = box.left + (box.width * (t + 0.5)) / this.playback.iterations;
     return { x, y: box.top + box.height * row };
   }
 
@@ -61,11 +61,11 @@ export class Timeline {
   private draw(): void {
     const { canvas, pen } = this.sheet;
     const { width, height } = canvas;
-    const { stage, rows } = this;
+    const { playback, rows } = this;
     if (!this.sheet.width || !this.sheet.height) return;
     const image = pen.createImageData(width, height);
     const pixels = new Uint32Array(image.data.buffer);
-    const colours = [...stage.actions.map((kind) => kind.colour || FAINT), FAINT].map(abgr);
+    const colours = [...playback.actions.map((kind) => kind.colour || FAINT), FAINT].map(abgr);
     const white = abgr("#ffffff");
     pixels.fill(white);
     const counts = new Uint32Array(colours.length);
@@ -76,14 +76,14 @@ export class Timeline {
       const foot = room >= 7 ? SWITCHES : 0;
       const body = Math.max(room - (room >= 4 ? 1 : 0) - foot, 1);
       for (let x = 0; x < width; x++) {
-        const from = Math.floor((x * stage.iterations) / width);
-        const to = Math.max(Math.floor(((x + 1) * stage.iterations) / width), from + 1);
+        const from = Math.floor((x * playback.iterations) / width);
+        const to = Math.max(Math.floor(((x + 1) * playback.iterations) / width), from + 1);
         counts.fill(0);
         let switches = 0;
         for (let t = from; t < to; t++) {
-          const action = stage.action.at(t, robot);
+          const action = playback.action.at(t, robot);
           counts[action < 0 ? colours.length - 1 : action]! += 1;
-          if (t > 0 && stage.action.at(t - 1, robot) !== action) switches += 1;
+          if (t > 0 && playback.action.at(t - 1, robot) !== action) switches += 1;
         }
         let done = 0;
         for (let action = 0, y = 0; action < colours.length; action++) {
@@ -102,7 +102,7 @@ export class Timeline {
   }
 
   private sort(state: State): void {
-    const { robots } = this.stage;
+    const { robots } = this.playback;
     this.rows = robots.map((_, robot) => robot);
     if (state.order === "caste") {
       const rank = (robot: number) => robots[robot]!.caste;
@@ -124,13 +124,13 @@ export class Timeline {
 
   /** Return what stands at the end of a row: S, the caste, and the share of the favourite setting. */
   private ending(robot: number): HTMLElement {
-    const { caste, specialization: s, favourite, share } = this.stage.robots[robot]!;
-    const kind = this.stage.castes[caste]!;
+    const { caste, specialization: s, favourite, share } = this.playback.robots[robot]!;
+    const kind = this.playback.castes[caste]!;
     const bar = make("i", { class: "bar" });
     bar.style.setProperty("--part", String(Math.min(Math.max(s, 0), 1)));
     const row = make("span", { "data-row": robot }, bar);
     row.append(make("b", {}, s.toFixed(2)), swatch(kind.colour), make("em", {}, kind.name));
-    const colour = this.stage.castes.find((one) => one.name === favourite)?.colour;
+    const colour = this.playback.castes.find((one) => one.name === favourite)?.colour;
     const part = make("i", { class: "bar" });
     part.style.setProperty("--part", String(Math.min(share, 1)));
     part.style.setProperty("--colour", colour || FAINT);
@@ -153,7 +153,7 @@ export class Timeline {
     const box = this.canvas.getBoundingClientRect();
     const part = (event.clientX - box.left) / box.width;
     const row = Math.floor(((event.clientY - box.top) / box.height) * this.rows.length);
-    const T = this.stage.iterations;
+    const T = this.playback.iterations;
     const t = Math.min(Math.max(Math.floor(part * T), 0), T - 1);
     return { t, robot: this.rows[Math.min(Math.max(row, 0), this.rows.length - 1)]! };
   }
@@ -168,20 +168,20 @@ export class Timeline {
   private move(event: PointerEvent): void {
     const { t, robot } = this.at(event);
     if (event.buttons & 1) this.store.set({ t });
-    const action = this.stage.actions[this.stage.action.at(t, robot)]?.name ?? "no action";
+    const action = this.playback.actions[this.playback.action.at(t, robot)]?.name ?? "no action";
     const text = `robot ${robot}, iteration ${t}: ${action}`;
     this.tooltip.show(event.clientX, event.clientY, text);
   }
 
   /** Return what can be seen, in words. */
   private summary(): string {
-    const { robots, actions, castes } = this.stage;
+    const { robots, actions, castes } = this.playback;
     const names = castes.map((kind, index) => {
       const n = robots.filter((one) => one.caste === index).length;
       return `${n} ${kind.name}`;
     });
     const of = `Actions (${actions.map((kind) => kind.name).join(", ")})`;
-    const extent = `${robots.length} robots over ${this.stage.iterations} iterations`;
+    const extent = `${robots.length} robots over ${this.playback.iterations} iterations`;
     return `${of} of ${extent}: ${names.join(", ")}`;
   }
 }

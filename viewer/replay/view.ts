@@ -1,6 +1,7 @@
 // From the world's lengths to pixels of a canvas.
 
-import type { Stage } from "./stage";
+import { radiusOf } from "./bodies";
+import type { Playback } from "./playback";
 
 /** Pixels around the world, for its border and for names of robots at it. */
 const MARGIN = 6;
@@ -13,8 +14,8 @@ export interface Look {
 }
 
 /** Return a look at the whole of a world. */
-export function wholeOf(bounds: readonly number[]): Look {
-  const [x0, y0, x1, y1] = bounds as [number, number, number, number];
+export function wholeOf(bounds: Playback["bounds"]): Look {
+  const [x0, y0, x1, y1] = bounds;
   return { zoom: 1, x: (x0 + x1) / 2, y: (y0 + y1) / 2 };
 }
 
@@ -25,17 +26,17 @@ export class View {
   private left = 0;
   private top = 0;
 
-  constructor(private readonly bounds: readonly number[]) {}
+  constructor(private readonly bounds: Playback["bounds"]) {}
 
   /** Return width / height of the world. */
   get aspect(): number {
-    const [x0, y0, x1, y1] = this.bounds as [number, number, number, number];
+    const [x0, y0, x1, y1] = this.bounds;
     return (x1 - x0) / (y1 - y0);
   }
 
   /** Show what is looked at in the middle of a canvas of a size. */
   fit(width: number, height: number, look: Look): void {
-    const [x0, y0, x1, y1] = this.bounds as [number, number, number, number];
+    const [x0, y0, x1, y1] = this.bounds;
     const [across, up] = [width - 2 * MARGIN, height - 2 * MARGIN];
     this.scale = look.zoom * Math.max(Math.min(across / (x1 - x0), up / (y1 - y0)), 1e-9);
     this.left = width / 2 - this.scale * look.x;
@@ -53,7 +54,7 @@ export class View {
 
   /** Return the outline of the world. */
   path(): Path2D {
-    const [x0, y0, x1, y1] = this.bounds as [number, number, number, number];
+    const [x0, y0, x1, y1] = this.bounds;
     const path = new Path2D();
     path.rect(this.x(x0), this.y(y1), this.scale * (x1 - x0), this.scale * (y1 - y0));
     return path;
@@ -70,7 +71,7 @@ export class View {
  * -1 if none is near enough to be meant.
  */
 export function nearest(
-  stage: Stage,
+  playback: Playback,
   view: View,
   t: number,
   x: number,
@@ -79,8 +80,8 @@ export function nearest(
 ): number {
   let [best, least] = [-1, Infinity];
   for (let b = 0; b < among; b++) {
-    const reach = Math.max(stage.body_kinds[stage.body[b]!]!.radius * view.scale, 3.5) + 6;
-    const away = Math.hypot(view.x(stage.x.at(t, b)) - x, view.y(stage.y.at(t, b)) - y);
+    const reach = radiusOf(playback, view, b) + 6;
+    const away = Math.hypot(view.x(playback.x.at(t, b)) - x, view.y(playback.y.at(t, b)) - y);
     if (away <= reach && away < least) [best, least] = [b, away];
   }
   return best;

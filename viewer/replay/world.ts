@@ -4,7 +4,7 @@ import { drawBodies, drawHeld, drawMark, drawTrails } from "./bodies";
 import { drawGround, drawLabels } from "./ground";
 import { Sheet } from "./paint";
 import { drawRings, drawWedges } from "./ranges";
-import type { Stage } from "./stage";
+import type { Playback } from "./playback";
 import type { State, Store } from "./state";
 import { Heap } from "./things";
 import type { Tooltip } from "./tooltip";
@@ -25,14 +25,14 @@ export class World {
 
   constructor(
     readonly canvas: HTMLCanvasElement,
-    private readonly stage: Stage,
+    private readonly playback: Playback,
     private readonly team: number,
     private readonly store: Store,
     private readonly tooltip: Tooltip,
   ) {
-    this.view = new View(stage.bounds);
+    this.view = new View(playback.bounds);
     this.sheet = new Sheet(canvas, false);
-    this.heaps = stage.things.map((things) => new Heap(things));
+    this.heaps = playback.things.map((things) => new Heap(things));
     letZoom(canvas, this.view, store);
     canvas.addEventListener("click", (event) => this.click(event));
     canvas.addEventListener("pointermove", (event) => this.hover(event));
@@ -53,11 +53,11 @@ export class World {
     this.view.fit(width, height, look);
     pen.fillStyle = "#ffffff";
     pen.fillRect(0, 0, width, height);
-    drawGround(pen, this.stage, this.view);
+    drawGround(pen, this.playback, this.view);
   }
 
   draw(state: State): void {
-    const { stage, view } = this;
+    const { playback, view } = this;
     const { pen, width, height } = this.sheet;
     if (!width || !height) return;
     if (this.hovered >= 0 && state.t !== this.hoveredAt) {
@@ -68,43 +68,43 @@ export class World {
     if (state.look !== this.look) this.drawGround(state.look);
     pen.drawImage(this.ground.canvas, 0, 0, width, height);
     for (const heap of this.heaps) heap.draw(pen, view, state.t);
-    drawLabels(pen, stage, view);
+    drawLabels(pen, playback, view);
     pen.save();
     pen.clip(view.path());
-    drawRings(pen, stage, view, state, selected);
-    if (selected >= 0) drawWedges(pen, stage, view, state.t, selected);
+    drawRings(pen, playback, view, state, selected);
+    if (selected >= 0) drawWedges(pen, playback, view, state.t, selected);
     pen.restore();
-    if (state.trails) drawTrails(pen, stage, view, state);
-    drawBodies(pen, stage, view, state);
-    drawHeld(pen, stage, view, this.heaps[0], state.t);
+    if (state.trails) drawTrails(pen, playback, view, state);
+    drawBodies(pen, playback, view, state);
+    drawHeld(pen, playback, view, this.heaps[0], state.t);
     if (this.hovered >= 0 && this.hovered !== selected) {
-      drawMark(pen, stage, view, state.t, this.hovered, false);
+      drawMark(pen, playback, view, state.t, this.hovered, false);
     }
-    if (selected >= 0) drawMark(pen, stage, view, state.t, selected, true);
+    if (selected >= 0) drawMark(pen, playback, view, state.t, selected, true);
   }
 
   /** Return where a body is now, in pixels of the browser's window. */
   place(body: number): { x: number; y: number } {
     const box = this.canvas.getBoundingClientRect();
     const { t } = this.store.now;
-    const x = box.left + this.view.x(this.stage.x.at(t, body));
-    return { x, y: box.top + this.view.y(this.stage.y.at(t, body)) };
+    const x = box.left + this.view.x(this.playback.x.at(t, body));
+    return { x, y: box.top + this.view.y(this.playback.y.at(t, body)) };
   }
 
   private below(event: MouseEvent, among: number): number {
     const box = this.canvas.getBoundingClientRect();
     const [x, y] = [event.clientX - box.left, event.clientY - box.top];
-    return nearest(this.stage, this.view, this.store.now.t, x, y, among);
+    return nearest(this.playback, this.view, this.store.now.t, x, y, among);
   }
 
   private click(event: MouseEvent): void {
-    const robot = this.below(event, this.stage.robots.length);
+    const robot = this.below(event, this.playback.robots.length);
     this.store.set({ selected: robot < 0 ? null : { team: this.team, robot } });
   }
 
   private hover(event: PointerEvent): void {
-    const body = this.below(event, this.stage.body.length);
-    this.canvas.style.cursor = body >= 0 && body < this.stage.robots.length ? "pointer" : "";
+    const body = this.below(event, this.playback.body.length);
+    this.canvas.style.cursor = body >= 0 && body < this.playback.robots.length ? "pointer" : "";
     if (body < 0) return this.leave();
     this.tooltip.show(event.clientX, event.clientY, this.words(body));
     if (body !== this.hovered) {
@@ -115,11 +115,12 @@ export class World {
   }
 
   private words(body: number): string {
-    const { stage } = this;
-    const robot = stage.robots[body];
-    if (!robot) return stage.body_kinds[stage.body[body]!]!.name;
-    const action = stage.actions[stage.action.at(this.store.now.t, body)]?.name ?? "no action";
-    return `robot ${body}: ${action} (${stage.castes[robot.caste]!.name})`;
+    const { playback } = this;
+    const robot = playback.robots[body];
+    if (!robot) return playback.body_kinds[playback.body[body]!]!.name;
+    const action =
+      playback.actions[playback.action.at(this.store.now.t, body)]?.name ?? "no action";
+    return `robot ${body}: ${action} (${playback.castes[robot.caste]!.name})`;
   }
 
   private leave(): void {

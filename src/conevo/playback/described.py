@@ -11,10 +11,10 @@ import numpy.typing as npt
 
 from conevo.errors import UsageError, unknown_name
 from conevo.palette import FAINT, several
-from conevo.playback.channel import Channel
+from conevo.playback.check import DAMAGE, one_line
 from conevo.playback.drawn import Area, Drawn, Objects, Signal
-from conevo.playback.parts import Parts
-from conevo.playback.refusals import DAMAGE, one_line
+from conevo.playback.quantized import Channel
+from conevo.playback.reading import Parts
 from conevo.playback.schema import Backdrop, Event, Kind, Playback, Things
 
 __all__ = ["described"]
@@ -105,8 +105,10 @@ class _Places:
         if x.shape != y.shape:
             raise self._refuse(of.name, f"x is {list(x.shape)}, y {list(y.shape)}")
         k = x.shape[-1]
-        kind = self._whole(of, of.kind, (k,)) if of.kind else np.zeros(k, np.int64)
         names = of.kinds or (of.name,)
+        kind = np.zeros(k, np.int64)
+        if of.kind:
+            kind = self._index(of, of.kind, (k,), len(names))
         colours = (*of.colours, *several(8)[1 + number :], *several(8))[: len(names)]
         return Things(
             of.name,
@@ -135,11 +137,22 @@ class _Places:
             raise self._refuse(of.name, f"{text!r} is {list(found.shape)}, not {list(shape)}")
         return found.astype(np.int64).reshape(shape)
 
+    def _index(
+        self, of: Objects, text: str, shape: tuple[int, ...], n: int
+    ) -> npt.NDArray[np.int64]:
+        """Return whole numbers that pick from n names."""
+        found = self._whole(of, text, shape)
+        if found.size and not (found.min() >= 0 and found.max() < n):
+            raise self._refuse(
+                of.name, f"{text!r} is {found.min()} to {found.max()}, and there are {n} names"
+            )
+        return found
+
     def _gone(self, of: Objects, k: int) -> Channel:
         return Channel.of(np.clip(self._whole(of, of.gone, (k,)), 0, self._parts.t))
 
     def _state(self, of: Objects, k: int) -> Channel:
-        return Channel.of(self._whole(of, of.state, (self._parts.t, k)))
+        return Channel.of(self._index(of, of.state, (self._parts.t, k), len(of.states)))
 
     def area(self, of: Area, number: int) -> Backdrop:
         """Return an area as a part of the backdrop."""

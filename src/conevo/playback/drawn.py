@@ -16,14 +16,19 @@ of the scenario, else a parameter. Indices in brackets pick from it, "places[-1,
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from functools import cache
-from typing import Any
+from typing import Annotated, Any, Literal
+
+from annotated_types import Ge, Gt
 
 from conevo.errors import UsageError
 
 __all__ = ["Area", "Drawn", "Objects", "Signal"]
+
+_COLOUR = re.compile(r"#[0-9a-f]{6}")
 
 
 @dataclass(frozen=True)
@@ -39,8 +44,8 @@ class Objects:
     name: str
     x: str
     y: str
-    size: float = 0.01
-    shape: str = "disc"
+    size: Annotated[float, Gt(0)] = 0.01
+    shape: Literal["disc", "square"] = "disc"
     kind: str = ""
     kinds: tuple[str, ...] = ()
     state: str = ""
@@ -92,9 +97,9 @@ class Drawn:
     areas: tuple[Area, ...] = ()
     signals: tuple[Signal, ...] = ()
     unit: str = ""
-    seconds: float = 0.0
+    seconds: Annotated[float, Ge(0)] = 0.0
     bounds: tuple[float, float, float, float] | None = None
-    radius: float = 0.0
+    radius: Annotated[float, Ge(0)] = 0.0
     colours: dict[str, str] = field(default_factory=dict)
 
     @property
@@ -125,7 +130,20 @@ class Drawn:
             first = error.errors()[0]
             place = "".join(f"[{p}]" if isinstance(p, int) else f".{p}" for p in first["loc"])
             raise UsageError(f"world {world}: drawn{place}: {first['msg']}") from error
+        if wrong := found._wrong():
+            raise UsageError(f"world {world}: drawn: {wrong}")
         return found
+
+    def _wrong(self) -> str:
+        """Return what cannot be drawn though it is of the right kind, "" if nothing."""
+        x0, y0, x1, y1 = self.bounds or (0.0, 0.0, 1.0, 1.0)
+        if not (x0 < x1 and y0 < y1):
+            return f"bounds {self.bounds} are not x0, y0, x1, y1 with x0 < x1 and y0 < y1"
+        colours = [*self.colours.values(), *(c for one in self.objects for c in one.colours)]
+        colours += [area.colour for area in self.areas if area.colour]
+        colours += [signal.colour for signal in self.signals if signal.colour]
+        odd = [colour for colour in colours if not _COLOUR.fullmatch(colour)]
+        return f"{odd[0]!r} is not a colour, as in '#d55e00'" if odd else ""
 
 
 @cache

@@ -15,5 +15,5 @@ TRAIL_OPACITY = 0.5  # of the newest piece
 JUMP = 0.5  # of the world's width or height: who moves farther leaves no trail there
 GONE_OPACITY = 0.12  # of what has been gone for long
 RING_FRAMES = 15  # a ring shows so long that something has just gone
-RING_GROWTH = 14.0  # px, by which it has grown when it ends
+RING_GROWTH = 14  # px, by which it has grown when it ends
 RANGE_FILL, RANGE_LINE = 0.1, 0.35  # opacities of the range of an action

@@ -1,7 +1,8 @@
 """What is to be drawn of an epoch: the one description that the viewer and films share.
 
 A playback knows no world. ``conevo.replay.playback`` makes one of a trajectory; the viewer gets it
-as JSON with the channels next to it. Lengths are in the world's unit, angles in rad counter-
+as JSON with the channels next to it, and its types are generated from these classes
+(``viewer/make_playback.py``). Lengths are in the world's unit, angles in rad counter-
 clockwise from +x, y points up, colours are "#rrggbb". Frame t, from 0 to T - 1, is the state after
 iteration t; actions and sensor values of frame t are those of iteration t.
 """
@@ -9,11 +10,11 @@ iteration t; actions and sensor values of frame t are those of iteration t.
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
-from conevo.playback.channel import Channel
+from conevo.playback.quantized import Channel
 
 __all__ = [
     "Backdrop",
@@ -30,6 +31,8 @@ __all__ = [
     "Playback",
     "Things",
 ]
+
+Body = Literal["disc", "square"]
 
 
 @dataclass(frozen=True)
@@ -49,7 +52,7 @@ class Backdrop:
     not drawn.
     """
 
-    shape: str
+    shape: Literal["rect", "disc", "raster"]
     numbers: tuple[float, ...]
     fill: str = ""
     line: str = ""
@@ -66,7 +69,7 @@ class BodyKind:
 
     name: str
     radius: float
-    shape: str = "disc"
+    shape: Body = "disc"
     colour: str = ""
 
 
@@ -86,7 +89,7 @@ class Things:
     x: Channel
     y: Channel
     size: float
-    shape: str
+    shape: Body
     gone: Channel | None = None
     fade: int = 60
     state: Channel | None = None
@@ -104,8 +107,8 @@ class Ring:
 
     name: str
     radius: tuple[float, ...]
-    when: str
-    of: str = "robots"
+    when: Literal["action", "selected"]
+    of: Literal["robots", "others"] = "robots"
 
 
 @dataclass(frozen=True)

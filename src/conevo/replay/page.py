@@ -12,9 +12,8 @@ from importlib.metadata import version
 from conevo.errors import UsageError
 from conevo.playback.schema import Playback, Pool
 
-__all__ = ["FORMAT", "replay_page"]
+__all__ = ["replay_page"]
 
-FORMAT = 1
 PLACE = "<!-- conevo:data -->"  # in the viewer's page, where the data go
 # Inside a script element nothing may end it: these are written as JSON escapes.
 _ESCAPED = {ord(sign): f"\\u{ord(sign):04x}" for sign in "<>&\u2028\u2029"}
@@ -38,7 +37,7 @@ def replay_page(playbacks: Sequence[Playback]) -> str:
         )
     pool = Pool()
     teams = [pool.plain(playback) for playback in playbacks]
-    about = {"format": FORMAT, "conevo": version("conevo"), "teams": teams}
+    about = {"conevo": version("conevo"), "teams": teams}
     text = json.dumps(about, allow_nan=False, separators=(",", ":")).translate(_ESCAPED)
     data = base64.b64encode(zlib.compress(pool.data, 9)).decode()
     viewer = resources.files("conevo.replay").joinpath("replay.html").read_text("utf-8")

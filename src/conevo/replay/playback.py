@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from conevo.playback.check import checked
-from conevo.playback.refusals import DAMAGE, refusal
+from conevo.playback.check import DAMAGE, checked, refusal
 from conevo.playback.schema import Playback
+from conevo.replay.captions import facts, subtitle, title
 from conevo.replay.trajectory import Trajectory
-from conevo.replay.words import facts, subtitle, title
 from conevo.worlds.drawing import drawing
 
 __all__ = ["playback_of"]

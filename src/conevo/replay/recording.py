@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from conevo.errors import UsageError
 from conevo.playback.about import About
-from conevo.playback.channel import Channel
+from conevo.playback.quantized import Channel
 from conevo.replay.trajectory import FORMAT, Trajectory
 from conevo.rng import fold
 from conevo.runs.evaluation import describe

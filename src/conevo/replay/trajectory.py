@@ -28,25 +28,24 @@ from __future__ import annotations
 
 import io
 import json
-import math
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from conevo.errors import UsageError
 from conevo.playback.about import About
-from conevo.playback.channel import Channel
+from conevo.playback.quantized import Channel
 from conevo.reading import parse_json, read_arrays
+from conevo.replay.validation import channel_of, validated
 from conevo.runs.durable import write_new
 
 __all__ = ["FORMAT", "Trajectory"]
 
 FORMAT = 1
 MOST_BYTES = 2**30  # of a file when it is unpacked: what a small file can ask for is limited
-_CODES = {np.dtype(kind) for kind in (np.uint8, np.uint16, np.uint32)}
 
 
 @dataclass(frozen=True)
@@ -83,13 +82,21 @@ class Trajectory:
 
     @staticmethod
     def load(path: Path) -> Trajectory:
-        """Return the trajectory in a file.
+        """Return the trajectory in a file. What comes from a file is looked at here, and only here.
 
         Raises:
             UsageError: it is damaged, or not a trajectory.
             EnvironmentFailure: it cannot be read.
         """
-        arrays = read_arrays(path, MOST_BYTES, "a trajectory")
+        return Trajectory.of_arrays(read_arrays(path, MOST_BYTES, "a trajectory"), path)
+
+    @staticmethod
+    def of_arrays(arrays: dict[str, npt.NDArray[Any]], path: Path) -> Trajectory:
+        """Return the trajectory that the arrays of a file are, its words among them.
+
+        Raises:
+            UsageError: it is damaged, or not a trajectory.
+        """
         try:
             about = parse_json(arrays.pop("about").tobytes(), "about")
             version = about.get("format")
@@ -98,51 +105,10 @@ class Trajectory:
             kept = about.pop("channels")
             if set(kept) != set(arrays):
                 raise ValueError("it has other channels than it says")
-            checked: About = _checker().validate_python(about, strict=True)
-            _check(checked)
-            return Trajectory(
-                checked, {name: _channel(arrays[name], kept[name]) for name in arrays}
-            )
+            channels = {name: channel_of(name, arrays[name], kept[name]) for name in arrays}
+            return Trajectory(validated(about), channels)
         except Exception as error:  # whatever a damaged or hostile file makes its readers say
             raise UsageError(f"{path} is damaged or not a trajectory ({_reason(error)})") from error
-
-
-def _channel(codes: Any, kept: Any) -> Channel:
-    if codes.dtype not in _CODES:
-        raise ValueError(f"codes of type {codes.dtype}")
-    low, step = kept["low"], kept["step"]
-    for number in (low, step):
-        if isinstance(number, bool) or not isinstance(number, int | float):
-            raise TypeError(f"{number!r} is not a number")
-    top = low + step * np.iinfo(codes.dtype).max
-    if not (math.isfinite(top) and math.isfinite(low) and step >= 0):
-        raise ValueError(f"values from {low} in steps of {step}")
-    return Channel(codes, low, step)
-
-
-def _check(about: About) -> None:
-    """Raise ValueError if the numbers do not go together."""
-    r, castes = about["n_robots"], (*about["castes"], "non-specialized")
-    if not (r >= 1 and about["iterations"] >= 1):
-        raise ValueError("no robots or no iterations")
-    for name in ("labels", "specialization", "fitness", "heuristic", "neurons"):
-        if len(about[name]) != r:
-            raise ValueError(f"{name} of {len(about[name])} robots, not {r}")
-    liked, shares = about.get("favourites", []), about.get("favourite_shares", [])
-    if not len(liked) == len(shares) in (0, r):
-        raise ValueError(f"{len(liked)} favourites and {len(shares)} shares of {r} robots")
-    if not all(0 <= share <= 1 for share in shares):
-        raise ValueError(f"a favourite's share is {min(shares)} to {max(shares)}, not 0 to 1")
-    if unknown := (set(about["labels"]) - set(castes)) | (set(liked) - {*castes, ""}):
-        raise ValueError(f"castes that the world does not have: {', '.join(sorted(unknown))}")
-
-
-@cache
-def _checker() -> Any:
-    from pydantic import ConfigDict, TypeAdapter, with_config
-
-    config = ConfigDict(extra="forbid", allow_inf_nan=False)
-    return TypeAdapter(with_config(config)(About))
 
 
 def _reason(error: Exception) -> str:

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from importlib import import_module
 
-from conevo.playback import plain
+from conevo.playback import any_world
 from conevo.playback.about import About
-from conevo.playback.channel import Channel
+from conevo.playback.check import DAMAGE, one_line
 from conevo.playback.described import described
 from conevo.playback.drawn import Drawn
-from conevo.playback.parts import Parts
-from conevo.playback.refusals import DAMAGE, one_line
+from conevo.playback.quantized import Channel
+from conevo.playback.reading import Parts
 from conevo.playback.schema import Playback
 from conevo.worlds.registry import entry_of
 
@@ -35,12 +35,12 @@ def _robots(parts: Parts, drawn: Drawn) -> Playback:
     about = parts.about
     entry = entry_of(about.get("like", about["world"]))
     if entry is None or not entry.drawn:
-        return plain.playback(parts, drawn)
+        return any_world.playback(parts, drawn)
     draw = import_module(entry.drawn).playback
     try:
         made: Playback = draw(parts)
     except DAMAGE:
         if "like" not in about:
             raise
-        return plain.playback(parts, drawn)  # it has other actions, castes or arrays
+        return any_world.playback(parts, drawn)  # it has other actions, castes or arrays
     return made

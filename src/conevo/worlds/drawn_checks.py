@@ -9,8 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from conevo.errors import UsageError, unknown_name
-from conevo.playback.check import checked
-from conevo.playback.refusals import DAMAGE, DAMAGED
+from conevo.playback.check import DAMAGE, DAMAGED, checked
 from conevo.terms import NON_SPECIALIZED
 from conevo.worlds.drawing import drawing
 from conevo.worlds.protocol import Simulator, World

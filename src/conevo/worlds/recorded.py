@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from conevo.errors import UsageError
-from conevo.playback.channel import Channel
 from conevo.playback.drawn import Drawn
+from conevo.playback.quantized import Channel
 from conevo.worlds.measures import Measure, measures_of
 from conevo.worlds.protocol import Outcome, Simulator, World
 from conevo.worlds.registry import inherited

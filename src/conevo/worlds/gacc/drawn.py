@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections import Counter
 
 from conevo.palette import BLUE, FAINT, GREEN, INK, MOVE, ORANGE, SKY, VERMILION, shade
-from conevo.playback.channel import Channel
-from conevo.playback.parts import Parts, begun, columns, octants
+from conevo.playback.quantized import Channel
+from conevo.playback.reading import Parts, begun, columns, octants
 from conevo.playback.schema import (
     Backdrop,
     BodyKind,

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from conevo.palette import BLUE, FAINT, GREEN, INK, ORANGE, VERMILION
-from conevo.playback.parts import Parts
+from conevo.playback.reading import Parts
 from conevo.playback.schema import Event, Kind
 from conevo.playback.words import enumerated
 from conevo.terms import counted

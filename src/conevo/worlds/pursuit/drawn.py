@@ -19,8 +19,8 @@ from conevo.palette import (
     YELLOW,
     shade,
 )
-from conevo.playback.channel import Channel
-from conevo.playback.parts import Parts, begun
+from conevo.playback.quantized import Channel
+from conevo.playback.reading import Parts, begun
 from conevo.playback.schema import (
     Backdrop,
     BodyKind,
@@ -58,7 +58,7 @@ def playback(parts: Parts) -> Playback:
     if n < r + (not is_prey):
         raise ValueError(f"{n} bodies, of which {r} are the team's")
     x, y, heading = (_present(parts.channel(name, t, -1), n) for name in ("x", "y", "heading"))
-    reach, side = parts.param("sensor_range_cm"), parts.param("arena_cm")
+    reach, side = parts.param("sensor_range_cm"), parts.length("arena_cm")
     team, others = ("prey", "predator") if is_prey else ("predator", "prey")
     captured = None if is_prey else parts.index("captured", 2, t, n - r)
     ranges = "infrared range" if is_prey else "infrared and light range"

@@ -8,8 +8,8 @@ from collections import Counter
 import numpy as np
 
 from conevo.palette import BLUE, INK, MOVE, SKY, YELLOW
-from conevo.playback.channel import Channel
-from conevo.playback.parts import Parts, begun, octants
+from conevo.playback.quantized import Channel
+from conevo.playback.reading import Parts, begun, octants
 from conevo.playback.schema import Backdrop, BodyKind, Curve, Event, Kind, Playback, Ring, Things
 from conevo.playback.words import enumerated
 from conevo.worlds.rover import rocks
@@ -74,8 +74,8 @@ def _backdrop(parts: Parts) -> tuple[Backdrop, ...]:
 
 
 def _rocks(parts: Parts) -> Things:
-    kind = parts.whole("scene/rock_type", -1)
-    _ = parts.index("scene/rock_type", len(rocks.TYPES), len(kind))
+    kind = parts.index("scene/rock_type", len(rocks.TYPES), -1).values
+    gone = parts.index("detected", 2**31, len(kind)).values
     present = np.unique(kind)
     worth = [f"red rock {rocks.TYPES[n]}, worth {rocks.VALUES[n]}" for n in present]
     return Things(
@@ -86,7 +86,7 @@ def _rocks(parts: Parts) -> Things:
         parts.channel("scene/rock_y", len(kind)),
         size=ROCK,
         shape="square",
-        gone=Channel.of(np.minimum(parts.whole("detected", len(kind)), parts.t)),
+        gone=Channel.of(np.minimum(gone, parts.t)),
     )
 
 

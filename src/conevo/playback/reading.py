@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from conevo.palette import FAINT
 from conevo.playback.about import About
-from conevo.playback.channel import Channel
+from conevo.playback.quantized import Channel
 from conevo.playback.schema import Curve, Kind, Robot, SensorGroup
 from conevo.terms import NON_SPECIALIZED
 
@@ -121,6 +121,17 @@ class Parts:
         if not (math.isfinite(value) and value >= 0):
             raise ValueError(f"world.{name} is {value}")
         return float(value)
+
+    def length(self, name: str) -> float:
+        """Return a parameter that is a length above 0.
+
+        Raises:
+            ValueError: as ``param``, or it is 0.
+        """
+        value = self.param(name)
+        if value == 0:
+            raise ValueError(f"world.{name} is 0")
+        return value
 
     def measures(self, *names: str) -> tuple[Curve, ...]:
         """Return every task performance measure as if the epoch ended in each iteration."""

@@ -11,9 +11,9 @@ import numpy.typing as npt
 
 from conevo.errors import UsageError
 from conevo.palette import several
+from conevo.playback.check import one_line
 from conevo.playback.drawn import Drawn
-from conevo.playback.parts import Parts, begun
-from conevo.playback.refusals import one_line
+from conevo.playback.reading import Parts, begun
 from conevo.playback.schema import BodyKind, Playback, SensorGroup
 from conevo.terms import NON_SPECIALIZED
 
