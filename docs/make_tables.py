@@ -41,7 +41,7 @@ def worlds_by_methods():
             cells.append("all presets" if len(have) == len(PRESETS) else ", ".join(have) or "none")
         rows.append([f"`{name}`", entry.title, entry.summary, *cells])
     worlds = [f"`{world.name}` ({world.title})" for world in WORLDS.values()]
-    return table(["method", "published as", "what it is", *worlds], rows)
+    return table(["method", "published as", "description", *worlds], rows)
 
 
 def _has_sizes(preset, world, method):
@@ -74,7 +74,7 @@ def presets(task, has_purpose=True):
             ]
         )
     head = (
-        "preset | what for | generations at most | budget of team evaluations | epochs x iterations"
+        "preset | purpose | generations at most | budget of team evaluations | epochs x iterations"
     )
     head += " | evaluation | genotypes per sub-population | test scenarios"
     heads = head.split(" | ")
@@ -147,7 +147,7 @@ def parameters(params):
         default = f"`{value}`" if value != "" else ""
         meaning = one.meaning.replace("``", "`")
         rows.append([f"`{one.name}`", default, one.unit, one.allowed, meaning])
-    return table(["parameter", "default", "unit", "allowed", "what it is"], rows)
+    return table(["parameter", "default", "unit", "allowed", "meaning"], rows)
 
 
 def team_types():
