@@ -9,6 +9,7 @@ import tomllib
 from importlib import import_module, resources
 from pathlib import Path
 
+import settings_tables
 from conevo import METHODS, WORLDS
 from conevo.runs.config import resolve
 from conevo.runs.layers import PRESETS
@@ -21,7 +22,7 @@ from conevo.worlds.rover import rocks
 from conevo.worlds.rover.world import RoverParams
 
 ROOT = Path(__file__).resolve().parent.parent
-PAGES = ("README.md", "docs/quickstart.md", "docs/worlds.md")
+PAGES = ("README.md", "docs/quickstart.md", "docs/settings.md", "docs/worlds.md", "docs/cite.md")
 MARKED = re.compile(r"(<!-- table: ([^>]+?) -->\n).*?(<!-- end -->)", re.DOTALL)
 
 
@@ -173,7 +174,40 @@ def shaping_experiments():
     return table(["environment", "prey", "obstacles", "heuristic predators"], rows)
 
 
+def citation():
+    """Return CITATION.cff as entries of BibTeX."""
+    text = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+
+    def field(name):
+        return re.search(rf'^[ -]*{name}: "?([^"\n]+?)"?$', text, re.MULTILINE)[1]
+
+    title = re.search(r"^    title: (.+)$", text, re.MULTILINE)[1]
+    entries = {
+        "phdthesis{nitschke2009": {
+            "author": f"{field('family-names')}, {field('given-names')}",
+            "title": title,
+            "school": re.search(r"institution:\n +name: (.+)", text)[1],
+            "year": field("year"),
+        },
+        "software{conevo": {
+            "author": "{conevo contributors}",
+            "title": field("title"),
+            "version": field("version"),
+            "license": field("license"),
+        },
+    }
+    lines = ["```bibtex"]
+    for entry, fields in entries.items():
+        lines += [f"@{entry},", *(f"  {key} = {{{text}}}," for key, text in fields.items()), "}"]
+    return "\n" + "\n".join([*lines, "```"]) + "\n\n"
+
+
 TABLES = {
+    "citation": citation,
+    "settings run": lambda: settings_tables.run_settings(table),
+    "settings world": lambda: settings_tables.world_settings(table),
+    "settings controller": lambda: settings_tables.controller_settings(table),
+    "settings method": lambda: settings_tables.method_settings(table),
     "worlds x methods": worlds_by_methods,
     "presets": lambda: presets("rover/complex-1"),
     "presets pursuit": lambda: presets("pursuit/team-3", has_purpose=False),
