@@ -23,13 +23,18 @@ from conevo.worlds.simulators import simulator
 ROOT = Path(__file__).resolve().parent.parent
 EXECUTED = (
     "README.md",
-    *(f"docs/{name}.md" for name in ("quickstart", "worlds", "campaigns", "replay")),
+    *(f"docs/{name}.md" for name in ("quickstart", "python", "worlds", "campaigns", "replay")),
 )
-LINKED = (*EXECUTED, "CONTRIBUTING.md", "docs/index.md", "examples/README.md")
+LINKED = (
+    *EXECUTED,
+    "CONTRIBUTING.md",
+    "examples/README.md",
+    *(f"docs/{name}.md" for name in ("api", "cite", "index", "platforms", "results", "settings")),
+)
 MARKED = re.compile(r"<!-- ([a-z]+): (\S+) -->\n```\w+\n(.*?)```\n", re.DOTALL)
 
 
-sys.path.append(str(ROOT / "experiments"))  # scripts import what they share
+sys.path += [str(ROOT / "experiments"), str(ROOT / "docs")]  # scripts import what they share
 
 
 def script(name, folder="docs"):

@@ -1,0 +1,9 @@
+// Formulas as HTML: reads a JSON list of {tex, display} and writes a JSON list of texts.
+import { readFileSync } from "node:fs";
+import katex from "katex";
+
+const formulas = JSON.parse(readFileSync(0, "utf8"));
+const html = formulas.map(({ tex, display }) =>
+  katex.renderToString(tex, { displayMode: display, throwOnError: true, strict: "error" }),
+);
+process.stdout.write(JSON.stringify(html));
