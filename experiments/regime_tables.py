@@ -164,8 +164,14 @@ def judged(cells: Sequence[Cell]) -> list[Judged]:
         judge(cells, "the rule", lambda cell: cell.incentive),
         judge(cells, "the rule, threshold 1", lambda cell: cell.incentive, at=1.0),
         judge(cells, "segregation alone", lambda cell: cell.regime.segregation, near=0.5),
+        judge(cells, "a detection's iterations alone", detection_iterations, near=10.0),
         judge(cells, "the same sign everywhere", lambda cell: 1.0),
     ]
+
+
+def detection_iterations(cell: Cell) -> float:
+    """Return how many iterations two rovers with the setting med need for a rock, on average."""
+    return 1.0 / cell.regime.accuracies[1] ** 2
 
 
 def rule(cells: Sequence[Cell]) -> str:

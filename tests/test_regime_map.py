@@ -19,7 +19,7 @@ sys.path.append(str(ROOT / "experiments"))  # scripts import what they share
 import pages  # noqa: E402
 import regime_map  # noqa: E402
 from regime_cells import apart, cells_of, judge, threshold, trends_of  # noqa: E402
-from regime_tables import PAGE_PARTS, judged  # noqa: E402
+from regime_tables import PAGE_PARTS, detection_iterations, judged  # noqa: E402
 
 PAGE = ROOT / "docs" / "results" / "regimes.md"
 REGIME = {
@@ -108,7 +108,7 @@ def test_a_threshold_is_found_without_the_cells_for_testing():
     rows += runs(1.0, [100, 102], [150, 152])
     test = runs(0.25, [100, 102], [150, 152]) + runs(0.75, [100, 102], [101, 99])
     cells = cells_of(rows + test)
-    rule, at_one, segregation, same = judged(cells)
+    rule, at_one, segregation, slow, same = judged(cells)
     assert rule.threshold == pytest.approx((cells[2].incentive + cells[4].incentive) / 2)
     assert judged(cells_of(rows))[0].threshold == rule.threshold
     assert (rule.found, rule.tested) == ((3, 3), (1, 2))  # 0.75 is below 0, as predicted
@@ -116,6 +116,8 @@ def test_a_threshold_is_found_without_the_cells_for_testing():
     assert rule.right == ()  # the interval of 0.75 contains 0
     assert (at_one.threshold, at_one.found, at_one.tested) == (1.0, (2, 3), (0, 2))
     assert (segregation.threshold, segregation.tested) == (0.75, (1, 2))
+    assert detection_iterations(cells[0]) == pytest.approx(25)  # med: .2, both rovers
+    assert (slow.threshold, slow.found) == (math.inf, (2, 3))  # alike in all cells
     assert (same.threshold, same.found, same.tested) == (math.inf, (2, 3), (1, 2))
 
 
