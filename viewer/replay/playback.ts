@@ -7,7 +7,7 @@ import type { Channel } from "./data";
 
 export const SPEED = 60;
 export const LEAST_BODY = 3.5;
-export const LEAST_THING = 1.5;
+export const LEAST_THING = 1.0;
 export const KITE_TIP = 1.35;
 export const KITE_SIDE = 0.95;
 export const TRAIL = 120;

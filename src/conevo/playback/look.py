@@ -7,7 +7,7 @@ from __future__ import annotations
 
 SPEED = 60  # Choice: iterations per second, of MP4 films and as the viewer begins
 LEAST_BODY = 3.5  # px, radius of the smallest body drawn
-LEAST_THING = 1.5  # px, radius or half a side of the smallest thing drawn
+LEAST_THING = 1.0  # px, radius or half a side of the smallest thing drawn
 KITE_TIP, KITE_SIDE = 1.35, 0.95  # radii: how far a body that is not of the team reaches
 TRAIL = 120  # positions that a trail shows
 TRAIL_PIECES = 4  # of a trail, each fainter than the one after it

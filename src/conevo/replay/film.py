@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
+import numpy.typing as npt
 from PIL import Image
 
 from conevo.errors import EnvironmentFailure, UsageError
@@ -44,6 +45,7 @@ FPS = {"gif": 20, "mp4": SPEED}  # Choice: browsers show a GIF no faster
 SIZES = {"gif": 480, "mp4": 720, "png": 720}  # Choice: of a world in pixels; GIFs are for slides
 GIF_FRAMES = 250  # Choice: a GIF has about so many frames unless told otherwise
 _SAMPLES = 16  # frames that a GIF's colours are taken from
+_EXACT = 64  # of its 255 colours
 _NO_FFMPEG = "MP4 needs ffmpeg: install it, or conevo[video], or make a GIF with --gif"
 
 
@@ -110,7 +112,19 @@ def write_film(
     fps: int | None = None,
     progress: Progress | None = None,
 ) -> None:
-    """Write a GIF or an MP4, as the file's name says; see ``write_gif`` and ``write_mp4``."""
+    """Write a GIF or an MP4, as the file's name says.
+
+    Args:
+        painter: of the frames.
+        path: where to.
+        frames: their numbers, at least one.
+        fps: frames per second; GIF counts in hundredths of a second, so 50 at most.
+        progress: told the frames done and all.
+
+    Raises:
+        UsageError: no frames, something is at ``path`` already, or ffmpeg is needed and missing.
+        EnvironmentFailure: ffmpeg fails, or the file cannot be written.
+    """
     kind = choose_format(str(path))
     write = {"gif": write_gif, "mp4": write_mp4}[kind]
     write(painter, path, frames, fps or FPS[kind], progress)
@@ -135,21 +149,10 @@ def write_gif(
     fps: int = FPS["gif"],
     progress: Progress | None = None,
 ) -> None:
-    """Write an animated GIF that repeats for ever.
+    """Write an animated GIF that repeats for ever; arguments and errors as of ``write_film``.
 
-    All frames share 255 colours, so none flickers; a frame holds only the pixels that change. Until
-    they are written all frames are in memory, about a megabyte each.
-
-    Args:
-        painter: of the frames.
-        path: where to.
-        frames: their numbers, at least one; equal ones in a row become one that lasts longer.
-        fps: frames per second; GIF counts in hundredths of a second, so 50 at most.
-        progress: told the frames done and all.
-
-    Raises:
-        UsageError: no frames, or something is at ``path`` already.
-        EnvironmentFailure: it cannot be written.
+    All frames share 255 colours, so none flickers; equal ones in a row become one that lasts
+    longer. Until they are written all are in memory, about a megabyte each.
     """
     if not frames:
         raise UsageError("the film has no frames")
@@ -178,19 +181,8 @@ def write_mp4(
 ) -> None:
     """Write an MP4 that players of all kinds show: H.264, yuv420p, its index at the beginning.
 
-    The same frames give the same bytes with the same ffmpeg. Ffmpeg is a process of its own that
-    reads frames from a pipe, and has ended when this returns or raises.
-
-    Args:
-        painter: of the frames.
-        path: where to.
-        frames: their numbers, at least one.
-        fps: frames per second.
-        progress: told the frames done and all.
-
-    Raises:
-        UsageError: no frames, something is at ``path`` already, or there is no ffmpeg.
-        EnvironmentFailure: ffmpeg fails, or the file cannot be written.
+    Arguments and errors are those of ``write_film``. The same frames give the same bytes with the
+    same ffmpeg, a process of its own that has ended when this returns or raises.
     """
     ffmpeg = find_ffmpeg()
     if ffmpeg is None:
@@ -253,7 +245,7 @@ def _appearing(path: Path) -> Iterator[Path]:
 def _command(ffmpeg: str, size: tuple[int, int], fps: int, draft: Path) -> list[str]:
     """Return the call of ffmpeg that reads frames in red, green and blue from its input."""
     frames = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size[0]}x{size[1]}"]
-    colours = ["-vf", "scale=out_color_matrix=bt709:out_range=tv,format=yuv420p"]
+    colours = ["-vf", "scale=flags=accurate_rnd:out_color_matrix=bt709:out_range=tv,format=yuv420p"]
     colours += ["-color_range", "tv", "-colorspace", "bt709"]
     colours += ["-color_primaries", "bt709", "-color_trc", "bt709"]
     # Choice: "veryfast" at quality 20 with a simple search for motion: slower settings gain little
@@ -304,18 +296,30 @@ def _why(path: Path, said: str, draft: Path) -> str:
 def _palette(samples: Iterable[Image.Image]) -> Image.Image:
     """Return a picture whose palette has at most 255 colours, the most frequent of some pictures.
 
-    No two are nearly alike, since Pillow would take one for the other: areas and robots have the
-    colours of the legend.
+    The first of them serve areas, text and robots, and are found again exactly: Pillow looks up the
+    colour that is nearest to the lower corner of a cube of 4 x 4 x 4. Others are well apart.
     """
     counts: Counter[Any] = Counter()
     for sample in samples:
         found: Any = sample.getcolors(1 << 24)
         counts.update({colour: n for n, colour in found})
     left = np.array([colour for colour, _ in counts.most_common()])
-    kept: list[int] = []
-    while len(left) and len(kept) < 3 * 255:
-        kept += left[0].tolist()
-        left = left[np.abs(left - left[0]).max(axis=1) > 7]
+    kept: list[list[int]] = []
+    while len(left) and len(kept) < 255:
+        one = left[0]
+        kept.append(one.tolist())
+        if len(kept) <= _EXACT:
+            corner, corners = one & ~3, left & ~3
+            is_alike = _apart(left, corner) <= _apart(one, corner)
+            is_alike |= _apart(one, corners) <= _apart(left, corners)
+        else:
+            is_alike = np.abs(left - one).max(axis=1) < 8
+        left = left[~is_alike]
     palette = Image.new("P", (1, 1))
-    palette.putpalette(kept)
+    palette.putpalette([part for colour in kept for part in colour])
     return palette
+
+
+def _apart(some: npt.NDArray[Any], others: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """Return the squared distances between colours [..., 3]."""
+    return np.asarray(((some - others) ** 2).sum(axis=-1))
