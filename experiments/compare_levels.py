@@ -6,7 +6,8 @@ Runs whose FACTOR is the baseline's level are what the others are compared with,
 factors agree that both have: with ``credit=equation`` each credit within each method and range,
 with ``method=mesp`` each form of exchange of CONE within each world. With ``--write`` a row per run
 goes to the CSV file next to the page and the tables between the page's markers; ``--again`` makes
-the tables from the CSV file. Several ``--baseline`` give a table each, ``<!-- BASELINE -->``.
+the tables from the CSV file. Several ``--baseline`` give a table each, ``<!-- BASELINE -->``, and
+where the page has the marker ``<!-- BASELINE pooled -->`` one over all cells.
 """
 
 from __future__ import annotations
@@ -21,7 +22,8 @@ from conevo.campaigns.tables import Tables
 from conevo.cli.lookup import find_campaign, sealed
 from conevo.errors import ConevoError, UsageError
 from conevo.evolution.methods.registry import title_of
-from conevo.report.statistics import compare, holm
+from conevo.report.statistics import Comparison, compare, holm
+from contrasts import contrast
 from page_arguments import PageParser, rows_for
 from pages import Row, put, table
 from provenance import made_with
@@ -134,6 +136,29 @@ def comparison_table(rows: Sequence[Row], factor: str, level: str) -> str:
     return f"{table(head, lines)}\n{tail}"
 
 
+def pooled_table(rows: Sequence[Row], factor: str, level: str) -> str:
+    """Return what the cells of a comparison have in common: the mean of their relative differences.
+
+    A row for each level over all cells, and one for each of its methods. The baseline's mean is
+    taken as exact. Cells with a single run on either side do not count.
+    """
+    pooled: dict[tuple[str, str], list[Comparison]] = {}
+    for levels, rest, runs, same in groups(rows, factor, level):
+        one = compare(*([float(row["value"]) for row in of] for of in (runs, same)))
+        if one.low is not None and one.mean_b:
+            pooled.setdefault((rest, ""), []).append(one)
+            if "method" in levels:
+                pooled.setdefault((rest, title_of(levels["method"])), []).append(one)
+    lines = []
+    for (rest, method), cells in pooled.items():
+        found = contrast([(1 / len(cells) / (one.mean_b or 1.0), one) for one in cells])
+        around = f"{percent(found.low)} to {percent(found.high)}"
+        lines.append([rest, method or "all", len(cells), percent(found.value), around])
+    lines.sort(key=lambda line: (line[1] != "all", line[1], line[0]))
+    head = [factor if factor != "method" else "compared", "method", "cells"]
+    return table([*head, "relative difference, mean over cells", "95 % interval"], lines)
+
+
 def signal_table(rows: Sequence[Row]) -> str:
     """Return the signal of generation 0 in each cell: of one trial, and of a generation's."""
     cells: dict[tuple[str, ...], list[Row]] = {}
@@ -174,13 +199,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
         if wrong := [one for one in args.baseline if "=" not in one]:
             parser.error(f"--baseline {wrong[0]}: must be FACTOR=LEVEL, for example method=hom-es")
         parts = {one: comparison_table(rows, *one.split("=", 1)) for one in args.baseline}
+        parts |= {f"{one} pooled": pooled_table(rows, *one.split("=", 1)) for one in args.baseline}
     except (ConevoError, OSError) as error:
         parser.error(str(error))
     if any(row.get("icc") is not None for row in rows):
         parts["signal"] = signal_table(rows)
     for name, text in parts.items():
         print(f"{name}\n\n{text}")
-        if page:
+        if page and (name in args.baseline or f"<!-- {name} -->" in page.read_text()):
             put(text, page, name)
 
 

@@ -9,9 +9,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from scipy.stats import t as student
 
 from conevo.report.statistics import Comparison, Estimate, compare, holm
+from contrasts import contrast
 from incentives import FINDING, Regime, incentive
 from pages import Row
 
@@ -184,30 +184,15 @@ def trends_of(cells: Sequence[Cell]) -> list[Trend]:
             groups.setdefault((cell.ranges, cell.accuracies), []).append(cell)
     found = []
     for some in groups.values():
-        mean = contrast([(1 / len(some), cell) for cell in some])
+        mean = contrast([(1 / len(some), cell.value) for cell in some])
         at = np.array([cell.regime.segregation for cell in some])
         far = at - at.mean()
         slope = None
         if len(some) > 1:
             weights = (far / (far**2).sum()).tolist()
-            slope = contrast(list(zip(weights, some, strict=True)))
+            slope = contrast([(w, cell.value) for w, cell in zip(weights, some, strict=True)])
         found.append(Trend(some, mean, slope))
     return found
-
-
-def contrast(weighted: Sequence[tuple[float, Cell]]) -> Estimate:
-    """Return a weighted sum of the cells' differences, with Welch's interval (Satterthwaite)."""
-    value, parts = 0.0, []
-    for weight, cell in weighted:
-        of = cell.value
-        value += weight * (of.difference or 0.0)
-        for sd, n in ((of.sd_a, of.n_a), (of.sd_b, of.n_b)):
-            parts.append((weight**2 * (sd or 0.0) ** 2 / n, n))
-    variance = sum(part for part, _ in parts)
-    freedom = variance**2 / sum(part**2 / (n - 1) for part, n in parts)
-    reach = float(student.ppf(0.975, freedom)) * math.sqrt(variance)
-    n = sum(n for _, n in parts)
-    return Estimate(value, value - reach, value + reach, n, "Welch's t")
 
 
 # --- what the rule predicts -----------------------------------------------------------------------

@@ -1,14 +1,16 @@
 """The tables that compare the levels of a factor: what is next to what, by hand."""
 
+import math
 import sys
 from pathlib import Path
 
 import pytest
+from scipy.stats import t
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.append(str(ROOT / "experiments"))  # scripts import what they share
 
-from compare_levels import comparison_table, groups, main, signal_table  # noqa: E402
+from compare_levels import comparison_table, groups, main, pooled_table, signal_table  # noqa: E402
 from conevo.errors import UsageError  # noqa: E402
 from pages import write  # noqa: E402
 from rotations import OTHER, SAME, orders, rotation_table  # noqa: E402
@@ -43,6 +45,20 @@ def test_a_level_is_compared_with_the_baseline_where_all_else_agrees():
     assert mesp[:6] == ["Multi-Agent ESP", "value", "2, 2", "52 (1)", "42 (1)", "−10"]
     assert (ccga[7], ccga[9]) == ("+19.7 %", "2 of 2")
     assert (mesp[7], mesp[9]) == ("−19.4 %", "0 of 2")
+
+
+def test_cells_are_pooled_as_shares_of_their_baselines():
+    """CCGA +20 of 101.5, Multi-Agent ESP -10 of 51.5; each mean of two has the variance 1/4."""
+    whole, ccga, mesp = lines(pooled_table(CREDIT, "credit", "equation"))
+    shares = (20 / 101.5, -10 / 51.5)
+    assert whole[:4] == ["value", "all", "2", f"{100 * sum(shares) / 2:+.1f} %"]
+    assert ccga[1:4] == ["CCGA", "1", f"{100 * shares[0]:+.1f} %"]
+    assert mesp[1:4] == ["Multi-Agent ESP", "1", f"−{-100 * shares[1]:.1f} %"]
+    variances = [0.25 * 2 / (2 * base) ** 2 for base in (101.5, 51.5)]
+    freedom = sum(variances) ** 2 / sum(2 * (v / 2) ** 2 for v in variances)
+    reach = t.ppf(0.975, freedom) * math.sqrt(sum(variances))
+    low, high = (100 * (sum(shares) / 2 + sign * reach) for sign in (-1, 1))
+    assert whole[4] == f"−{-low:.1f} % to {high:+.1f} %"
 
 
 def test_levels_that_the_baseline_lacks_name_what_is_compared():
