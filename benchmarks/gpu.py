@@ -23,8 +23,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from conevo.kernels.devices import CPU, device_here
-from conevo.kernels.engine import usable_threads
+from conevo.kernels.devices import CPU, device_here, usable_cores
 from conevo.rng import fold
 from conevo.worlds.agreement import difference
 from conevo.worlds.registry import world as build_world
@@ -85,7 +84,7 @@ def kernels(paths: Sequence[str], lanes: Sequence[int], device: str) -> str:
     """Return a table of what compiled kernels take; what follows finds them compiled."""
     arch = 90 if device == CPU else wp.get_device(device).arch
     work = [(path, n, arch) for path in paths for n in lanes]
-    with multiprocessing.get_context("spawn").Pool(min(len(work), usable_threads())) as pool:
+    with multiprocessing.get_context("spawn").Pool(min(len(work), usable_cores())) as pool:
         rows = pool.starmap(_compiled, work, chunksize=1)
     head = ["world", "lanes", "registers", "instructions", "shared, bytes", "stack, bytes"]
     return f"Kernels compiled for sm_{arch}\n\n{table(head, rows)}"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
+import sys
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -18,10 +19,8 @@ from conevo.errors import UsageError
 from conevo.rng import fold, stream
 from conevo.runs.champions import Team
 from conevo.runs.shrinkage import shrinkage
-from conevo.studies.behaviour_report import behaviour_report
-from conevo.studies.caste_tables import composition_table, fittest_runs, lesion_table
 from conevo.studies.lifetimes import lifetimes
-from conevo.studies.observation import Observed, observe
+from conevo.studies.observation import Observed, behaviour_report, observe
 from conevo.studies.team_study import study
 from conevo.worlds.pursuit.study.behaviours import BEHAVIOURS
 from conevo.worlds.pursuit.study.captures import COLLECTIVES
@@ -36,6 +35,10 @@ from conevo.worlds.pursuit.world import PursuitParams, PursuitWorld
 from conevo.worlds.registry import WORLDS, WorldEntry, studies, study_of
 from conevo.worlds.rollout import Rollout
 from runs.tiny import evolve_tiny
+
+sys.path.append(str(Path(__file__).resolve().parents[2] / "experiments"))
+
+from caste_tables import composition_table, fittest_runs, lesion_table
 
 TINY = {
     "run.generations": 2,

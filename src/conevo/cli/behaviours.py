@@ -55,8 +55,7 @@ def behaviours(
 ) -> None:
     """Classify what the fittest team of a run does."""
     from conevo.cli.lookup import find_run
-    from conevo.studies.behaviour_report import behaviour_report
-    from conevo.studies.observation import studied
+    from conevo.studies.observation import behaviour_report, studied
 
     of = find_run(run)
     found = behaviour_report(of, scenarios, seed, threads=threads, device=device)

@@ -14,7 +14,6 @@ import click
 
 from conevo.campaigns.campaign import CAMPAIGNS, Campaign
 from conevo.campaigns.estimate import remaining_seconds
-from conevo.campaigns.executors.worker import usable_cores
 from conevo.campaigns.inputs import shown_as
 from conevo.campaigns.ledger import Entry
 from conevo.campaigns.plan import PlannedRun
@@ -24,6 +23,7 @@ from conevo.cli.lookup import campaigns_in
 from conevo.cli.text import duration, table
 from conevo.errors import ConevoError
 from conevo.evolution.methods.registry import name_in
+from conevo.kernels.devices import usable_cores
 from conevo.terms import counted
 
 __all__ = [

@@ -20,6 +20,7 @@ from typing import Any
 import warp as wp
 
 from conevo.errors import EnvironmentFailure, UsageError
+from conevo.kernels.devices import usable_cores
 
 __all__ = [
     "OutOfMemory",
@@ -31,7 +32,6 @@ __all__ = [
     "options",
     "start",
     "threads_of",
-    "usable_threads",
 ]
 
 # Measured: no adjoints and no unrolling pay; fast_math and -O3 do not. No fused
@@ -158,15 +158,10 @@ def threads_of(given: Any) -> int:
         UsageError: not a number of threads.
     """
     if given is None:
-        return usable_threads()
+        return usable_cores()
     if isinstance(given, bool) or not isinstance(given, int) or not 1 <= given <= MOST_THREADS:
         raise UsageError(f"threads = {given!r}: must be an integer from 1 to {MOST_THREADS}")
     return given
-
-
-def usable_threads() -> int:
-    """Return the number of hardware threads this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def launch(

@@ -302,7 +302,7 @@ class Run:
         self.refuse_other_code(accept_other_code)
         with self._open():
             self.refuse_finished()
-            lab = self._equip(threads, device)
+            lab = self.equip(threads, device)
             stopped_by = evolve_on(
                 self._store,
                 lab,
@@ -380,7 +380,7 @@ class Run:
         """Give the run the length that a configuration has; see ``give_length``."""
         from conevo.runs.length import give_length
 
-        lab = give_length(self._store, config, lambda: self._equip(threads, device), is_later)
+        lab = give_length(self._store, config, lambda: self.equip(threads, device), is_later)
         self.outline, self.config, self._lab = config.outline, config, lab
 
     @contextmanager
@@ -418,7 +418,7 @@ class Run:
         champion = team or self.champion
         if champion is None:
             raise without_team(self.path, self.generations())
-        return self._test(self._equip(threads, device), champion, scenarios, seed)
+        return self._test(self.equip(threads, device), champion, scenarios, seed)
 
     def test_under(
         self,
@@ -472,7 +472,7 @@ class Run:
         """Raise UsageError if other code, unless accepted, made it, or its world is not played."""
         refuse_other_code(self.path, self.outline.task, last_code(self.provenance), is_accepted)
 
-    def _equip(self, threads: int | None, device: str | None) -> Lab:
+    def equip(self, threads: int | None, device: str | None) -> Lab:
         """Return what the run needs, after checking that it is what it was started with."""
         from conevo.runs.lab import Lab
 

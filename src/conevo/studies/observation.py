@@ -7,7 +7,7 @@ the same for all worlds: each robot's S and caste, and how many robots and teams
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import cached_property
 from typing import Any
 
@@ -25,7 +25,7 @@ from conevo.studies.lifetimes import Lifetime, lifetimes
 from conevo.worlds.registry import WORLDS, studies, study_of
 from conevo.worlds.study import Seen, WorldStudy
 
-__all__ = ["Observed", "observe", "studied", "watch"]
+__all__ = ["Observed", "behaviour_report", "observe", "studied", "watch"]
 
 
 @dataclass(frozen=True)
@@ -149,3 +149,30 @@ def _watched(
     keys = tuple(fold(seed, "test", k) for k in range(scenarios))
     seen = study.observe(lab.simulator, genes, rows, keys, seed, rules)
     return Observed(study, seen, team, lab, seed)
+
+
+def behaviour_report(
+    run: Run,
+    scenarios: int = 20,
+    seed: int | None = None,
+    *,
+    threads: int | None = None,
+    device: str | None = None,
+    rules: Any = None,
+) -> dict[str, Any]:
+    """Observe the fittest team of a run and return what ``conevo behaviours`` prints.
+
+    Plain data: run, task, generation (of the team), scenarios, seed; then the details that the
+    world's study gives.
+
+    Raises:
+        UsageError: another world, no generation has finished yet, or made with other kernels.
+    """
+    found = observe(run, scenarios, seed, threads=threads, device=device, rules=rules)
+    return {
+        "run": str(run.path),
+        "task": run.config.task,
+        "generation": found.team.generation,
+        "scenarios": scenarios,
+        "seed": found.seed,
+    } | found.seen.details([asdict(life) for life in found.lifetimes])

@@ -33,7 +33,6 @@ from conevo.runs.evaluation import play
 from conevo.runs.lab import Lab
 from conevo.runs.run import Run
 from conevo.runs.store import Store
-from conevo.studies.fittest import lab_of
 from conevo.studies.repeatability import Repeatability, repeatability, spearman_brown, trials_for
 from conevo.terms import counted
 
@@ -139,7 +138,7 @@ def signal_of_run(
         Unmeasured: the method has no populations.
         UsageError: these numbers are not allowed, or the run was made with other kernels.
     """
-    lab, store = lab_of(run, threads, device), Store(run.path)
+    lab, store = run.equip(threads, device), Store(run.path)
     name, blank = lab.config.method, lab.blank_state()
     states = {"first": store.load_origin(name, blank) or blank}
     last, _ = store.load_checkpoint(name, blank)

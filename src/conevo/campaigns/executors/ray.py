@@ -21,10 +21,11 @@ from typing import Any, ClassVar
 
 from conevo.campaigns.devices import AUTO, CPU
 from conevo.campaigns.executors.protocol import Ending, RunJob
-from conevo.campaigns.executors.worker import spawn, usable_cores, why_lost
+from conevo.campaigns.executors.worker import spawn, why_lost
 from conevo.campaigns.object_store import ObjectStore
 from conevo.campaigns.places import Places
 from conevo.errors import EnvironmentFailure, UsageError
+from conevo.kernels.devices import usable_cores
 
 __all__ = ["RayCluster"]
 

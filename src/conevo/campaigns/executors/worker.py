@@ -9,7 +9,7 @@ import sys
 from conevo.campaigns.executors.protocol import RunJob
 from conevo.campaigns.places import Places
 
-__all__ = ["ONE_THREAD", "spawn", "usable_cores", "why_lost", "worker_command"]
+__all__ = ["ONE_THREAD", "spawn", "why_lost", "worker_command"]
 
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
@@ -41,10 +41,3 @@ def why_lost(code: int) -> str:
     if code in (0, 1):
         return ""
     return f"killed by signal {-code}" if code < 0 else f"ended with exit code {code}"
-
-
-def usable_cores() -> int:
-    """Return the number of CPU cores this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
