@@ -93,15 +93,12 @@ class Summary:
     """What the runs of a cell reached in one measure.
 
     Attributes:
-        environment, treatment: which cell.
         values: of the runs, by seed.
         mean: with Student's 95 % interval.
         sd: standard deviation of the runs (n - 1); None below two.
         normal: tests of normality.
     """
 
-    environment: str
-    treatment: Treatment
     values: tuple[float, ...]
     mean: Estimate
     sd: float | None
@@ -206,20 +203,11 @@ def group_values(values: Iterable[RunValue]) -> dict[Group, dict[Cell, list[RunV
     return {group: dict(cells) for group, cells in groups.items()}
 
 
-def summarize(cells: Mapping[Cell, Sequence[RunValue]]) -> list[Summary]:
-    """Return what each cell reached: by environment, then by treatment."""
-    return [
-        Summary(
-            environment=environment,
-            treatment=treatment,
-            values=tuple(values),
-            mean=mean_interval(values),
-            sd=float(np.std(values, ddof=1)) if len(values) > 1 else None,
-            normal=normality(values),
-        )
-        for environment, samples in _by_environment(cells).items()
-        for treatment, values in samples.items()
-    ]
+def summarize(runs: Sequence[RunValue]) -> Summary:
+    """Return what the runs of a cell reached."""
+    values = tuple(run.value for run in runs)
+    sd = float(np.std(values, ddof=1)) if len(values) > 1 else None
+    return Summary(values, mean_interval(values), sd, normality(values))
 
 
 def compare_all(cells: Mapping[Cell, Sequence[RunValue]]) -> list[Pair]:

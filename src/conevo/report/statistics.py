@@ -23,8 +23,9 @@ from functools import lru_cache
 import numpy as np
 import numpy.typing as npt
 
-from conevo.report.ranks import Floats, above, mann_whitney, smallest_mann_whitney
+from conevo.report.ranks import above, mann_whitney, smallest_mann_whitney
 from conevo.rng import stream
+from conevo.typing import Floats, Record
 
 __all__ = [
     "ALPHA",
@@ -38,6 +39,7 @@ __all__ = [
     "mean_interval",
     "normality",
     "proportion_interval",
+    "with_holm",
 ]
 
 ALPHA = 0.05
@@ -114,6 +116,19 @@ class Estimate:
     n: int
     method: str
 
+    def within(self, least: float, most: float) -> tuple[float | None, float | None]:
+        """Return the interval, which ends where values do; a pair of None without one."""
+        if self.low is None or self.high is None:
+            return None, None
+        return max(self.low, least), min(self.high, most)
+
+    def ends(self, least: float, most: float) -> tuple[float, float, float] | None:
+        """Return the value and its interval, as ``within``; None without one."""
+        low, high = self.within(least, most)
+        if self.value is None or low is None or high is None:
+            return None
+        return self.value, low, high
+
 
 def normality(values: npt.ArrayLike) -> Normality:
     """Test a sample of runs against the normal distribution fitted to it.
@@ -179,6 +194,12 @@ def holm(ps: Sequence[float | None]) -> list[float | None]:
         least = max(least, min(1.0, (len(made) - rank) * p))
         adjusted[k] = least
     return adjusted
+
+
+def with_holm(rows: Sequence[Record]) -> list[Record]:
+    """Return rows with their ``p_mann_whitney`` corrected by Holm, as ``p_holm``."""
+    corrected = holm([row["p_mann_whitney"] for row in rows])
+    return [row | {"p_holm": p} for row, p in zip(rows, corrected, strict=True)]
 
 
 def is_alike(comparison: Comparison, margin: float = 0.15) -> bool:

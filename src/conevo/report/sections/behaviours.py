@@ -21,25 +21,17 @@ Counts = dict[Cell, Counter[str]]
 
 def behaviours(scope: Scope) -> Section | None:
     """Return which collective and individual behaviours were seen; None in other worlds."""
-    cells = {one.run: cell for cell, values in scope.cells.items() for one in values}
     counts: dict[str, Counts] = defaultdict(lambda: defaultdict(Counter))
     studied: dict[Cell, set[str]] = defaultdict(set)
-    for run, kind, behaviour, count in scope.tables.query(
+    for cell, run, kind, behaviour, count in scope.rows(
         "SELECT run, kind, behaviour, count FROM behaviours ORDER BY ALL"
-    )[1]:
-        if run in cells:
-            # The team's row names its most frequent behaviour: there it is runs that are counted.
-            counts[kind][cells[run]][behaviour] += 1 if kind == "team" else count
-            studied[cells[run]].add(run)
+    ):
+        # The team's row names its most frequent behaviour: there it is runs that are counted.
+        counts[kind][cell][behaviour] += 1 if kind == "team" else count
+        studied[cell].add(run)
     if not counts:
         return None
-    ordered = [
-        Cell(environment, treatment)
-        for environment in scope.environments
-        for treatment in scope.treatments
-        if Cell(environment, treatment) in studied
-    ]
-    n = {cell: len(studied[cell]) for cell in ordered}
+    n = {cell: len(studied[cell]) for cell in scope.ordered(studied)}
     names, words = _named({name for of in counts["collective"].values() for name in of})
     return Section(
         "Behaviours",

@@ -85,32 +85,23 @@ def _over_generations(
 
 def _champions(scope: Scope) -> dict[Cell, list[dict[str, int]]]:
     """Return the castes of each run's champion in the study, with their robots."""
-    cells = {one.run: cell for cell, values in scope.cells.items() for one in values}
-    teams: dict[str, dict[str, int]] = defaultdict(dict)
-    for run, caste, robots in scope.tables.query(
+    found: dict[Cell, dict[str, dict[str, int]]] = defaultdict(lambda: defaultdict(dict))
+    for cell, run, caste, robots in scope.rows(
         "SELECT run, caste, count(*) FROM robots GROUP BY ALL ORDER BY ALL"
-    )[1]:
-        if run in cells:
-            teams[run][caste] = robots
-    found: dict[Cell, list[dict[str, int]]] = defaultdict(list)
-    for run, team in teams.items():
-        found[cells[run]].append(team)
-    return {cell: found[cell] for cell in scope.cells if cell in found}
+    ):
+        found[cell][run][caste] = robots
+    return {cell: list(teams.values()) for cell, teams in found.items()}
 
 
 def _devoted(scope: Scope) -> dict[Cell, float]:
     """Return how many robots of a champion do more than half of their work in one setting, mean."""
-    counted = dict(
-        scope.tables.query(
-            f"SELECT run, count(*) FILTER (setting_share > {MAJORITY}) FROM robots"
-            " GROUP BY run HAVING count(setting_share) > 0"
-        )[1]
-    )
-    found = {
-        cell: [counted[one.run] for one in values if one.run in counted]
-        for cell, values in scope.cells.items()
-    }
-    return {cell: float(np.mean(of)) for cell, of in found.items() if of}
+    found: dict[Cell, list[int]] = defaultdict(list)
+    for cell, _, robots in scope.rows(
+        f"SELECT run, count(*) FILTER (setting_share > {MAJORITY}) FROM robots"
+        " GROUP BY run HAVING count(setting_share) > 0"
+    ):
+        found[cell].append(robots)
+    return {cell: float(np.mean(of)) for cell, of in found.items()}
 
 
 def _of_champions(scope: Scope, teams: Mapping[Cell, Sequence[Mapping[str, int]]]) -> Table:
@@ -118,12 +109,13 @@ def _of_champions(scope: Scope, teams: Mapping[Cell, Sequence[Mapping[str, int]]
     names = [*sorted(seen - {NON_SPECIALIZED}), *({NON_SPECIALIZED} & seen)]
     devoted = _devoted(scope)
     rows: list[dict[str, Any]] = [
-        scope.key(environment, treatment)
+        scope.key(*cell)
         | {"n": len(of), "one_caste": sum(len(team) == 1 for team in of)}
         | {"specialized": float(np.mean([len(set(team) - {NON_SPECIALIZED}) for team in of]))}
         | {name: float(np.mean([team.get(name, 0) for team in of])) for name in names}
-        | {"devoted": devoted.get(Cell(environment, treatment))}
-        for environment, treatment, of in _in_order(scope, teams)
+        | {"devoted": devoted.get(cell)}
+        for cell in scope.ordered(teams)
+        for of in [teams[cell]]
     ]
     columns = [
         *KEYS,
@@ -146,17 +138,6 @@ def _of_champions(scope: Scope, teams: Mapping[Cell, Sequence[Mapping[str, int]]
     )
 
 
-def _in_order(
-    scope: Scope, teams: Mapping[Cell, Sequence[Mapping[str, int]]]
-) -> list[tuple[str, Treatment, Sequence[Mapping[str, int]]]]:
-    return [
-        (environment, treatment, teams[Cell(environment, treatment)])
-        for environment in scope.environments
-        for treatment in scope.treatments
-        if Cell(environment, treatment) in teams
-    ]
-
-
 class _Member(NamedTuple):
     """Robots of a cell's champions that have a caste and a favourite setting in common.
 
@@ -174,14 +155,12 @@ class _Member(NamedTuple):
 
 def _members(scope: Scope) -> list[_Member]:
     """Return who is in which caste with which favourite; of studies that have favourites."""
-    cells = {one.run: cell for cell, values in scope.cells.items() for one in values}
     found: dict[tuple[Cell, str, str], list[float]] = defaultdict(list)
-    for run, caste, setting, share in scope.tables.query(
+    for cell, _, caste, setting, share in scope.rows(
         "SELECT run, caste, favourite_setting, setting_share FROM robots"
         " WHERE setting_share IS NOT NULL ORDER BY ALL"
-    )[1]:
-        if run in cells:
-            found[cells[run], caste, setting].append(share)
+    ):
+        found[cell, caste, setting].append(share)
     return [
         _Member(*key, len(of), float(np.mean(of)), sum(share > MAJORITY for share in of))
         for key, of in found.items()
@@ -191,10 +170,9 @@ def _members(scope: Scope) -> list[_Member]:
 def _by_setting(scope: Scope, members: Sequence[_Member]) -> Table:
     """Show castes by S next to favourite settings, a row per method and pair of them."""
     numbers = [
-        scope.key(environment, treatment) | {"n": len(scope.cells[one.cell])} | _shown([one])
-        for environment in scope.environments
-        for treatment in scope.treatments
-        for one in _largest(one for one in members if one.cell == Cell(environment, treatment))
+        scope.key(*cell) | {"n": len(scope.cells[cell])} | _shown([one])
+        for cell in scope.ordered(scope.cells)
+        for one in _largest(one for one in members if one.cell == cell)
     ]
     rows = []
     for treatment in scope.treatments:

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 from conevo.report.exhibits import Column, Figure, Section, Table, interval, p_value, plain
 from conevo.report.figures import charts as figures
 from conevo.report.sections.scope import Scope, place_names
-from conevo.report.statistics import compare, holm
+from conevo.report.statistics import compare, with_holm
 
 __all__ = ["composed"]
 
@@ -38,6 +38,7 @@ COLUMNS = [
 class _Played(NamedTuple):
     """A team that was played, and what it reached in the mean of its scenarios."""
 
+    environment: str
     study: str
     team: str
     value: float
@@ -65,16 +66,16 @@ def composed(scope: Scope) -> Section | None:
 
 def _played(scope: Scope) -> dict[str, list[_Played]]:
     """Return the teams of each run that were composed or cloned."""
-    found: dict[str, list[_Played]] = defaultdict(list)
-    for run, *played in scope.tables.query(
+    found: dict[str, list[_Played]] = {run.run: [] for of in scope.cells.values() for run in of}
+    for cell, run, *played in scope.rows(
         """
         SELECT s.run, s.study, s.team, avg(s.value) FROM scores s JOIN runs r USING (run)
         WHERE s.study IN ('clones', 'composed') AND s.team <> 'whole' AND s.measure = r.measure
             AND s.value IS NOT NULL
         GROUP BY ALL ORDER BY ALL
         """
-    )[1]:
-        found[run].append(_Played(*played))
+    ):
+        found[run].append(_Played(cell.environment, *played))
     return found
 
 
@@ -82,13 +83,11 @@ def _rows(scope: Scope, by_run: dict[str, list[_Played]]) -> list[dict[str, Any]
     """Return each composed team with the best clones of the same runs."""
     best = max if scope.main.larger_is_better else min
     pairs: dict[tuple[str, str], list[tuple[float, float]]] = defaultdict(list)
-    for cell, runs in scope.cells.items():
-        for one in runs:
-            teams = by_run.get(one.run, [])
-            clones = [team.value for team in teams if team.study == "clones"]
-            for team in teams:
-                if team.study == "composed" and clones:
-                    pairs[cell.environment, team.team].append((team.value, best(clones)))
+    for teams in by_run.values():
+        clones = [team.value for team in teams if team.study == "clones"]
+        for team in teams:
+            if team.study == "composed" and clones:
+                pairs[team.environment, team.team].append((team.value, best(clones)))
     rows: list[dict[str, Any]] = []
     for (environment, name), values in sorted(pairs.items()):
         found = compare([a for a, _ in values], [b for _, b in values])
@@ -98,17 +97,14 @@ def _rows(scope: Scope, by_run: dict[str, list[_Played]]) -> list[dict[str, Any]
             | {"interval": (found.low, found.high)}
             | {"p_t": found.p_t, "p_mann_whitney": found.p_mann_whitney}
         )
-    corrected = holm([row["p_mann_whitney"] for row in rows])
-    return [row | {"p_holm": p} for row, p in zip(rows, corrected, strict=True)]
+    return with_holm(rows)
 
 
 def _figure(scope: Scope, about: str, by_run: dict[str, list[_Played]]) -> Figure:
     """Draw a bar per team and environment, clones first: the form of figure 4.12."""
     values: dict[tuple[str, str], dict[str, list[float]]] = defaultdict(lambda: defaultdict(list))
-    for cell, runs in scope.cells.items():
-        for one in runs:
-            for study, team, value in by_run.get(one.run, ()):
-                values[study, team][cell.environment].append(value)
+    for environment, study, team, value in (one for of in by_run.values() for one in of):
+        values[study, team][environment].append(value)
     names = {
         f"{team} {study}": f"{team} clones" if study == "clones" else team
         for study, team in sorted(values)

@@ -9,8 +9,6 @@ of the means. Of a measure of which smaller is better, what is added is lost.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any, NamedTuple
 
 from conevo.report.comparison import Cell
@@ -27,7 +25,7 @@ from conevo.report.exhibits import (
 )
 from conevo.report.figures import charts as figures
 from conevo.report.sections.scope import KEYS, Scope, named, sizes
-from conevo.report.statistics import Estimate, compare, holm, mean_interval
+from conevo.report.statistics import compare, mean_interval, with_holm
 
 __all__ = ["clones", "lesions", "rotations"]
 
@@ -112,32 +110,29 @@ def _section(scope: Scope, study: str, title: str, what: str, note: str) -> Sect
 
 def _teams(scope: Scope, study: str) -> tuple[dict[Cell, list[_Team]], int]:
     """Return the changed teams of each cell by run, and how many of them have nothing to lose."""
-    found = scope.tables.query(
-        f"""
-        SELECT s.run, s.team, avg(s.value) FROM scores s JOIN runs r USING (run)
-        WHERE s.study = '{study}' AND s.measure = r.measure AND s.value IS NOT NULL
-        GROUP BY ALL ORDER BY ALL
-        """
-    )[1]
-    values: dict[str, dict[str, float]] = defaultdict(dict)
-    for run, team, value in found:
-        values[run][team] = value
-    cells: dict[Cell, list[_Team]] = {}
-    lost = 0
-    for cell, runs in scope.cells.items():
-        teams = []
-        for one in runs:
-            of = dict(values.get(one.run, {}))
-            whole = of.pop("whole", None)
-            if whole is not None:
-                direction = scope.main.larger_is_better
-                own = [_Team(one.run, caste, whole, v, direction) for caste, v in of.items()]
-                able = [team for team in own if team.scale > 0]
-                teams += able
-                lost += len(own) - len(able)
-        if teams:
-            cells[cell] = teams
-    return cells, lost
+    found = [
+        (cell, _Team(run, caste, whole, value, scope.main.larger_is_better))
+        for cell, run, caste, whole, value in scope.rows(
+            f"""
+            WITH played AS (
+                SELECT s.run, r.seed, s.team, avg(s.value) AS value
+                FROM scores s JOIN runs r USING (run)
+                WHERE s.study = '{study}' AND s.measure = r.measure AND s.value IS NOT NULL
+                GROUP BY ALL
+            )
+            SELECT run, changed.team, whole.value, changed.value
+            FROM played changed JOIN played whole USING (run)
+            WHERE whole.team = 'whole' AND changed.team <> 'whole'
+            ORDER BY changed.seed, run, changed.team
+            """
+        )
+    ]
+    able = {
+        cell: [team for own, team in found if own == cell and team.scale > 0]
+        for cell in scope.cells
+    }
+    kept = {cell: teams for cell, teams in able.items() if teams}
+    return kept, len(found) - sum(map(len, kept.values()))
 
 
 def _figure(
@@ -179,7 +174,7 @@ def _figure(
         (),
         rows,
         drawing=figures.points(
-            at.grid(means, lambda values: figures.Points(values, _ends(_mean_lost(values)))),
+            at.grid(means, lambda of: figures.Points(of, mean_interval(of).ends(-MOST, MOST))),
             at.places,
             named({cell: len(values) for cell, values in means.items()}),
             x_label=at.axis,
@@ -190,38 +185,22 @@ def _figure(
     )
 
 
-def _mean_lost(values: Sequence[float]) -> Estimate:
-    """Return the mean of losses in percent, with an interval that ends where losses do."""
-    mean = mean_interval(values)
-    if mean.low is None or mean.high is None:
-        return mean
-    return replace(mean, low=max(mean.low, -MOST), high=min(mean.high, MOST))
-
-
-def _ends(mean: Estimate) -> tuple[float, float, float] | None:
-    """Return a mean with its interval, if it has one."""
-    if mean.value is None or mean.low is None or mean.high is None:
-        return None
-    return mean.value, mean.low, mean.high
-
-
 def _rows(scope: Scope, cells: dict[Cell, list[_Team]]) -> list[dict[str, Any]]:
     rows: list[dict[str, Any]] = []
     for cell, teams in cells.items():
         for caste in sorted({team.caste for team in teams}):
             with_it = [team for team in teams if team.caste == caste]
             result = compare([team.value for team in with_it], [team.whole for team in with_it])
-            lost = _mean_lost([team.lost for team in with_it])
+            lost = mean_interval([team.lost for team in with_it])
             of = _percent(result.mean_a, result.mean_b)
             rows.append(
                 scope.key(cell.environment, cell.treatment)
                 | {"caste": caste, "n": len(with_it)}
                 | {"whole": result.mean_b, "changed": result.mean_a, "percent": of}
-                | {"lost": lost.value, "interval": (lost.low, lost.high)}
+                | {"lost": lost.value, "interval": lost.within(-MOST, MOST)}
                 | {"p_t": result.p_t, "p_mann_whitney": result.p_mann_whitney}
             )
-    corrected = holm([row["p_mann_whitney"] for row in rows])
-    return [row | {"p_holm": p} for row, p in zip(rows, corrected, strict=True)]
+    return with_holm(rows)
 
 
 def _by_caste(study: str) -> list[Column]:

@@ -33,17 +33,14 @@ DIRECTIONS = {
 def metrics(scope: Scope) -> Section:
     """Return every measure of the champions, a column per treatment."""
     title = "Measures of specialization"
-    cells = {one.run: cell for cell, values in scope.cells.items() for one in values}
     found: dict[tuple[str, Cell], list[float]] = defaultdict(list)
     diversity: dict[str, float] = {}
-    listed = scope.tables.query(
+    for cell, run, metric, value in scope.rows(
         "SELECT run, metric, value FROM metrics WHERE isfinite(value) ORDER BY run, metric"
-    )[1]
-    for run, metric, value in listed:
-        if run in cells:
-            found[metric, cells[run]].append(value)
-            if metric == DIVERSITY:
-                diversity[run] = value
+    ):
+        found[metric, cell].append(value)
+        if metric == DIVERSITY:
+            diversity[run] = value
     if not found:
         return Section(title, ["No team of these runs was studied."])
     seen = {metric for metric, _ in found}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from statistics import fmean, stdev
 from typing import Any
 
 from conevo.report.comparison import (
@@ -36,12 +37,9 @@ MOST_COLUMNS = 5  # of treatments that a table compares with each other
 
 def performance(scope: Scope) -> Section:
     """Return what every cell reached."""
-    found = {Cell(one.environment, one.treatment): one for one in summarize(scope.cells)}
+    found = {cell: summarize(scope.cells[cell]) for cell in scope.ordered(scope.cells)}
     exchanges = scope.exchanges()
-    rows = [
-        scope.key(*cell) | _summary_row(one, scope) | _exchange_row(exchanges.get(cell))
-        for cell, one in found.items()
-    ]
+    rows = [_row(scope, cell, one, exchanges.get(cell)) for cell, one in found.items()]
     exhibits = [*_drawn(scope, found, rows), _table(scope, rows), *_pooled(scope), *_others(scope)]
     return Section(f"Task performance: {scope.main.heading}", _warnings(scope), exhibits)
 
@@ -91,7 +89,7 @@ def _drawn(
         (),
         runs,
         drawing=figures.points(
-            at.grid(found, lambda one: figures.Points(one.values, _ends(one, scope))),
+            at.grid(found, lambda one: figures.Points(one.values, one.mean.ends(*scope.within))),
             at.places,
             names,
             x_label=at.axis,
@@ -134,37 +132,32 @@ def _table(scope: Scope, rows: Sequence[Mapping[str, Any]]) -> Table:
     )
 
 
-def _ends(one: Summary, scope: Scope) -> tuple[float, float, float] | None:
-    """Return mean and interval, which ends where values do; None if there is no interval."""
-    mean, (least, most) = one.mean, scope.within
-    if mean.value is None or mean.low is None or mean.high is None:
-        return None
-    return mean.value, max(mean.low, least), min(mean.high, most)
+def _row(
+    scope: Scope, cell: Cell, one: Summary, made: tuple[float, float] | None
+) -> dict[str, Any]:
+    """Return the numbers of a cell.
 
-
-def _summary_row(one: Summary, scope: Scope) -> dict[str, Any]:
-    cell = Cell(one.environment, one.treatment)
-    begun = [value.value for value in scope.first.get(cell, ())]
-    optima = {value.optimum for value in scope.cells[cell]}
+    Args:
+        scope, cell, one: what its runs reached.
+        made: pairs that exchanged in a generation, and their share; None if the method never does.
+    """
+    begun = [run.value for run in scope.first.get(cell, ())]
+    optima = {run.optimum for run in scope.cells[cell]}
     optimum = optima.pop() if len(optima) == 1 else None
-    mean = one.mean.value
-    interval_of = _ends(one, scope)
-    return {
+    mean, (pairs, share) = one.mean.value, made or (None, None)
+    return scope.key(*cell) | {
         "n": len(one.values),
         "mean": mean,
         "sd": one.sd,
-        "interval": interval_of[1:] if interval_of else (None, None),
+        "interval": one.mean.within(*scope.within),
         "range": (min(one.values), max(one.values)),
         "generation_0": sum(begun) / len(begun) if begun else None,
         "share": mean / optimum if optimum and mean is not None else None,
         "p_ks": one.normal.p_ks,
         "p_lilliefors": one.normal.p_lilliefors,
+        "exchanges": pairs,
+        "exchange_share": None if share is None else 100 * share,
     }
-
-
-def _exchange_row(made: tuple[float, float] | None) -> dict[str, Any]:
-    pairs, share = made or (None, None)
-    return {"exchanges": pairs, "exchange_share": None if share is None else 100 * share}
 
 
 def _performance_columns(rows: Sequence[Mapping[str, Any]]) -> list[Column]:
@@ -260,9 +253,10 @@ def _others(scope: Scope) -> list[Exhibit]:
             "direction": measure.direction,
             "n": len(values),
         }
-        | _mean_and_sd([one.value for one in values])
+        | {"mean": fmean(of), "sd": stdev(of) if len(of) > 1 else None}
         for measure, cells in scope.others.items()
         for (environment, treatment), values in cells.items()
+        for of in [[one.value for one in values]]
     ]
     if not rows:
         return []
@@ -279,9 +273,3 @@ def _others(scope: Scope) -> list[Exhibit]:
     note = "Mean over runs of the mean over fresh scenarios; sd: of the runs; n: runs."
     name, title = f"{scope.stem}-measures", "Other measures of task performance"
     return [Table(name, title, note, columns, rows, is_open=False)]
-
-
-def _mean_and_sd(values: Sequence[float]) -> dict[str, float | None]:
-    n, mean = len(values), sum(values) / len(values)
-    squares = sum((value - mean) ** 2 for value in values)
-    return {"mean": mean, "sd": math.sqrt(squares / (n - 1)) if n > 1 else None}

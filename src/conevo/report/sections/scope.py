@@ -5,6 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
+from statistics import fmean
+from typing import Any
 
 from conevo.campaigns.tables import RunValue, Tables
 from conevo.report.comparison import Cell, Group, Treatment, group_values, treatments_of
@@ -106,25 +110,43 @@ class Scope:
             by_environment=by_environment,
         )
 
+    @cached_property
+    def _cell_of(self) -> dict[str, Cell]:
+        return {one.run: cell for cell, values in self.cells.items() for one in values}
+
+    def rows(self, sql: str) -> list[tuple[Any, ...]]:
+        """Return what a query has of the group's runs, each row after its cell.
+
+        Args:
+            sql: its first column is a run.
+        """
+        found = self.tables.query(sql)[1]
+        return [(self._cell_of[row[0]], *row) for row in found if row[0] in self._cell_of]
+
+    def ordered(self, cells: Collection[Cell]) -> list[Cell]:
+        """Return cells by environment, then by treatment."""
+        every = (Cell(*pair) for pair in product(self.environments, self.treatments))
+        return [cell for cell in every if cell in cells]
+
     def exchanges(self) -> dict[Cell, tuple[float, float]]:
         """Return what the populations of each cell exchanged, if its method's ever do.
 
         Pairs of sub-populations that recombined between populations in a generation, and their
         share of those that could have, in the mean of the runs.
         """
-        rows = self.tables.query(
+        made: dict[Cell, list[tuple[float, float]]] = {}
+        for cell, _, pairs, share in self.rows(
             "SELECT run, exchanges, exchange_share FROM runs WHERE exchanges IS NOT NULL"
-        )[1]
-        made = {run: (exchanges, share) for run, exchanges, share in rows}
-        found = {}
-        for cell, values in self.cells.items():
-            own = [made[one.run] for one in values if one.run in made]
-            if own:
-                pairs, shares = zip(*own, strict=True)
-                found[cell] = (sum(pairs) / len(own), sum(shares) / len(own))
-        return found
+            " ORDER BY seed, run"
+        ):
+            made.setdefault(cell, []).append((pairs, share))
+        return {
+            cell: (fmean(pairs for pairs, _ in made[cell]), fmean(share for _, share in made[cell]))
+            for cell in self.cells
+            if cell in made
+        }
 
-    def key(self, environment: str, treatment: Treatment) -> dict[str, str]:
+    def key(self, environment: str, treatment: Treatment) -> dict[str, Any]:
         """Return how rows of numbers name a cell."""
         return {
             "environment": environment,

@@ -72,18 +72,13 @@ def blind_cells(scope: Scope) -> set[Cell]:
 
 def _found(scope: Scope) -> dict[Cell, dict[str, list[MeasuredSignal]]]:
     """Return what was measured of the runs of each cell that has any, "first" and "last"."""
-    by_run: dict[str, dict[str, MeasuredSignal]] = {}
-    for run, generation, *rest in scope.tables.query(
-        "SELECT run, generation, unit, scheme, icc, standard_error, icc_of_scheme, rounds_for_half"
-        " FROM signal ORDER BY run, generation"
-    )[1]:
-        by_run.setdefault(run, {})[generation] = MeasuredSignal(*rest)
     found: dict[Cell, dict[str, list[MeasuredSignal]]] = {}
-    for cell, values in scope.cells.items():
-        for one in values:
-            for generation, measured in by_run.get(one.run, {}).items():
-                found.setdefault(cell, {}).setdefault(generation, []).append(measured)
-    return found
+    for cell, _, generation, *rest in scope.rows(
+        "SELECT s.run, s.generation, unit, scheme, icc, standard_error, icc_of_scheme,"
+        " rounds_for_half FROM signal s JOIN runs USING (run) ORDER BY seed, s.run, s.generation"
+    ):
+        found.setdefault(cell, {}).setdefault(generation, []).append(MeasuredSignal(*rest))
+    return {cell: found[cell] for cell in scope.cells if cell in found}
 
 
 def _row(scope: Scope, cell: Cell, own: dict[str, list[MeasuredSignal]]) -> dict[str, Any]:
