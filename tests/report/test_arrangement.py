@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from itertools import product
 
+from conevo.campaigns.plan import levels_of
 from conevo.report.comparison import Cell, Treatment, treatments_of
-from conevo.report.sections.arrangement import Arrangement, arrange, factors_of, levels_of
+from conevo.report.sections.arrangement import Arrangement, arrange, factors_of
 
 
 def arranged(*cells: Cell, by_environment: bool = False) -> Arrangement:

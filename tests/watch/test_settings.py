@@ -1,6 +1,7 @@
 """Runs with other settings have curves, medians and names of their own."""
 
-from conevo.watch.settings import comparisons, differences, factors
+from conevo.campaigns.plan import levels_of
+from conevo.watch.settings import comparisons, differences
 from conevo.watch.state import Watched
 from watch.followed import session, write_run, write_shaping
 
@@ -111,8 +112,8 @@ def test_runs_by_other_code_have_medians_of_their_own_once_they_have_begun(tmp_p
 
 
 def test_factors_of_some_runs_of_a_plan_are_compared_with_the_others():
-    parts = [factors(v) for v in ("", "gst=0.1", "gst=0.2", "gst=0.1", "")]
+    parts = [levels_of(v) for v in ("", "gst=0.1", "gst=0.2", "gst=0.1", "")]
     assert comparisons(parts) == [("gst=0.1", [0, 1, 3, 4]), ("gst=0.2", [0, 2, 4])]
-    parts = [factors(v) for v in ("n=1", "n=2", "n=1, gst=0.1", "n=2, gst=0.1")]
+    parts = [levels_of(v) for v in ("n=1", "n=2", "n=1, gst=0.1", "n=2, gst=0.1")]
     assert [members for _, members in comparisons(parts)] == [[0, 2], [1, 3]]
     assert comparisons([{}, {}]) == [("", [0, 1])]

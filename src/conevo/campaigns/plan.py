@@ -30,10 +30,16 @@ from conevo.runs.shaping import tasks_up_to
 from conevo.worlds.registry import WorldEntry
 from conevo.worlds.registry import resolve as resolve_world
 
-__all__ = ["MOST_SEEDS", "Plan", "PlannedRun", "Where"]
+__all__ = ["MOST_SEEDS", "Plan", "PlannedRun", "Where", "levels_of"]
 
 MOST_RUNS = 100_000
 MOST_SEEDS = 10_000
+
+
+def levels_of(variant: str) -> dict[str, str]:
+    """Return the level of each factor that a variant names: "gst=0.1, rounds=2"."""
+    parts = re.split(r", (?=[A-Za-z_][\w.-]*=)", variant) if variant else []
+    return {name: level for name, _, level in (part.partition("=") for part in parts)}
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,6 @@ import json
 import shutil
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 from conevo.campaigns.ended import read_ended
 from conevo.campaigns.places import Places
@@ -30,11 +29,11 @@ from conevo.runs.shrinkage import shrinkage
 from conevo.runs.store import Store
 from conevo.studies.exchange import exchanged
 from conevo.studies.records import SignalStudy, Study
+from conevo.typing import Record
 
 __all__ = ["is_sealed", "left_out", "seal_tables"]
 
 MANIFEST = "tables.json"
-Row = dict[str, Any]
 
 
 def is_sealed(places: Places, finished: Sequence[PlannedRun]) -> bool:
@@ -112,7 +111,7 @@ def left_out(folder: Path) -> dict[str, str]:
     return found
 
 
-def _manifest(finished: Sequence[PlannedRun]) -> Row:
+def _manifest(finished: Sequence[PlannedRun]) -> Record:
     return {
         "columns": SCHEMA,
         "runs": {run.label: list(run.run_ids) for run in finished},
@@ -130,7 +129,7 @@ def _last_cost(places: Places, label: str) -> float:
     return ended["core_seconds"] if ended is not None else 0.0
 
 
-def _rows(places: Places, planned: PlannedRun, cost: float) -> Iterator[tuple[str, Row]]:
+def _rows(places: Places, planned: PlannedRun, cost: float) -> Iterator[tuple[str, Record]]:
     """Yield every row that a finished run has in any table."""
     for name, parts in planned.courses.items():
         runs = [Run(places.run(part)) for part in parts]
@@ -175,7 +174,7 @@ def _rows(places: Places, planned: PlannedRun, cost: float) -> Iterator[tuple[st
                 yield "signal", {"run": name} | {k: row[k] for k in SCHEMA["signal"] if k in row}
 
 
-def _tested(run: Run) -> Row:
+def _tested(run: Run) -> Record:
     """Return the testing phase of a run, after checking that it is as it was sealed."""
     test = run.test_result
     if test is None or not run.generations():
@@ -184,7 +183,7 @@ def _tested(run: Run) -> Row:
     return test
 
 
-def _joined(runs: Sequence[Run]) -> tuple[list[Row], list[Row], int]:
+def _joined(runs: Sequence[Run]) -> tuple[list[Record], list[Record], int]:
     """Return the generations and sessions of a run, or of its stages as those of one run.
 
     Generations, team evaluations and team-steps are counted through the stages.
@@ -192,8 +191,8 @@ def _joined(runs: Sequence[Run]) -> tuple[list[Row], list[Row], int]:
     Returns:
         Both, and the number of generations before the last stage.
     """
-    records: list[Row] = []
-    sessions: list[Row] = []
+    records: list[Record] = []
+    sessions: list[Record] = []
     before = 0
     for run in runs:
         before, last = len(records), records[-1] if records else {}
@@ -208,10 +207,10 @@ def _run_row(
     planned: PlannedRun,
     run: Outline,
     world: str,
-    provenance: Row,
-    records: Sequence[Row],
-    sessions: Sequence[Row],
-) -> Row:
+    provenance: Record,
+    records: Sequence[Record],
+    sessions: Sequence[Record],
+) -> Record:
     environment = run.environment
     family, _, number = environment.rpartition("-")
     is_numbered = bool(family) and number.isdecimal()
@@ -241,7 +240,7 @@ def _run_row(
     }
 
 
-def _generation_rows(name: str, record: Row) -> Iterator[tuple[str, Row]]:
+def _generation_rows(name: str, record: Record) -> Iterator[tuple[str, Record]]:
     generation = record["generation"]
     yield (
         "generations",
@@ -265,13 +264,13 @@ def _generation_rows(name: str, record: Row) -> Iterator[tuple[str, Row]]:
         yield "castes", about | {"caste": caste, "robots": robots}
 
 
-def _champion_row(name: str, validation: Row, row: Row, before: int) -> Row:
+def _champion_row(name: str, validation: Record, row: Record, before: int) -> Record:
     means = {key: row[key]["mean"] for key in ("validation", "test")}
     about = {"run": name, "generation": before + validation["chosen"]}
     return about | {"finalists": len(validation["finalists"])} | row | means
 
 
-def _study_rows(name: str, study: Row) -> Iterator[tuple[str, Row]]:
+def _study_rows(name: str, study: Record) -> Iterator[tuple[str, Record]]:
     for metric, value in study["metrics"].items():
         yield "metrics", {"run": name, "metric": metric, "value": value}
     for table in ("scores", "robots", "actions", "behaviours"):

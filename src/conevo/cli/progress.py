@@ -15,11 +15,11 @@ from conevo.cli.text import bars, castes, count, duration, favourites, neurons, 
 from conevo.runs.progress import RECENT, Done, seconds_left, share_of
 from conevo.runs.run import Run
 from conevo.terms import S_MEANS, SHARE_SCALE, counted
+from conevo.typing import Record
 from conevo.worlds.measures import Measure
 
 __all__ = ["watching"]
 
-Record = dict[str, Any]
 PAUSE = 2.0  # seconds between two plain lines
 
 

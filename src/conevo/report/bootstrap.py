@@ -16,9 +16,10 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from conevo.report.ranks import Floats, above
+from conevo.report.ranks import above
 from conevo.report.statistics import Estimate, finite
 from conevo.rng import stream
+from conevo.typing import Floats
 
 __all__ = ["iqm", "iqm_interval", "probability_of_improvement"]
 

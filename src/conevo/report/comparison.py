@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from conevo.campaigns.plan import levels_of
 from conevo.campaigns.tables import RunValue
 from conevo.evolution.methods.registry import METHODS, title_of
 from conevo.report.bootstrap import iqm_interval, probability_of_improvement
@@ -40,7 +41,6 @@ __all__ = [
     "agree",
     "compare_all",
     "group_values",
-    "levels_of",
     "summarize",
     "treatments_of",
 ]
@@ -57,11 +57,6 @@ class Treatment(NamedTuple):
         """Name as published, and the levels."""
         name = title_of(self.method)
         return f"{name}, {self.variant}" if self.variant else name
-
-
-def levels_of(variant: str) -> dict[str, str]:
-    """Return the level of each factor that a variant names."""
-    return dict(level.partition("=")[::2] for level in variant.split(", ") if level)
 
 
 def agree(a: str, b: str) -> bool:

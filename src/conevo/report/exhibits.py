@@ -31,6 +31,7 @@ __all__ = [
 
 Row = Mapping[str, Any]
 NOTHING = "–"
+MOST_OPEN = 12  # rows of a table that a page shows without being asked
 
 
 def number(value: Any, digits: int | None = None) -> str:
@@ -156,10 +157,15 @@ class Table(Exhibit):
     """A table.
 
     Attributes:
-        is_open: whether the page shows it without being asked.
+        is_folded: whether the page shows it only when asked; None: if it is long.
     """
 
-    is_open: bool = True
+    is_folded: bool | None = None
+
+    @property
+    def is_open(self) -> bool:
+        """Whether the page shows it without being asked."""
+        return len(self.rows) <= MOST_OPEN if self.is_folded is None else not self.is_folded
 
 
 @dataclass(frozen=True)

@@ -18,13 +18,12 @@ import numpy.typing as npt
 from conevo.campaigns.tables import Tables
 from conevo.report.comparison import Cell, Group, Treatment
 from conevo.report.statistics import ALPHA
+from conevo.typing import Floats
 
 __all__ = ["COURSES", "Course", "Histories", "caste_courses", "courses", "read_histories"]
 
 COURSES = ("value", "specialization", "sst", "gst", "hidden", "recombinations")
 """Columns of ``generations`` that have a course."""
-
-Floats = npt.NDArray[np.float64]
 
 
 class Course(NamedTuple):

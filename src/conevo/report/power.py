@@ -19,21 +19,20 @@ import numpy.typing as npt
 
 from conevo.report.statistics import ALPHA, finite
 from conevo.rng import stream
+from conevo.typing import Floats
 
 __all__ = ["CAMPAIGNS", "Redrawn", "draw", "found_alike", "power_of_pair"]
 
 CAMPAIGNS = 2000
 """Campaigns that are drawn: a power of a half is then known to 2 %."""
 
-Numbers = npt.NDArray[np.float64]
-
 
 class Redrawn(NamedTuple):
     """One sample in every campaign drawn: its runs, means and variances [campaigns]."""
 
     n: int
-    mean: Numbers
-    variance: Numbers
+    mean: Floats
+    variance: Floats
 
 
 def draw(values: npt.ArrayLike, *place: int | str) -> Redrawn | None:

@@ -7,12 +7,12 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["EXACT_RUNS", "Floats", "above", "mann_whitney", "smallest_mann_whitney"]
+from conevo.typing import Floats
+
+__all__ = ["EXACT_RUNS", "above", "mann_whitney", "smallest_mann_whitney"]
 
 EXACT_RUNS = 60
 """Of both samples together: above that Mann-Whitney takes the normal approximation."""
-
-Floats = npt.NDArray[np.float64]
 
 
 def above(x: Floats, y: Floats) -> Floats:

@@ -20,13 +20,12 @@ from conevo.runs.config import RunConfig, resolve
 from conevo.runs.lab import Lab
 from conevo.runs.provenance import device_of
 from conevo.runs.testing import test_team
+from conevo.typing import Record
 
 if TYPE_CHECKING:
     from conevo.runs.run import Run
 
 __all__ = ["test_under"]
-
-Record = dict[str, Any]
 
 
 def test_under(

@@ -22,11 +22,10 @@ from conevo.runs.provenance import now
 from conevo.runs.settings import RunSettings
 from conevo.runs.store import Store
 from conevo.terms import counted, quoted
+from conevo.typing import Record
 from conevo.worlds.measures import measures_of
 
 __all__ = ["give_length", "length_of", "refuse_parts"]
-
-Record = dict[str, Any]
 
 
 def length_of(

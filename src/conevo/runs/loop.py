@@ -18,12 +18,12 @@ from conevo.runs.settings import RunSettings
 from conevo.specialization import castes
 from conevo.specialization.favourite import mean_where_defined
 from conevo.terms import counted
+from conevo.typing import Record
 from conevo.worlds.measures import Measure
 from conevo.worlds.protocol import Outcome
 
 __all__ = ["check_budget", "evolve_generations", "has_reached", "price", "rehearse", "unscored"]
 
-Record = dict[str, Any]
 MOST_REQUESTS = 1000  # of one generation: a method that asks for more never ends it
 OF_METHODS = {"type_c_evaluations", "sst", "gst", "recombinations"}  # every log has them
 

@@ -16,6 +16,7 @@ from conevo.runs.outline import Outline
 from conevo.runs.store import Store, create
 from conevo.runs.time_limit import TimeLimit
 from conevo.terms import quoted
+from conevo.typing import Record
 
 # A run is looked at more often than it is carried on: what simulates it is loaded where it is used.
 if TYPE_CHECKING:
@@ -27,7 +28,6 @@ if TYPE_CHECKING:
 __all__ = ["RUNS", "Run", "evolve", "start"]
 
 RUNS = Path("runs")  # where runs are made and looked for unless told otherwise
-Record = dict[str, Any]
 Watch = Callable[["Run", Record], None]
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from typing import Any
 
 from conevo.errors import UsageError
 from conevo.evolution.protocol import State
@@ -17,11 +16,10 @@ from conevo.runs.loop import evolve_generations
 from conevo.runs.store import Store
 from conevo.runs.testing import test_team, validate
 from conevo.runs.time_limit import TimeLimit
+from conevo.typing import Record
 from conevo.worlds.measures import measures_of
 
 __all__ = ["evolve_again", "evolve_on", "finish"]
-
-Record = dict[str, Any]
 
 
 def evolve_on(

@@ -33,9 +33,10 @@ from conevo.runs.directory import CONFIG, SHAPING, Directory, appearing, refuse_
 from conevo.runs.durable import is_there, replace_file
 from conevo.runs.outline import Outline, flattened, identify, outline_of
 from conevo.runs.provenance import device_of
-from conevo.runs.run import RUNS, Record, Run, Watch, start
+from conevo.runs.run import RUNS, Run, Watch, start
 from conevo.runs.time_limit import TimeLimit
 from conevo.terms import quoted
+from conevo.typing import Record
 from conevo.worlds.registry import product_of
 
 if TYPE_CHECKING:

@@ -50,6 +50,7 @@ from conevo.runs.directory import CONFIG, Directory, appearing, as_json
 from conevo.runs.durable import append_line, replace_file, writing
 from conevo.runs.outline import LENGTH, Outline, digest_of, read_outline
 from conevo.terms import counted
+from conevo.typing import Record
 
 if TYPE_CHECKING:
     from conevo.evolution.protocol import State
@@ -58,7 +59,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Store", "create"]
 
-Record = dict[str, Any]
 PROVENANCE, GENERATIONS, TEST = "provenance.json", "generations.jsonl", "test.json"
 CHAMPION, FINALISTS, ORIGIN = "champion.npz", "finalists.npz", "origin.npz"
 EXTENSION = "extension.json"

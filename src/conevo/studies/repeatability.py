@@ -20,6 +20,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from conevo.typing import Floats
+
 __all__ = [
     "LEAST_RELIABILITY",
     "Repeatability",
@@ -29,7 +31,6 @@ __all__ = [
     "trials_for",
 ]
 
-Floats = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
 ENOUGH_POPULATIONS = 10
 

@@ -35,13 +35,13 @@ from conevo.runs.run import Run
 from conevo.runs.store import Store
 from conevo.studies.repeatability import Repeatability, repeatability, spearman_brown, trials_for
 from conevo.terms import counted
+from conevo.typing import Record
 
 __all__ = ["TRIALS", "Unmeasured", "measure_signal", "signal_of_run", "signal_study"]
 
 GENOTYPES, PER_ROBOT, ALONE, TRIALS = 20, 3, 5, 50
 BATCH = 1000  # teams that are played at once
 Announce = Callable[[str], None]
-Row = dict[str, Any]
 
 
 class Unmeasured(UsageError):
@@ -85,7 +85,7 @@ def measure_signal(
     threads: int | None = None,
     device: str = "cpu",
     announce: Announce | None = None,
-) -> Row:
+) -> Record:
     """Measure the signal of the populations that a run would begin with; writes nothing.
 
     Args:
@@ -114,7 +114,7 @@ def signal_of_run(
     threads: int | None = None,
     device: str | None = None,
     announce: Announce | None = None,
-) -> Row:
+) -> Record:
     """Measure the signal of the populations that a run began with, and of its last ones.
 
     Args:
@@ -147,7 +147,7 @@ def signal_of_run(
     return _measure(lab, states, units, trials, announce)
 
 
-def signal_study(run: Run, *, threads: int | None = None) -> Row:
+def signal_study(run: Run, *, threads: int | None = None) -> Record:
     """Return what ``signal_of_run`` does, as a campaign keeps it.
 
     Returns:
@@ -167,7 +167,7 @@ def _measure(
     units: int | None,
     trials: int,
     announce: Announce | None,
-) -> Row:
+) -> Record:
     if trials < 2:
         raise UsageError(f"trials = {trials}: a signal takes two trials of each genotype, or more")
     if units is not None and units < 2:
@@ -236,7 +236,7 @@ def _price(lab: Lab, subjects: list[_Subject], trials: int) -> str:
     )
 
 
-def _row(lab: Lab, subject: _Subject, trials: int) -> Row:
+def _row(lab: Lab, subject: _Subject, trials: int) -> Record:
     """Return what is found of one subject."""
     state, run = subject.state, lab.config.run
     fitness, is_clones = _try(lab, subject, trials)
@@ -270,7 +270,7 @@ def _row(lab: Lab, subject: _Subject, trials: int) -> Row:
     }
 
 
-def _of_scheme(found: Repeatability, n_trials: int) -> Row:
+def _of_scheme(found: Repeatability, n_trials: int) -> Record:
     """Return the reliability of the mean of a scheme's trials, with its interval."""
     named = {"icc_of_scheme": found.icc, "low_of_scheme": found.low, "high_of_scheme": found.high}
     return {"scheme": n_trials} | {

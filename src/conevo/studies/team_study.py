@@ -34,13 +34,13 @@ from conevo.studies.composition import compose
 from conevo.studies.fittest import equip
 from conevo.studies.lesions import Compared, clone, lesion, rotate
 from conevo.studies.observation import Observed, watch
+from conevo.typing import Record
 from conevo.worlds.protocol import Outcome, setting_columns
 
 __all__ = ["study"]
 
 # Not cloned: a team that only moves, or idles, does nothing of the task (4.6.5, 5.5.4, 6.5.5).
 NOT_CLONED = ("move", "idle")
-Row = dict[str, Any]
 
 
 @dataclass(frozen=True)
@@ -159,7 +159,7 @@ def _counts(outcome: Outcome) -> npt.NDArray[np.int64]:
     return counts
 
 
-def _rows(study: str, compared: Compared) -> list[Row]:
+def _rows(study: str, compared: Compared) -> list[Record]:
     """Return the values of each team and measure as rows; one that is not finite is None."""
     return [
         {"study": study, "team": team, "measure": measure, "scenario": k, "value": _finite(value)}
@@ -173,7 +173,7 @@ def _finite(value: Any) -> float | None:
     return float(value) if np.isfinite(value) else None
 
 
-def _robots(team: Team, portrait: _Portrait) -> list[Row]:
+def _robots(team: Team, portrait: _Portrait) -> list[Record]:
     of, names = portrait.activity, portrait.names
     settings = [names[column] for column in of.settings]
     columns = {
@@ -195,7 +195,7 @@ def _robots(team: Team, portrait: _Portrait) -> list[Row]:
     ]
 
 
-def _actions(lab: Lab, outcome: Outcome) -> list[Row]:
+def _actions(lab: Lab, outcome: Outcome) -> list[Record]:
     return [
         {"robot": robot, "action": action, "count": int(count)}
         for robot, executed in enumerate(_counts(outcome))

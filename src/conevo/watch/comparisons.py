@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from conevo.typing import Floats
 from conevo.watch.settings import comparisons, differences
 from conevo.watch.subjects import Subject
 from conevo.worlds.measures import Measure
 
 __all__ = ["CurvePanel", "panels_of"]
 
-Array = npt.NDArray[np.float64]
 MOST = 300  # points of a curve
 ALL = 40_000  # points of all curves together, about
 FEWEST = 40
@@ -148,20 +148,20 @@ def panels_of(subjects: Sequence[Subject], group: str) -> list[CurvePanel]:
     return found
 
 
-def _steps(x: Array, y: Array, grid: Array) -> Array:
+def _steps(x: Floats, y: Floats, grid: Floats) -> Floats:
     """Return at each place of the grid what the last generation before it came to; NaN before."""
     at = np.searchsorted(x, grid, side="right") - 1
     values = np.append(y, np.nan)
     return np.where(at >= 0, values[at], np.nan)
 
 
-def _until_end(values: Array, x: Array, grid: Array) -> Array:
+def _until_end(values: Floats, x: Floats, grid: Floats) -> Floats:
     """Return values up to the first place of the grid at or after the last x."""
     last = int(np.searchsorted(grid, x[-1])) if len(x) else -1
     return np.where(np.arange(len(grid)) <= last, values, np.nan)
 
 
-def _median(rows: Sequence[Array], size: int) -> tuple[Array, npt.NDArray[np.int64]]:
+def _median(rows: Sequence[Floats], size: int) -> tuple[Floats, npt.NDArray[np.int64]]:
     """Return the median of rows [n, G] and of how many it is.
 
     It is that of the runs that have got so far, and there is none where these are fewer than half
@@ -177,7 +177,7 @@ def _median(rows: Sequence[Array], size: int) -> tuple[Array, npt.NDArray[np.int
     return np.where((2 * n >= len(rows)) & (n > 0), middle, np.nan), n
 
 
-def _plain(values: Array) -> list[float | None]:
+def _plain(values: Floats) -> list[float | None]:
     """Return numbers as JSON has them, none for what is not finite."""
     finite = np.abs(values[np.isfinite(values)])
     most = float(finite.max()) if finite.size else 0.0

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from conevo.watch.tail import readable
 
-__all__ = ["CODE", "FROM", "Choices", "choices_of", "comparisons", "differences", "factors"]
+__all__ = ["CODE", "FROM", "Choices", "choices_of", "comparisons", "differences"]
 
 Choices = tuple[tuple[str, str], ...]  # key and value of all but names and seed
 NAMES = ("run.world", "run.method", "run.preset", "run.seed")
@@ -40,11 +40,6 @@ def differences(methods: Sequence[str], settings: Sequence[Choices]) -> list[dic
         for member, part in zip(members, parts, strict=True):
             own[member] = part
     return [one | other for one, other in zip(common, own, strict=True)]
-
-
-def factors(variant: str) -> dict[str, str]:
-    """Return the factors and levels that the variant of a planned run names."""
-    return dict(part.partition("=")[::2] for part in variant.split(", ") if part)
 
 
 def comparisons(parts: Sequence[Mapping[str, str]]) -> list[tuple[str, list[int]]]:

@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from conevo.campaigns.ledger import Entry
+from conevo.campaigns.plan import levels_of
 from conevo.errors import ConevoError, UsageError
 from conevo.runs import locks
 from conevo.runs.directory import CONFIG, LOCK, SEAL, SHAPING, kind_of
@@ -21,7 +22,7 @@ from conevo.runs.progress import Done, seconds_left, share_of
 from conevo.runs.run import Run
 from conevo.runs.shaping import Shaping
 from conevo.runs.store import GENERATIONS, PROVENANCE
-from conevo.watch.settings import CODE, FROM, Choices, choices_of, factors
+from conevo.watch.settings import CODE, FROM, Choices, choices_of
 from conevo.watch.tail import Log, Whole, readable, stamp
 from conevo.worlds.measures import Measure
 
@@ -315,7 +316,7 @@ class Subject:
             origin = "" if self._shaping else about.origin
             made = [(k, v) for k, v in ((FROM, origin), (CODE, about.codes)) if v]
         if self._is_planned:
-            levels = factors(str(self._about["variant"])).items()
+            levels = levels_of(str(self._about["variant"])).items()
             return (*((f"plan.{k}", v) for k, v in levels), *made)
         if self._shaping is None:
             return (*(about.choices if about else ()), *made)

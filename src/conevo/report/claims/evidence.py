@@ -8,10 +8,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
+from conevo.campaigns.plan import levels_of
 from conevo.campaigns.tables import Tables
 from conevo.report.claims.quantities import QUANTITIES
 from conevo.report.claims.statements import Compare, Sample, Within
-from conevo.report.comparison import levels_of
 from conevo.studies.exchange import is_idle
 from conevo.studies.repeatability import has_signal
 

@@ -17,8 +17,8 @@ from collections import defaultdict
 from collections.abc import Mapping
 from typing import Any
 
+from conevo.campaigns.plan import levels_of
 from conevo.campaigns.tables import RunValue, Tables
-from conevo.report.comparison import levels_of
 
 __all__ = ["changed"]
 

@@ -12,7 +12,6 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from conevo.palette import method_looks
 from conevo.report.figures.lettering import LINE, SIZE, fitted, lines_in
@@ -35,6 +34,7 @@ from conevo.report.figures.style import (
     style,
     width_for,
 )
+from conevo.typing import Floats
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -42,7 +42,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Bar", "Drawing", "Points", "bars", "points"]
 
-Floats = npt.NDArray[np.float64]
 SLOT = 0.5  # inches: most that one method takes of an axis
 EVERYTHING = (-math.inf, math.inf)
 

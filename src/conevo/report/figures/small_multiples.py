@@ -9,16 +9,15 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 from conevo.report.figures.lettering import LINE, SMALL
+from conevo.typing import Floats
 
 __all__ = ["Panels"]
 
-Floats = npt.NDArray[np.float64]
 GAP_X = 0.1  # between panels, in panels
 TICK = 0.025
 

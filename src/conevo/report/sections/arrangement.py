@@ -7,15 +7,15 @@ other factors has a panel of its own. A method that does not have a factor is in
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from typing import TypeVar
 
+from conevo.campaigns.plan import levels_of
 from conevo.report.comparison import Cell, Treatment
 
-__all__ = ["MOST", "Arrangement", "arrange", "factors_of", "levels_of"]
+__all__ = ["MOST", "Arrangement", "arrange", "factors_of"]
 
 MOST = 8
 """Panels, variants or methods that a drawing may have; beyond it a table is easier to read."""
@@ -80,12 +80,6 @@ class Arrangement:
             if cells:
                 made[title] = cells
         return made
-
-
-def levels_of(variant: str) -> dict[str, str]:
-    """Return the levels in the name of a variant, factor by factor: "gst=0.1, rounds=2"."""
-    parts = re.split(r", (?=[A-Za-z_][\w.-]*=)", variant) if variant else []
-    return {name: level for name, _, level in (part.partition("=") for part in parts)}
 
 
 def factors_of(treatments: Iterable[Treatment]) -> dict[str, list[str]]:

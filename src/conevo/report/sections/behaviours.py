@@ -122,5 +122,4 @@ def _table(
         "n: runs.",
         columns,
         rows,
-        is_open=len(rows) <= 12,
     )

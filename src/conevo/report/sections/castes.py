@@ -134,7 +134,6 @@ def _of_champions(scope: Scope, teams: Mapping[Cell, Sequence[Mapping[str, int]]
         "of their work with it, whatever they do in between.",
         columns,
         rows,
-        is_open=len(rows) <= 12,
     )
 
 
@@ -206,7 +205,6 @@ def _by_setting(scope: Scope, members: Sequence[_Member]) -> Table:
         "with the same setting.",
         columns,
         rows,
-        is_open=len(rows) <= 12,
         numbers=numbers,
     )
 

@@ -46,7 +46,7 @@ def champions(scope: Scope) -> Section | None:
         "n: runs in which all three are finite."
     )
     title = "Champions: selection, validation and test"
-    table = Table(f"{scope.stem}-chosen", title, note, columns, rows, is_open=len(rows) <= 12)
+    table = Table(f"{scope.stem}-chosen", title, note, columns, rows)
     return Section("How champions were chosen", text, [table])
 
 

@@ -62,7 +62,8 @@ def claims(tables: Tables) -> Section:
         "and the interval of the difference inside ±15 % of the larger mean. Power: how often "
         "methods that are exactly alike would be found so, with as many runs that scatter as much."
     )
-    table = Table("claims", title, note, columns, [_row(one) for one in found])
+    rows = [_row(one) for one in found]
+    table = Table("claims", title, note, columns, rows, is_folded=False)
     return Section(title, [*text, INCONSISTENT], [table, _statements(found)])
 
 
@@ -138,4 +139,4 @@ def _statements(found: list[Verdict]) -> Table:
     ]
     note = "n: runs of each sample; intervals as in the claim's row."
     title = "Every statement that the verdicts are made of"
-    return Table("claims-statements", title, note, columns, rows, is_open=False)
+    return Table("claims-statements", title, note, columns, rows, is_folded=True)

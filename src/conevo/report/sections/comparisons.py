@@ -84,11 +84,11 @@ def comparisons(scope: Scope) -> Section | None:
         untested |= dict.fromkeys(blind, NO_SIGNAL)
     exhibits: list[Exhibit] = [
         *_map(scope, pairs),
-        _pair_table(scope, pairs, scope.stem, scope.main, untested, is_open=len(pairs) <= 12),
+        _pair_table(scope, pairs, scope.stem, scope.main, untested),
     ]
     for measure, others in scope.others.items():
         stem, of = f"{scope.stem}-{measure.name}", compare_all(others)
-        exhibits.append(_pair_table(scope, of, stem, measure, untested, is_open=False))
+        exhibits.append(_pair_table(scope, of, stem, measure, untested, is_folded=True))
     return Section("Comparisons", text, exhibits)
 
 
@@ -169,7 +169,7 @@ def _pair_table(
     measure: Measure,
     untested: Mapping[Cell, str],
     *,
-    is_open: bool,
+    is_folded: bool | None = None,
 ) -> Table:
     columns = [
         Column("environment", "environment", plain),
@@ -201,5 +201,5 @@ def _pair_table(
         note,
         columns,
         rows,
-        is_open,
+        is_folded,
     )

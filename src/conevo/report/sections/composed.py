@@ -59,7 +59,6 @@ def composed(scope: Scope) -> Section | None:
         f"Mann-Whitney, corrected by Holm for the {len(rows)} rows.",
         COLUMNS,
         rows,
-        is_open=len(rows) <= 12,
     )
     return Section(TITLE, exhibits=[_figure(scope, about, by_run), table])
 

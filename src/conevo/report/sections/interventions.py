@@ -161,7 +161,7 @@ def _figure(
             *_by_caste(study),
             Column("lost", "lost, %"),
         ]
-        return Table(f"{scope.stem}-{study}", title, note, columns, rows, is_open=False)
+        return Table(f"{scope.stem}-{study}", title, note, columns, rows, is_folded=True)
     several = any(len(values) > 1 for values in means.values())
     size = sizes(len(values) for values in means.values())
     return Figure(
@@ -240,5 +240,4 @@ def _table(scope: Scope, study: str, what: str, note: str, rows: list[dict[str, 
         f"larger of the two, mean over runs{tests if is_tested else '.'}",
         shown,
         rows,
-        is_open=len(rows) <= 12,
     )

@@ -125,7 +125,9 @@ def _course_table(
         *(Column(str(q), f"at {q:,}") for q in quarters),
     ]
     note += " At the number of team evaluations given; n: runs."
-    return Table(f"{scope.stem}-{name}", title, note, columns, rows, is_open=False, numbers=numbers)
+    return Table(
+        f"{scope.stem}-{name}", title, note, columns, rows, is_folded=True, numbers=numbers
+    )
 
 
 def _at(course: Course, evaluations: float) -> float | None:

@@ -98,7 +98,6 @@ def metrics(scope: Scope) -> Section:
         f"{PAYS.capitalize()} is one number for all runs of a cell, from three on.",
         columns,
         rows,
-        is_open=len(rows) <= 12,
         numbers=numbers,
     )
     return Section(title, (), [table])
@@ -156,5 +155,6 @@ def definitions() -> Section:
         Column("source", "source", plain),
     ]
     note = "R: robots of the team, A: actions of the world, K: its settings."
-    table = Table("measures", "Measures of specialization: definitions", note, columns, rows)
+    name = "Measures of specialization: definitions"
+    table = Table("measures", name, note, columns, rows, is_folded=False)
     return Section("Definitions of the measures of specialization", (), [table])

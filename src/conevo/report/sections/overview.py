@@ -147,7 +147,7 @@ def _failures(failed: Mapping[str, Ended], campaign: Campaign) -> Table:
         "Origin: machine, the environment failed; request, it could not be carried out; program, "
         "conevo failed."
     )
-    return Table("failures", "Runs that failed", note, columns, rows, is_open=len(rows) <= 12)
+    return Table("failures", "Runs that failed", note, columns, rows)
 
 
 def _unread(unread: Mapping[str, str]) -> Table:

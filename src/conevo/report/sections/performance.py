@@ -58,7 +58,7 @@ def _drawn(
     if not at.is_drawable:
         columns = [*KEYS, Column("seed", "seed"), Column(scope.measure, scope.unit)]
         note = "Mean over fresh scenarios."
-        return [Table(f"{scope.stem}-runs", title, note, columns, runs, is_open=False)]
+        return [Table(f"{scope.stem}-runs", title, note, columns, runs, is_folded=True)]
     names = named({cell: len(one.values) for cell, one in found.items()})
     size = sizes(len(one.values) for one in found.values())
     several = any(len(one.values) > 1 for one in found.values())
@@ -128,7 +128,6 @@ def _table(scope: Scope, rows: Sequence[Mapping[str, Any]]) -> Table:
         + ".",
         shown,
         rows,
-        is_open=len(rows) <= 12,
     )
 
 
@@ -272,4 +271,4 @@ def _others(scope: Scope) -> list[Exhibit]:
     ]
     note = "Mean over runs of the mean over fresh scenarios; sd: of the runs; n: runs."
     name, title = f"{scope.stem}-measures", "Other measures of task performance"
-    return [Table(name, title, note, columns, rows, is_open=False)]
+    return [Table(name, title, note, columns, rows, is_folded=True)]
