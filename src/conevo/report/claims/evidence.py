@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -34,6 +34,9 @@ class RunOf(NamedTuple):
     exchanges: float | None = None
     exchange_share: float | None = None
     reliability: float | None = None
+
+
+Valued = tuple[RunOf, float]  # a run, and the quantity in question
 
 
 @dataclass(frozen=True)
@@ -99,9 +102,7 @@ class Evidence:
         return self._gather_one(statement.sample)
 
     def _gather_two(self, a: Sample, b: Sample) -> Gathered:
-        first: list[float] = []
-        second: list[float] = []
-        runs: tuple[list[RunOf], list[RunOf]] = ([], [])
+        taken: tuple[list[Valued], list[Valued]] = ([], [])
         present: set[str] = set()
         budgets: set[str] = set()
         are_apart = all(QUANTITIES[one.quantity].is_apart for one in (a, b))
@@ -116,24 +117,12 @@ class Evidence:
                 chosen_a, chosen_b = _usual(of_a), _usual(of_b)
             else:
                 continue
-            first += [value for _, value in of_a[chosen_a]]
-            second += [value for _, value in of_b[chosen_b]]
-            runs[0].extend(self._runs(a, here, chosen_a))
-            runs[1].extend(self._runs(b, there, chosen_b))
+            taken[0].extend(of_a[chosen_a])
+            taken[1].extend(of_b[chosen_b])
             present |= {here, there}
             budgets |= {chosen_a, chosen_b}
-        asked = zip((a, b), runs, strict=True)
-        made = [_exchange(one, of) for one, of in asked]
-        least = min((one for one in made if one[0] is not None), default=(None, None))
-        measured = [_reliability(*pair) for pair in zip((a, b), runs, strict=True)]
-        known = [one for one in measured if one is not None]
-        return Gathered(
-            (first, second),
-            frozenset(present),
-            frozenset(budgets),
-            least,
-            min(known, default=None),
-        )
+        values = tuple([value for _, value in own] for own in taken)
+        return _gathered((a, b), taken, values, present, budgets)
 
     def _gather_one(self, sample: Sample) -> Gathered:
         """Return the runs of a sample.
@@ -144,45 +133,49 @@ class Evidence:
         """
         found = {place: self.by_budget(sample, place) for place in sample.environments}
         chosen = {place: _usual(of) for place, of in found.items() if of}
-        values = {place: found[place][budget] for place, budget in chosen.items()}
-        present = frozenset(values)
+        taken = [one for place, budget in chosen.items() for one in found[place][budget]]
         if QUANTITIES[sample.quantity].is_share:
-            flat = [value for pairs in values.values() for _, value in pairs]
+            flat = [value for _, value in taken]
         else:
             by_seed: dict[int, list[float]] = defaultdict(list)
-            for pairs in values.values():
-                for seed, value in pairs:
-                    by_seed[seed].append(value)
+            for run, value in taken:
+                by_seed[run.seed].append(value)
             flat = [
                 math.fsum(own) / len(own)
                 for _, own in sorted(by_seed.items())
-                if len(own) == len(present)
+                if len(own) == len(chosen)
             ]
-        runs = [
-            run for place, budget in chosen.items() for run in self._runs(sample, place, budget)
-        ]
-        budgets, made = frozenset(chosen.values()), _exchange(sample, runs)
-        return Gathered((flat,), present, budgets, made, _reliability(sample, runs))
+        return _gathered((sample,), (taken,), (flat,), chosen, chosen.values())
 
-    def _runs(self, sample: Sample, environment: str, budget: str) -> list[RunOf]:
-        """Return the runs of a sample in one environment at one budget."""
+    def by_budget(self, sample: Sample, environment: str) -> dict[str, list[Valued]]:
+        """Return the runs of a sample in one environment with their values, apart by budget."""
         values = self.read(sample.quantity)
-        return [
-            one
-            for method in sample.methods
-            for one in self.runs.get((environment, method), ())
-            if one.run in values and one.budget == budget
-        ]
-
-    def by_budget(self, sample: Sample, environment: str) -> dict[str, list[tuple[int, float]]]:
-        """Return seeds and values of a sample's runs in one environment, apart by budget."""
-        values = self.read(sample.quantity)
-        found: dict[str, list[tuple[int, float]]] = defaultdict(list)
+        found: dict[str, list[Valued]] = defaultdict(list)
         for method in sample.methods:
             for one in self.runs.get((environment, method), ()):
                 if one.run in values:
-                    found[one.budget].append((one.seed, values[one.run]))
+                    found[one.budget].append((one, values[one.run]))
         return dict(found)
+
+
+def _gathered(
+    samples: Sequence[Sample],
+    taken: Sequence[Sequence[Valued]],
+    values: tuple[list[float], ...],
+    present: Iterable[str],
+    budgets: Iterable[str],
+) -> Gathered:
+    """Return samples with the least that one of them exchanged, and the least of their signals."""
+    runs = [[run for run, _ in own] for own in taken]
+    made = [_exchange(*pair) for pair in zip(samples, runs, strict=True)]
+    measured = [_reliability(*pair) for pair in zip(samples, runs, strict=True)]
+    return Gathered(
+        values,
+        frozenset(present),
+        frozenset(budgets),
+        min((one for one in made if one[0] is not None), default=(None, None)),
+        min((one for one in measured if one is not None), default=None),
+    )
 
 
 def read_evidence(tables: Tables) -> list[Evidence]:
@@ -250,6 +243,6 @@ def _reliability(sample: Sample, runs: Sequence[RunOf]) -> float | None:
     return math.fsum(known) / len(runs) if runs and len(known) == len(runs) else None
 
 
-def _usual(of: Mapping[str, list[tuple[int, float]]]) -> str:
+def _usual(of: Mapping[str, list[Valued]]) -> str:
     """Return the budget with the most runs, the first by name of equals."""
     return max(sorted(of), key=lambda budget: len(of[budget]))

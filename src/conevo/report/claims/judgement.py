@@ -14,8 +14,9 @@ opposite elsewhere, and decided by the world if teams that nothing evolved diffe
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -31,6 +32,7 @@ from conevo.report.power import CAMPAIGNS, Redrawn, draw, found_alike
 
 __all__ = ["Verdict", "judge", "verdicts"]
 
+T = TypeVar("T")
 REPRODUCED = "reproduced"
 NOT_REPRODUCED = "not reproduced"
 UNDECIDED = "undecided: "
@@ -171,11 +173,7 @@ def _verdict(
     """Return the verdict by one of the two tests."""
     if not any(cell.has_runs for cell in cells):
         return f"{UNDECIDED}{_absence(cells, evidence)}"
-    parts, start = [], 0
-    for part in claim.parts:
-        stop = start + len(part.statements)
-        parts.append(_part(part, outcomes[start:stop]))
-        start = stop
+    parts = [_part(*pair) for pair in _by_part(claim, outcomes)]
     if Decision.CONTRADICTED in parts:
         return NOT_REPRODUCED
     if all(outcome is Decision.HOLDS for outcome in parts):
@@ -190,6 +188,13 @@ def _verdict(
     places = {place for cell in cells for place in cell.statement.environments}
     lacking = {p for c in cells for p in c.statement.environments if p not in c.gathered.present}
     return f"{UNDECIDED}{len(places - lacking)} of {len(places)} environments"
+
+
+def _by_part(claim: Claim, of: Sequence[T]) -> Iterator[tuple[Part, Sequence[T]]]:
+    """Yield the parts of a claim with what there is of each of their statements."""
+    rest = iter(of)
+    for part in claim.parts:
+        yield part, [next(rest) for _ in part.statements]
 
 
 def _part(part: Part, outcomes: Sequence[Decision]) -> Decision:
@@ -216,11 +221,11 @@ def _part(part: Part, outcomes: Sequence[Decision]) -> Decision:
 
 def _power(claim: Claim, cells: Sequence[Answer]) -> float | None:
     """Return how likely what is claimed to be alike is found so in campaigns where it is."""
-    alike, start = [], 0
-    for part in claim.parts:
-        own, start = cells[start : start + len(part.statements)], start + len(part.statements)
-        if all(isinstance(s, Compare) and s.expect == "alike" for s in part.statements):
-            alike.append((part, own))
+    alike = [
+        (part, own)
+        for part, own in _by_part(claim, cells)
+        if all(isinstance(s, Compare) and s.expect == "alike" for s in part.statements)
+    ]
     if not alike or any(cell.by_t is Decision.MISSING for _, own in alike for cell in own):
         return None
     drawn: dict[Sample, Redrawn | None] = {}
