@@ -10,9 +10,10 @@ from typing import Any
 
 import click
 
-from conevo.cli.run_text import declared, heading_of, measures_text
+from conevo.cli.run_text import heading_of, measures_text
 from conevo.cli.text import bars, castes, count, duration, favourites, neurons, number
 from conevo.runs.progress import RECENT, Done, seconds_left, share_of
+from conevo.runs.provenance import declared
 from conevo.runs.run import Run
 from conevo.terms import S_MEANS, SHARE_SCALE, counted
 from conevo.typing import Record

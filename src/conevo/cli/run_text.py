@@ -27,17 +27,16 @@ from conevo.controllers.registry import DEFAULT
 from conevo.evolution.methods.registry import title_of
 from conevo.runs.code import changes_text, last_code, sessions_of
 from conevo.runs.outline import Outline
+from conevo.runs.provenance import declared
 from conevo.runs.records import own_numbers
 from conevo.runs.run import Run
 from conevo.runs.shrinkage import shrinkage
 from conevo.studies.exchange import exchanged, per_generation
 from conevo.terms import S_SCALE, SHARE_SCALE, counted, quoted
-from conevo.worlds.measures import Measure
 
 __all__ = [
     "conditions_text",
     "controlled",
-    "declared",
     "exchange_text",
     "generations_table",
     "heading_of",
@@ -107,12 +106,6 @@ def run_text(run: Run, n_rows: int) -> str:
     if run.status == "interrupted":
         parts += ["", f"Continue it with: conevo resume {quoted(run.path)}"]
     return "\n".join(parts)
-
-
-def declared(about: Mapping[str, Any]) -> dict[str, Measure]:
-    """Return the measures that a run's provenance declares, by name."""
-    found = (about.get("world") or {}).get("measures", ())
-    return {one["name"]: Measure(**one) for one in found}
 
 
 def measures_text(about: Mapping[str, Any]) -> list[str]:

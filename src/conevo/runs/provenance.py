@@ -28,9 +28,10 @@ from conevo.runs.code import code_digest, version
 
 if TYPE_CHECKING:
     from conevo.evolution.protocol import Method
+    from conevo.worlds.measures import Measure
     from conevo.worlds.protocol import World
 
-__all__ = ["describe", "describe_machine", "describe_world", "device_of", "now"]
+__all__ = ["declared", "describe", "describe_machine", "describe_world", "device_of", "now"]
 
 log = logging.getLogger("conevo")
 
@@ -53,6 +54,14 @@ def describe(world: World, method: Method) -> dict[str, Any]:
     """Return the headers of a run's world and method: what is known without loading them."""
     about = {"name": method.name, "title": method.title}
     return {"world": describe_world(world), "method": about}
+
+
+def declared(provenance: Mapping[str, Any]) -> dict[str, Measure]:
+    """Return the measures of a run's world by name; conevo 0.1.0 kept none."""
+    from conevo.worlds.measures import Measure
+
+    found = (provenance.get("world") or {}).get("measures", ())
+    return {one["name"]: Measure(**one) for one in found}
 
 
 def describe_world(world: World) -> dict[str, Any]:

@@ -19,6 +19,7 @@ from conevo.runs import locks
 from conevo.runs.directory import CONFIG, LOCK, SEAL, SHAPING, kind_of
 from conevo.runs.outline import Outline, flattened, span
 from conevo.runs.progress import Done, seconds_left, share_of
+from conevo.runs.provenance import declared
 from conevo.runs.run import Run
 from conevo.runs.shaping import Shaping
 from conevo.runs.store import GENERATIONS, PROVENANCE
@@ -60,19 +61,13 @@ class Declared:
         """
         run = Run(path)
         provenance = run.provenance
-        listed = provenance.get("world", {"measures": ()})["measures"]
         codes = [
             f"{one['conevo']} ({one['code']})" for one in provenance["sessions"] if "code" in one
         ]
         return Declared(
             outline=run.outline,
             choices=choices_of(flattened(run.tables())),
-            measures={
-                readable(one["name"]): Measure(
-                    one["name"], readable(one["unit"]), one["larger_is_better"]
-                )
-                for one in listed
-            },
+            measures=declared(provenance),
             origin=_origin(provenance.get("origin")),
             codes=readable(" + ".join(dict.fromkeys(codes))),
         )
