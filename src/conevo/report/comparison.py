@@ -75,6 +75,12 @@ class Group(NamedTuple):
     family: str
     budget: str
 
+    @property
+    def condition(self) -> str:
+        """Which rows of runs with their budgets are its own, in SQL."""
+        world, family, budget = (part.replace("'", "''") for part in self)
+        return f"world = '{world}' AND family = '{family}' AND budget = '{budget}'"
+
 
 class Cell(NamedTuple):
     """Runs that differ in their seed only."""

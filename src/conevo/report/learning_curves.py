@@ -78,11 +78,10 @@ class Histories:
 
 def read_histories(tables: Tables, group: Group) -> Histories:
     """Return the generations of a group's runs, by environment, method, variant and seed."""
-    world, family, budget = (part.replace("'", "''") for part in group)
     tables.query(
         "CREATE OR REPLACE TEMP TABLE chosen AS SELECT row_number() OVER (ORDER BY number,"
         " environment, method, variant, seed, run) - 1 AS place, runs.* FROM runs JOIN budgets"
-        f" USING (run) WHERE world = '{world}' AND family = '{family}' AND budget = '{budget}'"
+        f" USING (run) WHERE {group.condition}"
     )
     tables.query(
         "CREATE OR REPLACE TEMP TABLE history AS SELECT row_number() OVER (ORDER BY place,"

@@ -56,11 +56,9 @@ class Spent(NamedTuple):
 
 def spent_by(tables: Tables, group: Group) -> Spent:
     """Return what the finished runs of a group spent."""
-    world, family, budget = (part.replace("'", "''") for part in group)
     rows = tables.query(
         "SELECT evaluations, team_steps, stopped_by, preset, conevo, contains(run, '/stage-')"
-        f" FROM runs JOIN budgets USING (run) WHERE world = '{world}' AND family = '{family}'"
-        f" AND budget = '{budget}' ORDER BY run"
+        f" FROM runs JOIN budgets USING (run) WHERE {group.condition} ORDER BY run"
     )[1]
     evaluations, steps, reasons, presets, versions, stages = zip(*rows, strict=True)
     return Spent(

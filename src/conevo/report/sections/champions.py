@@ -52,13 +52,12 @@ def champions(scope: Scope) -> Section | None:
 
 def _rows(scope: Scope, measure: str) -> list[dict[str, Any]]:
     """Return a row per cell."""
-    world, family, budget, name = (part.replace("'", "''") for part in (*scope.group, measure))
+    name = measure.replace("'", "''")
     found = scope.tables.query(
         "SELECT r.environment, r.method, r.variant, count(*), avg(c.selection), avg(c.validation),"
         " avg(c.test) FROM champions c JOIN runs r USING (run) JOIN budgets b USING (run)"
-        f" WHERE r.world = '{world}' AND r.family = '{family}' AND b.budget = '{budget}'"
-        f" AND c.measure = '{name}' AND c.selection IS NOT NULL AND c.validation IS NOT NULL"
-        " AND c.test IS NOT NULL GROUP BY ALL"
+        f" WHERE {scope.group.condition} AND c.measure = '{name}' AND c.selection IS NOT NULL"
+        " AND c.validation IS NOT NULL AND c.test IS NOT NULL GROUP BY ALL"
     )[1]
     cells = {(row[0], Treatment(row[1], row[2])): row[3:] for row in found}
     return [
@@ -74,13 +73,12 @@ def _rows(scope: Scope, measure: str) -> list[dict[str, Any]]:
 
 def _not_finite(scope: Scope) -> list[str]:
     """Return a sentence for each study and measure that lacks values."""
-    world, family, budget = (part.replace("'", "''") for part in scope.group)
     found = scope.tables.query(
         "SELECT s.measure, s.study, if(s.study = 'test', s.team, '') AS team,"
         " count(DISTINCT run) FILTER (s.value IS NULL), count(DISTINCT run),"
         " count(*) FILTER (s.value IS NULL), count(*) FROM scores s JOIN runs r USING (run)"
-        f" JOIN budgets b USING (run) WHERE r.world = '{world}' AND r.family = '{family}'"
-        f" AND b.budget = '{budget}' GROUP BY ALL HAVING count(*) > count(s.value) ORDER BY ALL"
+        f" JOIN budgets b USING (run) WHERE {scope.group.condition}"
+        " GROUP BY ALL HAVING count(*) > count(s.value) ORDER BY ALL"
     )[1]
     return [
         f"Not finite: {measure.replace('_', ' ')} in {values} of {counted(of_values, 'value')} of "
