@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from conevo.cli.run_to_end import device_option
+from conevo.cli.run_to_end import device_option, threads_option
 from conevo.worlds.registry import WORLDS
 
 if TYPE_CHECKING:
@@ -38,11 +38,7 @@ Try: conevo behaviours runs/hunt
     type=click.IntRange(0, 2**63 - 1),
     help="Seed of other scenarios (default: those of the run's own test).",
 )
-@click.option(
-    "--threads",
-    type=click.IntRange(1, 4096),
-    help="CPU threads (default: all); does not change results.",
-)
+@threads_option
 @device_option
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def behaviours(

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from conevo.cli.run_to_end import device_option
+from conevo.cli.run_to_end import device_option, threads_option
 from conevo.errors import UsageError
 
 if TYPE_CHECKING:
@@ -38,10 +38,7 @@ OPTIONS = (
         "--epoch", type=click.IntRange(0, 2**31 - 1), metavar="K",
         help="Scenario of its testing phase, counted from 0 (default: 0).",
     ),
-    click.option(
-        "--threads", type=click.IntRange(1, 4096),
-        help="CPU threads (default: all); does not change results."
-    ),
+    threads_option,
     device_option,
 )  # fmt: skip
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from conevo.cli.run_to_end import carry_on, style_of, time_limit_option
+from conevo.cli.run_to_end import carry_on, style_of, threads_option, time_limit_option
 from conevo.errors import UsageError
 
 if TYPE_CHECKING:
@@ -47,10 +47,7 @@ OPTIONS = (
         "--budget-evaluations", type=int,
         help="Spend at most this many team evaluations."
     ),
-    click.option(
-        "--threads", type=click.IntRange(1, 4096),
-        help="CPU threads (default: all); does not change results."
-    ),
+    threads_option,
     click.option(
         "--device", default="cpu", show_default=True,
         help="cpu, cuda or auto (cuda if there is one); does not change results.",

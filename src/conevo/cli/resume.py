@@ -12,6 +12,7 @@ from conevo.cli.run_to_end import (
     device_option,
     output_options,
     style_of,
+    threads_option,
     time_limit_option,
 )
 from conevo.errors import UsageError
@@ -35,11 +36,7 @@ __all__ = ["resume"]
 )  # fmt: skip
 @click.option("--target", metavar="VALUE|none", help="New task performance at which the run ends.")
 @time_limit_option
-@click.option(
-    "--threads",
-    type=click.IntRange(1, 4096),
-    help="CPU threads (default: all); does not change results.",
-)
+@threads_option
 @device_option
 @accept_option
 @output_options

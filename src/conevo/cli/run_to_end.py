@@ -24,6 +24,7 @@ __all__ = [
     "drop_output",
     "output_options",
     "style_of",
+    "threads_option",
     "time_limit_option",
 ]
 
@@ -48,6 +49,13 @@ def accept_option(function: Function) -> Function:
         is_flag=True,
         help="Continue results of another version of conevo; show and reports list both.",
     )(function)
+
+
+threads_option = click.option(
+    "--threads",
+    type=click.IntRange(1, 4096),
+    help="CPU threads (default: all); does not change results.",
+)
 
 
 def device_option(function: Function) -> Function:

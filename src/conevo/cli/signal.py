@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from conevo.cli.options import Order, settings_only
-from conevo.cli.run_to_end import device_option
+from conevo.cli.run_to_end import device_option, threads_option
 from conevo.errors import UsageError
 
 if TYPE_CHECKING:
@@ -30,10 +30,7 @@ __all__ = ["signal"]
     "--trials", type=click.IntRange(2, 1_000_000), metavar="N", default=50, show_default=True,
     help="Trials of each genotype.",
 )  # fmt: skip
-@click.option(
-    "--threads", type=click.IntRange(1, 4096),
-    help="CPU threads (default: all); does not change results.",
-)  # fmt: skip
+@threads_option
 @device_option
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def signal(

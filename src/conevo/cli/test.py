@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from conevo.cli.run_to_end import device_option
+from conevo.cli.run_to_end import device_option, threads_option
 from conevo.errors import UsageError
 
 if TYPE_CHECKING:
@@ -28,11 +28,7 @@ __all__ = ["test"]
     type=click.IntRange(0, 2**63 - 1),
     help="Seed of other scenarios (default: those of the run's own test).",
 )
-@click.option(
-    "--threads",
-    type=click.IntRange(1, 4096),
-    help="CPU threads (default: all); does not change results.",
-)
+@threads_option
 @device_option
 @click.option("--stages", is_flag=True, help="For a shaping: test in every stage's environment.")
 @click.option(
