@@ -12,7 +12,7 @@ from conevo.campaigns.tables import Tables
 from conevo.report.sections.composed import composed
 from conevo.report.sections.scope import scopes
 from conevo.runs.champions import Team
-from conevo.studies.composition import compose
+from conevo.studies.lesions import compose
 from conevo.worlds.pursuit.study.behaviours import BEHAVIOURS
 from conevo.worlds.pursuit.study.captures import COMPOSITIONS
 from conevo.worlds.pursuit.study.composed import COMPOSED, roles_of

@@ -15,7 +15,7 @@ from conevo.runs import provenance
 from conevo.runs.config import resolve
 from conevo.runs.run import start
 from conevo.runs.shaping import start_shaping
-from conevo.studies.fittest import equip
+from conevo.studies.observation import equip
 from runs.tiny import TASK, content, evolve_tiny, tiny_settings
 
 OTHER = "this machine has no 'cuda:1', on which the run was last played: it is played on the cpu"

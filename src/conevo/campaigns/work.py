@@ -18,7 +18,11 @@ import time
 import traceback
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, NotRequired
+
+from annotated_types import Ge, Le, MinLen
+from pydantic import StringConstraints
+from typing_extensions import TypedDict
 
 from conevo.campaigns.admission import admit_code
 from conevo.campaigns.devices import CPU
@@ -26,12 +30,12 @@ from conevo.campaigns.inputs import located
 from conevo.campaigns.places import Places
 from conevo.campaigns.plan import PlannedRun
 from conevo.campaigns.plan_file import STUDIES
-from conevo.campaigns.records import PlannedLine
 from conevo.errors import ConevoError, EnvironmentFailure, UsageError
 from conevo.outside import line_of
 from conevo.reading import read_json_lines
 from conevo.runs.directory import as_json, kind_of
 from conevo.runs.durable import replace_file
+from conevo.runs.records import RunId
 from conevo.runs.run import Run, start
 from conevo.runs.shaping import Shaping, start_stages
 from conevo.runs.time_limit import TimeLimit
@@ -39,6 +43,27 @@ from conevo.runs.time_limit import TimeLimit
 __all__ = ["carry_out", "core_seconds", "main", "planned_runs"]
 
 PATIENCE = 600.0  # seconds to wait for another worker that is just about to leave a run
+
+
+Label = Annotated[str, StringConstraints(pattern=r"^[^/.\x00-\x1f][^/\x00-\x1f]*$")]
+
+
+class PlannedLine(TypedDict):
+    """A line of ``runs.jsonl``, see ``PlannedRun``."""
+
+    label: Label
+    world: str
+    method: str
+    preset: str
+    seed: Annotated[int, Ge(0), Le(2**63 - 1)]
+    variant: str
+    overrides: dict[str, bool | int | float | str]
+    shape: bool
+    studies: list[str]
+    run_ids: Annotated[list[RunId], MinLen(1)]
+    of_first: NotRequired[
+        dict[str, bool | int | float | str]
+    ]  # conevo 0.2.0.dev0 had none at first
 
 
 class _InUse(Exception):

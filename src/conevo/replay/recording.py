@@ -16,7 +16,7 @@ from conevo.replay.trajectory import FORMAT, Trajectory
 from conevo.rng import fold
 from conevo.runs.evaluation import describe
 from conevo.runs.run import Run
-from conevo.studies.fittest import equip
+from conevo.studies.observation import equip
 from conevo.worlds.protocol import Simulator, World
 from conevo.worlds.recorded import params_of, recorded
 

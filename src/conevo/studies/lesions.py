@@ -1,8 +1,8 @@
-"""Teams with one caste replaced, of one robot's clones, or whose controllers change places.
+"""Teams with one caste replaced, of one robot's clones, of several castes', or in other places.
 
-Nitschke 2009, sections 4.6.5, 4.6.6, 5.5.3, 5.5.4, 6.5.4 and 6.5.5; the last is ours. Nothing is
-adapted: the teams that are compared meet the same scenarios, and differ in whose controllers their
-robots have.
+Nitschke 2009, sections 4.6.5, 4.6.6, 5.5.3, 5.5.4, 6.5.4 and 6.5.5, and figure 4.12; the last is
+ours. Nothing is adapted: the teams that are compared meet the same scenarios, and differ in whose
+controllers their robots have.
 """
 
 from __future__ import annotations
@@ -16,8 +16,9 @@ import numpy.typing as npt
 from conevo.runs.champions import Team
 from conevo.specialization.individual import NON_SPECIALIZED
 from conevo.worlds.protocol import Scenarios, Simulator, World
+from conevo.worlds.study import Composed
 
-__all__ = ["WHOLE", "Compared", "clone", "fittest_of", "lesion", "replacement", "rotate"]
+__all__ = ["WHOLE", "Compared", "clone", "compose", "lesion", "replacement", "rotate"]
 
 WHOLE = "whole"  # the team as it was evolved
 MOVED = "moved"  # the same controllers, each in another robot
@@ -111,6 +112,38 @@ def rotate(simulator: Simulator, team: Team, scenarios: Scenarios) -> Compared:
         for name, values in outcome.performance.items()
     }
     return Compared((WHOLE, MOVED), performance)
+
+
+def compose(
+    simulator: Simulator,
+    team: Team,
+    labels: Sequence[str],
+    fitness: npt.ArrayLike,
+    compositions: Sequence[Composed],
+) -> list[Compared]:
+    """Play each composition that a team has the robots for, in scenarios of its own.
+
+    In section 4.6.5 individual behaviours were reproduced by fixed sensor inputs, then put
+    together. Choice: here the robots are the fittest specialists of the run's own team, with their
+    sensors, as in its teams of clones; without one of a behaviour the team is not played.
+
+    Args:
+        simulator: of the team's world.
+        team: R controllers.
+        labels: [R] caste of each robot.
+        fitness: [R] of each robot, as for ``clone``.
+        compositions: with a role per robot of the composed team.
+    """
+    genes, teams = team.as_trial()
+    played = []
+    for one in compositions:
+        if not one.roles or not set(one.roles) <= set(labels):
+            continue
+        robots = [fittest_of(role, labels, fitness) for role in one.roles]
+        rows = np.ascontiguousarray(teams[:, robots])
+        outcome = simulator.evaluate(genes, rows, one.scenarios)
+        played.append(Compared((one.name,), outcome.performance))
+    return played
 
 
 def fittest_of(caste: str, labels: Sequence[str], fitness: npt.ArrayLike) -> int:

@@ -13,19 +13,18 @@ from typing import Any
 
 import numpy as np
 
-from conevo.errors import UsageError
+from conevo.errors import UsageError, without_team
 from conevo.rng import fold
 from conevo.runs.champions import Team
 from conevo.runs.lab import Lab
 from conevo.runs.run import Run
 from conevo.specialization.individual import NON_SPECIALIZED, independent_degree
 from conevo.specialization.team import Activity
-from conevo.studies.fittest import equip
 from conevo.studies.lifetimes import Lifetime, lifetimes
 from conevo.worlds.registry import WORLDS, studies, study_of
 from conevo.worlds.study import Seen, WorldStudy
 
-__all__ = ["Observed", "behaviour_report", "observe", "studied", "watch"]
+__all__ = ["Observed", "behaviour_report", "equip", "observe", "studied", "watch"]
 
 
 @dataclass(frozen=True)
@@ -88,6 +87,25 @@ class Observed:
             ("team", usual, sum(together.values())),
         ]
         return [{"kind": kind, "behaviour": name, "count": n} for kind, name, n in counts]
+
+
+def equip(run: Run, threads: int | None = None, device: str | None = None) -> tuple[Team, Lab]:
+    """Return the fittest team of a run and what simulates it.
+
+    Args:
+        run: finished or not.
+        threads: CPU threads, all by default.
+        device: as for ``Run.resume``.
+
+    Raises:
+        UsageError: no generation has finished yet, or made with other kernels.
+    """
+    team = run.champion
+    if team is None:
+        raise without_team(run.path, run.generations())
+    lab = run.equip(threads, device)
+    lab.refuse_other_team(team, run.path)
+    return team, lab
 
 
 def observe(

@@ -30,10 +30,8 @@ from conevo.runs.run import Run
 from conevo.specialization.favourite import affinity, favourite, favourite_share
 from conevo.specialization.individual import NON_SPECIALIZED, relative_degree
 from conevo.specialization.team import Activity, measure
-from conevo.studies.composition import compose
-from conevo.studies.fittest import equip
-from conevo.studies.lesions import Compared, clone, lesion, rotate
-from conevo.studies.observation import Observed, watch
+from conevo.studies.lesions import Compared, clone, compose, lesion, rotate
+from conevo.studies.observation import Observed, equip, watch
 from conevo.typing import Record
 from conevo.worlds.protocol import Outcome, setting_columns
 
