@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import product
 from typing import Literal
 
 __all__ = [
@@ -16,8 +17,12 @@ __all__ = [
     "above",
     "across",
     "alike",
+    "comparison",
     "within",
 ]
+
+
+Expected = Literal["above", "alike"]
 
 
 @dataclass(frozen=True)
@@ -43,7 +48,7 @@ class Compare:
     are compared with those of another.
     """
 
-    expect: Literal["above", "alike"]
+    expect: Expected
     a: Sample
     b: Sample
 
@@ -119,18 +124,40 @@ class Claim:
     caution: str = ""
 
 
+def comparison(
+    expect: Expected, a: tuple[str, str], b: tuple[str, str], place: str, other: str = ""
+) -> Compare:
+    """Return a comparison of two methods' runs in one environment, or in two.
+
+    Args:
+        expect: what is claimed of the first.
+        a, b: quantity and method of each.
+        place: the environment of both.
+        other: that of the second, if it is another one.
+    """
+    (quantity, method), (of, than) = a, b
+    there = other or place
+    return Compare(expect, Sample(quantity, (method,), (place,)), Sample(of, (than,), (there,)))
+
+
 def above(
     quantity: str, environments: Iterable[str], methods: Iterable[str], others: Iterable[str]
 ) -> tuple[Compare, ...]:
     """Return: in each environment each of the methods is above each of the others."""
-    return _pairs("above", quantity, environments, [(a, b) for a in methods for b in others])
+    return tuple(
+        comparison("above", (quantity, a), (quantity, b), place)
+        for place, a, b in product(environments, methods, others)
+    )
 
 
 def alike(
     quantity: str, environments: Iterable[str], pairs: Iterable[tuple[str, str]]
 ) -> tuple[Compare, ...]:
     """Return: in each environment the two methods of each pair are alike."""
-    return _pairs("alike", quantity, environments, list(pairs))
+    return tuple(
+        comparison("alike", (quantity, a), (quantity, b), place)
+        for place, (a, b) in product(environments, pairs)
+    )
 
 
 def across(
@@ -138,9 +165,8 @@ def across(
 ) -> tuple[Compare, ...]:
     """Return: each method reaches more in the first environment of each pair than in the second."""
     return tuple(
-        Compare("above", Sample(quantity, (method,), (a,)), Sample(quantity, (method,), (b,)))
-        for a, b in pairs
-        for method in methods
+        comparison("above", (quantity, method), (quantity, method), *places)
+        for places, method in product(pairs, methods)
     )
 
 
@@ -149,16 +175,3 @@ def within(
 ) -> Within:
     """Return: over the environments together the method's quantity is in [low, high]."""
     return Within(Sample(quantity, (method,), tuple(environments)), low, high)
-
-
-def _pairs(
-    expect: Literal["above", "alike"],
-    quantity: str,
-    environments: Iterable[str],
-    pairs: list[tuple[str, str]],
-) -> tuple[Compare, ...]:
-    return tuple(
-        Compare(expect, Sample(quantity, (a,), (place,)), Sample(quantity, (b,), (place,)))
-        for place in environments
-        for a, b in pairs
-    )

@@ -6,7 +6,9 @@
 
 from __future__ import annotations
 
-from conevo.report.claims.statements import Compare, Part, Sample, within
+from itertools import product
+
+from conevo.report.claims.statements import Compare, Part, comparison, within
 
 __all__ = [
     "BY_WORLD",
@@ -87,13 +89,8 @@ def lesioned(environments: tuple[str, ...], of: str = "") -> tuple[Compare, ...]
         of: " area", say; empty is the world's main measure.
     """
     return tuple(
-        Compare(
-            "above",
-            Sample(f"whole{of}", (method,), (place,)),
-            Sample(f"lesioned{of}", (method,), (place,)),
-        )
-        for place in environments
-        for method in METHODS
+        comparison("above", (f"whole{of}", method), (f"lesioned{of}", method), place)
+        for place, method in product(environments, METHODS)
     )
 
 
@@ -102,24 +99,15 @@ def cloned(
 ) -> tuple[Compare, ...]:
     """Return: in each environment each method's teams are above clones of CONE's robots."""
     return tuple(
-        Compare(
-            "above", Sample("evolved", (method,), (place,)), Sample(clones, ("cone",), (place,))
-        )
-        for place in environments
-        for method in methods
+        comparison("above", ("evolved", method), (clones, "cone"), place)
+        for place, method in product(environments, methods)
     )
 
 
 def as_cloned(clones: str, environments: tuple[str, ...], method: str) -> Part:
     """Return: in each environment clones of CONE's robots are alike to a method's teams."""
-    return Part(
-        tuple(
-            Compare(
-                "alike", Sample(clones, ("cone",), (place,)), Sample("evolved", (method,), (place,))
-            )
-            for place in environments
-        )
-    )
+    own = [comparison("alike", (clones, "cone"), ("evolved", method), p) for p in environments]
+    return Part(tuple(own))
 
 
 def has_castes(
@@ -129,14 +117,14 @@ def has_castes(
 
     Choice: "the fittest teams" have them if the champions of more than half of the runs do.
     """
-    return _champions(castes, environments, methods, (MOST, 1))
+    return _champions(castes, environments, methods, MOST, 1)
 
 
 def lacks_castes(
     castes: str, environments: tuple[str, ...], methods: tuple[str, ...]
 ) -> tuple[Part, ...]:
     """Return: in each environment most champions of each method do not have these castes."""
-    return _champions(castes, environments, methods, (0, MOST))
+    return _champions(castes, environments, methods, 0, MOST)
 
 
 def has_only_in(
@@ -160,17 +148,7 @@ def has_only_in(
 
 
 def _champions(
-    castes: str,
-    environments: tuple[str, ...],
-    methods: tuple[str, ...],
-    share: tuple[float, float],
+    castes: str, environments: tuple[str, ...], methods: tuple[str, ...], low: float, high: float
 ) -> tuple[Part, ...]:
-    return (
-        Part(
-            tuple(
-                within(castes, method, (place,), *share)
-                for place in environments
-                for method in methods
-            )
-        ),
-    )
+    pairs = product(environments, methods)
+    return (Part(tuple(within(castes, method, (place,), low, high) for place, method in pairs)),)
