@@ -8,11 +8,11 @@ from types import TracebackType
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from conevo.campaigns.schema import SCHEMA
 from conevo.errors import UsageError
 from conevo.evolution.methods.registry import remember_title
+from conevo.typing import Floats, Record
 from conevo.worlds.measures import Measure
 
 __all__ = ["Tables", "RunValue"]
@@ -124,7 +124,16 @@ class Tables:
         except duckdb.Error as error:
             raise _refused(error) from error
 
-    def arrays(self, sql: str) -> dict[str, npt.NDArray[np.float64]]:
+    def records(self, sql: str) -> list[Record]:
+        """Return the rows that one SQL statement gives, by the names of its columns.
+
+        Raises:
+            UsageError: as ``query``.
+        """
+        columns, rows = self.query(sql)
+        return [dict(zip(columns, row, strict=True)) for row in rows]
+
+    def arrays(self, sql: str) -> dict[str, Floats]:
         """Return the columns of numbers that one SQL statement gives, as arrays: NULL is NaN.
 
         For many rows, where ``query`` would make a Python object of each number.

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from conevo.report.comparison import Cell, Treatment
+from conevo.report.comparison import Cell
 from conevo.report.exhibits import Column, Section, Table, number, plain
 from conevo.report.sections.scope import Scope, span
 from conevo.specialization.diversity import task_specialization
 from conevo.specialization.team import METRICS
 from conevo.terms import S_SCALE, SHARE_SCALE
+from conevo.typing import Record
 
 __all__ = ["definitions", "metrics"]
 
@@ -33,63 +34,42 @@ DIRECTIONS = {
 def metrics(scope: Scope) -> Section:
     """Return every measure of the champions, a column per treatment."""
     title = "Measures of specialization"
-    found: dict[tuple[str, Cell], list[float]] = defaultdict(list)
+    found: dict[str, dict[Cell, list[float]]] = defaultdict(lambda: defaultdict(list))
     diversity: dict[str, float] = {}
     for cell, run, metric, value in scope.rows(
         "SELECT run, metric, value FROM metrics WHERE isfinite(value) ORDER BY run, metric"
     ):
-        found[metric, cell].append(value)
+        found[metric][cell].append(value)
         if metric == DIVERSITY:
             diversity[run] = value
     if not found:
         return Section(title, ["No team of these runs was studied."])
-    seen = {metric for metric, _ in found}
-    names = [*(m for m in METRICS if m in seen), *sorted(seen - set(METRICS))]
-    treatments = {
-        treatment: f"{treatment.title} ({span(counts)})"
+    names = [*(m for m in METRICS if m in found), *sorted(found.keys() - METRICS.keys())]
+    numbers = [
+        scope.key(environment, treatment) | about
+        for environment in scope.environments
+        for metric in [*names, *([PAYS] if diversity else [])]
         for treatment in scope.treatments
-        if (counts := [len(of) for cell, of in scope.cells.items() if cell.treatment == treatment])
-    }
-    rows = []
-    numbers: list[dict[str, object]] = []
-    for environment in scope.environments:
-        for metric in names:
-            row: dict[str, str] = {
-                "environment": environment,
-                "metric": _title(metric)
-                + (f" ({DIRECTIONS[metric]})" if metric in DIRECTIONS else ""),
-            }
-            for treatment in treatments:
-                values = found.get((metric, Cell(environment, treatment)))
-                if values:
-                    mean = float(np.mean(values))
-                    sd = float(np.std(values, ddof=1)) if len(values) > 1 else None
-                    row[treatment.title] = number(mean) + (f" ± {number(sd)}" if sd else "")
-                    numbers.append(
-                        scope.key(environment, treatment)
-                        | {"metric": metric, "n": len(values), "mean": mean, "sd": sd}
-                    )
-            rows.append(row)
-        if diversity:
-            rows.append(_what_pays(scope, environment, treatments, diversity, numbers))
-    columns = [
-        Column("environment", "environment", plain),
-        Column("metric", "measure", plain),
-        *(Column(t.title, name, plain) for t, name in treatments.items()),
+        for about in _numbers(scope, Cell(environment, treatment), metric, found, diversity)
     ]
+    runs: dict[str, list[int]] = defaultdict(list)
+    for cell, of in scope.cells.items():
+        runs[cell.treatment.title].append(len(of))
+    treatments = {one.title: f"{one.title} ({span(runs[one.title])})" for one in scope.treatments}
+    columns = [Column("environment", "environment", plain), Column("metric", "measure", plain)]
     if len(treatments) > MOST_COLUMNS:
-        columns = [
-            *columns[:2],
-            Column("treatment", "method", plain),
-            Column("value", "value", plain),
-        ]
+        columns += [Column("treatment", "method", plain), Column("value", "value", plain)]
         rows = [
-            {"environment": row["environment"], "metric": row["metric"]}
-            | {"treatment": name, "value": row[treatment.title]}
-            for row in rows
-            for treatment, name in treatments.items()
-            if treatment.title in row
+            _named(one) | {"treatment": treatments[one["treatment"]], "value": _shown(one)}
+            for one in numbers
         ]
+    else:
+        columns += [Column(key, name, plain) for key, name in treatments.items()]
+        by_metric: dict[tuple[str, str], Record] = {}
+        for one in numbers:
+            row = by_metric.setdefault((one["environment"], one["metric"]), _named(one))
+            row[one["treatment"]] = _shown(one)
+        rows = list(by_metric.values())
     table = Table(
         f"{scope.stem}-specialization-measures",
         "Measures of specialization of the champions",
@@ -103,29 +83,38 @@ def metrics(scope: Scope) -> Section:
     return Section(title, (), [table])
 
 
+def _numbers(
+    scope: Scope,
+    cell: Cell,
+    metric: str,
+    found: Mapping[str, Mapping[Cell, Sequence[float]]],
+    diversity: Mapping[str, float],
+) -> Iterator[Record]:
+    """Yield what a measure is in a cell; nothing if the cell has none."""
+    if metric == PAYS:
+        of = [run for run in scope.cells.get(cell, ()) if run.run in diversity]
+        sign = 1 if scope.main.larger_is_better else -1
+        reached = [sign * run.value for run in of]
+        part = task_specialization([diversity[run.run] for run in of], reached)
+        yield {"metric": metric, "n": len(of), "mean": part, "sd": None}
+    elif values := found[metric].get(cell):
+        sd = float(np.std(values, ddof=1)) if len(values) > 1 else None
+        yield {"metric": metric, "n": len(values), "mean": float(np.mean(values)), "sd": sd}
+
+
+def _named(one: Record) -> Record:
+    """Return where and what a number is."""
+    metric = one["metric"]
+    direction = f" ({DIRECTIONS[metric]})" if metric in DIRECTIONS else ""
+    return {"environment": one["environment"], "metric": _title(metric) + direction}
+
+
+def _shown(one: Record) -> str:
+    return number(one["mean"]) + (f" ± {number(one['sd'])}" if one["sd"] else "")
+
+
 def _title(metric: str) -> str:
     return "S" if metric == "specialization" else metric.replace("_", " ")
-
-
-def _what_pays(
-    scope: Scope,
-    environment: str,
-    treatments: Mapping[Treatment, str],
-    diversity: Mapping[str, float],
-    numbers: list[dict[str, object]],
-) -> dict[str, str]:
-    """Return the part of diversity that pays, of each treatment, and add it to the numbers."""
-    row = {"environment": environment, "metric": PAYS}
-    for treatment in treatments:
-        ran = scope.cells.get(Cell(environment, treatment), ())
-        of = [one for one in ran if one.run in diversity]
-        sign = 1 if scope.main.larger_is_better else -1
-        reached = [sign * one.value for one in of]
-        part = task_specialization([diversity[one.run] for one in of], reached)
-        row[treatment.title] = number(part)
-        about = {"metric": PAYS, "n": len(of), "mean": part, "sd": None}
-        numbers.append(scope.key(environment, treatment) | about)
-    return row
 
 
 def definitions() -> Section:

@@ -92,7 +92,7 @@ def repetition(tables: Tables, campaign: Campaign) -> Section:
 
 
 def _cost(tables: Tables) -> Table:
-    columns, found = tables.query(
+    rows = tables.records(
         """
         SELECT r.world, r.family, b.budget, count(DISTINCT environment) AS environments,
                count(DISTINCT method || variant) AS methods, count(DISTINCT seed) AS seeds,
@@ -103,7 +103,6 @@ def _cost(tables: Tables) -> Table:
         FROM runs r JOIN budgets b USING (run) GROUP BY ALL ORDER BY ALL
         """
     )
-    rows = [dict(zip(columns, row, strict=True)) for row in found]
     for row in rows:
         for what in ("generations", "evaluations"):
             row[what] = (row.pop(f"least_{what}"), row.pop(f"most_{what}"))
@@ -158,7 +157,7 @@ def _unread(unread: Mapping[str, str]) -> Table:
 
 
 def _versions(tables: Tables) -> Table:
-    columns, found = tables.query(
+    rows = tables.records(
         "SELECT conevo, code, numpy, warp, world, kernel_hash, count(*) AS runs FROM runs"
         " GROUP BY ALL ORDER BY ALL"
     )
@@ -175,5 +174,4 @@ def _versions(tables: Tables) -> Table:
         "Code: digest of all text of conevo that decides results, several if others continued the "
         "run. Kernels: digest of the simulation's program. Runs with the same ones are comparable."
     )
-    rows = [dict(zip(columns, row, strict=True)) for row in found]
     return Table("versions", "Versions", note, shown, rows)
