@@ -35,7 +35,7 @@ def evidence(
 
 
 def claim(*parts: Part) -> Claim:
-    return Claim("X1", "something", "5.5", "rover", parts)
+    return Claim("R0", "something", "5.5", parts)
 
 
 CONE_ABOVE = claim(Part(above("value", PLACES[:1], ("cone",), ("mesp",))))

@@ -61,7 +61,6 @@ GACC: tuple[Claim, ...] = (
         "G1",
         "complex 1-9: CONE delivers more in correct order than all others",
         "6.4.3",
-        "gacc",
         (Part(above("delivered", COMPLEX_9, ("cone",), OTHERS)),),
     ),
     Claim(
@@ -69,7 +68,6 @@ GACC: tuple[Claim, ...] = (
         "CCGA, MESP, CONE reach a larger share of the optimum in complex than in simple "
         "environments",
         "6.4.3",
-        "gacc",
         (
             Part(
                 across("share of the optimum", COEVOLUTION, zip(COMPLEX_9, SIMPLE[:9], strict=True))
@@ -81,14 +79,12 @@ GACC: tuple[Claim, ...] = (
         "G3",
         "HomCNE and HetCNE alike, simple and complex",
         "6.4.3",
-        "gacc",
         (Part(alike("delivered", SIMPLE + COMPLEX_9, [CNE])),),
     ),
     Claim(
         "G4",
         "share of optimum, complex: .29 / .32 / .71 / .79 / .93 (HomCNE, HetCNE, CCGA, MESP, CONE)",
         "6.4.3",
-        "gacc",
         about(
             "share of the optimum",
             COMPLEX_9,
@@ -99,7 +95,6 @@ GACC: tuple[Claim, ...] = (
         "G5",
         "share of optimum, simple: .48 / .47 / .51 / .54 / .55",
         "6.4.3",
-        "gacc",
         about(
             "share of the optimum",
             SIMPLE,
@@ -111,7 +106,6 @@ GACC: tuple[Claim, ...] = (
         "G6",
         "fittest CONE teams, complex: one non-specialized and several specialized castes",
         "6.4.3",
-        "gacc",
         has_castes("several castes", COMPLEX_9, ("cone",)),
         caution="table 6.13 has no non-specialized caste in environment 9",
     ),
@@ -119,14 +113,12 @@ GACC: tuple[Claim, ...] = (
         "G7",
         "lesioning castes costs CONE teams more than CCGA and MESP teams (tables 6.9-6.13)",
         "6.5.4",
-        "gacc",
         (Part(above("loss", COMPLEX_9, ("cone",), ISOLATED)),),
     ),
     Claim(
         "G8",
         "cloned teams deliver less than evolved teams of every method",
         "6.5.5",
-        "gacc",
         (Part(cloned("clones", COMPLEX_9, METHODS)),),
         contradiction="6.5.5 ends with non-specialized clones alike to HomCNE and HetCNE",
     ),
@@ -134,7 +126,6 @@ GACC: tuple[Claim, ...] = (
         "G9",
         "CONE above CONE-1, CONE-2, CONE-3 in all complex environments",
         "6.5.6",
-        "gacc",
         (Part(above("delivered", COMPLEX_9, ("cone",), VARIANTS)),),
     ),
     Claim(
@@ -142,7 +133,6 @@ GACC: tuple[Claim, ...] = (
         "fittest HomCNE and HetCNE teams: all non-specialized in complex 1-9, one caste in simple "
         "environments",
         "6.5.2, 6.5.4",
-        "gacc",
         (
             *has_castes("only non-specialized", COMPLEX_9, CNE),
             *has_castes("one caste", SIMPLE, CNE),
@@ -153,7 +143,6 @@ GACC: tuple[Claim, ...] = (
         "fittest CCGA, MESP, CONE teams, complex: detectors, gatherers and constructors of types "
         "B and C in 2, A and B in 3 and 7, A and C in 4, C alone in 1, all in 5, 6, 8, 9",
         "6.5.4",
-        "gacc",
         _castes_of_types(),
         caution="constructors of C are not claimed in 6, nor of CCGA in 9, as tables 6.11 to 6.13 "
         "have none",
@@ -162,7 +151,6 @@ GACC: tuple[Claim, ...] = (
         "G12",
         "complex: direct evolution fails, shaping does not",
         "6.4.2",
-        "gacc",
         (
             Part(
                 tuple(
@@ -182,14 +170,12 @@ GACC: tuple[Claim, ...] = (
         "G13",
         "lesioning castes costs HomCNE and HetCNE teams least",
         "6.5.4",
-        "gacc",
         (Part(above("loss", COMPLEX_9, COEVOLUTION, CNE)),),
     ),
     Claim(
         "G14",
         "settings changed by a fifth: objects delivered change by 9 % at most",
         "6.3.2",
-        "gacc",
         changes_little(COMPLEX[0], 0.09),
         caution="the thesis names no environment: judged by plans as gacc-sensitivity, at each "
         "combination of levels by itself",
@@ -198,7 +184,6 @@ GACC: tuple[Claim, ...] = (
         "G15",
         "clones of the non-specialized deliver as much as HomCNE and HetCNE teams",
         "6.5.5",
-        "gacc",
         tuple(as_cloned("clones of the non-specialized", COMPLEX_9, method) for method in CNE),
         contradiction="6.5.5 begins with all teams of clones below all evolved ones",
     ),
@@ -206,7 +191,6 @@ GACC: tuple[Claim, ...] = (
         "G16",
         "complex: multiple castes of CCGA, MESP, CONE, one caste of HomCNE and HetCNE",
         "6.4.3, 6.5.2",
-        "gacc",
         (
             *has_castes("two castes", COMPLEX_9, COEVOLUTION),
             *has_castes("one caste", COMPLEX_9, CNE),

@@ -34,7 +34,6 @@ GENERAL: tuple[Claim, ...] = (
             f"C1{letter}",
             f"{world}: CONE's populations recombine rarely, and genotypes had to be very similar",
             "7.1.2",
-            world,
             (
                 *has_castes("rare exchange", environments, ("cone",)),
                 *has_castes("similar genotypes", environments, ("cone",)),
@@ -47,7 +46,6 @@ GENERAL: tuple[Claim, ...] = (
             f"C2{letter}",
             f"{world}: CONE develops no castes in simple environments, which need none",
             f"{section}, 7.1.2",
-            world,
             lacks_castes("two castes", SIMPLE, ("cone",)),
         )
         for letter, (world, section) in NEEDLESS.items()
@@ -57,7 +55,6 @@ GENERAL: tuple[Claim, ...] = (
             f"C3{letter}",
             f"{world}: with both metrics populations recombine less than without one of them",
             "7.1.2",
-            world,
             (Part(above("exchange", environments, ("cone-1", "cone-2"), ("cone",))),),
         )
         for letter, (world, environments) in WORLDS.items()

@@ -77,49 +77,42 @@ PURSUIT: tuple[Claim, ...] = (
         "P1",
         "capture time of CONE above all others for team types 4, 5, 8, 9, 10",
         "4.5.6",
-        "pursuit",
         (Part(above("capture_time", IDLE, ("cone",), OTHERS)),),
     ),
     Claim(
         "P2",
         "alike for team types 1, 2, 3, 6, 7",
         "4.5.6",
-        "pursuit",
         (Part(alike("capture_time", NOT_IDLE, [("cone", other) for other in OTHERS])),),
     ),
     Claim(
         "P3",
         "two prey (types 6-10) are held shorter than one (1-5), every method",
         "4.5.5",
-        "pursuit",
         (Part(across("capture_time", METHODS, zip(ONE_PREY, TWO_PREY, strict=True))),),
     ),
     Claim(
         "P4",
         "CONE above CONE-1, -2, -3 except for types 1, 6, 7",
         "4.5.7",
-        "pursuit",
         (Part(above("capture_time", teams(2, 3, 4, 5, 8, 9, 10), ("cone",), VARIANTS)),),
     ),
     Claim(
         "P5",
         "entrapment emerges in about 80 % of HomCNE and HetCNE runs",
         "4.5.1",
-        "pursuit",
         about("entrapment", TEAMS, {"homcne": 0.8, "hetcne": 0.8}),
     ),
     Claim(
         "P6",
         "pursuer-blocker in about 65 % (CCGA) and 70 % (MESP)",
         "4.5.2",
-        "pursuit",
         about("pursuer-blocker", TEAMS, {"ccga": 0.65, "mesp": 0.7}),
     ),
     Claim(
         "P7",
         "spiders-fly in about 40 / 35 / 50 % (CCGA / MESP / CONE)",
         "4.5.3",
-        "pursuit",
         about("spiders-fly", TEAMS, {"ccga": 0.4, "mesp": 0.35, "cone": 0.5}),
     ),
     Claim(
@@ -127,7 +120,6 @@ PURSUIT: tuple[Claim, ...] = (
         "role-switcher in about 80 % of CONE runs; idle predators appear in types 4, 5, 8, 9, 10 "
         "only",
         "4.5.4, 4.5.6",
-        "pursuit",
         (
             *about("role-switcher", TEAMS, {"cone": 0.8}),
             Part(tuple(within("idle predators", "cone", (e,), SOME, 1) for e in IDLE)),
@@ -138,7 +130,6 @@ PURSUIT: tuple[Claim, ...] = (
         "P9",
         "teams of complementary behaviours hold the prey longer than cloned teams (types 1-5)",
         "4.6.5",
-        "pursuit",
         (
             Part(
                 tuple(
@@ -157,7 +148,6 @@ PURSUIT: tuple[Claim, ...] = (
         "P10",
         "replacing specialized predators hurts CONE teams most (table 4.5)",
         "4.6.6",
-        "pursuit",
         (Part(tuple(_lose_more("cone", other) for other in OTHERS)),),
         caution="its other half, least in HomCNE and HetCNE, is P17",
     ),
@@ -167,7 +157,6 @@ PURSUIT: tuple[Claim, ...] = (
         "pursuer-blocker, spiders-fly and neither; of 5 CONE in spiders-fly, role-switcher and "
         "neither",
         "4.6.4",
-        "pursuit",
         (
             *has_castes("members of nothing", teams(2), CNE),
             *has_castes("members of pursuer-blocker and spiders-fly", teams(3), ISOLATED),
@@ -181,7 +170,6 @@ PURSUIT: tuple[Claim, ...] = (
         "entrapment and pursuer-blocker work best for types 2 and 3, spiders-fly for 1 to 3, "
         "role-switcher for 2 to 5 (one prey)",
         "4.5.1-4.5.4",
-        "pursuit",
         (
             _suits("entrapment", CNE, (2, 3), (1, 4, 5)),
             _suits("pursuer-blocker", ISOLATED, (2, 3), (1, 4, 5)),
@@ -196,7 +184,6 @@ PURSUIT: tuple[Claim, ...] = (
         "composed pursuer-blocker, spiders-fly and role-switcher teams hold the prey longer than "
         "cloned teams (types 2-5)",
         "4.6.5",
-        "pursuit",
         (
             Part(
                 tuple(
@@ -216,17 +203,16 @@ PURSUIT: tuple[Claim, ...] = (
         "P14",
         "CONE evolves fitter prey than all others; its prey have three hidden neurons",
         "4.3",
-        "prey",
         (
             Part(above("path", SHAPING, ("cone",), OTHERS)),
             *has_castes("three hidden neurons", (SHAPING[2], SHAPING[5]), ("cone",)),
         ),
+        other_world="prey",
     ),
     Claim(
         "P15",
         "settings changed by a fifth: capture time changes by 15 % at most",
         "4.2",
-        "pursuit",
         changes_little(TEAMS[2], 0.15),
         caution="the thesis names no environment: judged by plans as pursuit-sensitivity, at each "
         "combination of levels by itself",
@@ -236,7 +222,6 @@ PURSUIT: tuple[Claim, ...] = (
         "two predators are too few: pursuer-blocker (CCGA, MESP) and role-switcher (CONE) fail "
         "with type 1",
         "4.5.2, 4.5.4",
-        "pursuit",
         (
             Part(
                 tuple(
@@ -256,7 +241,6 @@ PURSUIT: tuple[Claim, ...] = (
         "P17",
         "replacing specialized predators hurts HomCNE and HetCNE teams least",
         "4.6.6",
-        "pursuit",
         (Part(tuple(_lose_more(method, other) for method in COEVOLUTION for other in CNE)),),
         contradiction="in table 4.5 CCGA keeps 60 % without its blockers, HomCNE 46.9 % and "
         "HetCNE 43.7 %",

@@ -48,7 +48,6 @@ ROVER: tuple[Claim, ...] = (
         "R1",
         "complex 1-10: value detected by CONE above each of HomCNE, HetCNE, CCGA, MESP",
         "5.4.2",
-        "rover",
         (Part(above("value", COMPLEX, ("cone",), OTHERS)),),
         caution="value only; 5.4.2 names task performance, which is value and area",
     ),
@@ -56,28 +55,24 @@ ROVER: tuple[Claim, ...] = (
         "R2",
         "complex: CCGA and MESP alike in value (at least 9 of 10 environments)",
         "5.4.2",
-        "rover",
         (Part(alike("value", COMPLEX, [ISOLATED]), need=9),),
     ),
     Claim(
         "R3",
         "complex: each of CCGA, MESP, CONE above HomCNE and HetCNE in value",
         "5.4.2",
-        "rover",
         (Part(above("value", COMPLEX, COEVOLUTION, CNE)),),
     ),
     Claim(
         "R4",
         "HomCNE and HetCNE alike in value, simple and complex",
         "5.4.1",
-        "rover",
         (Part(alike("value", SIMPLE + COMPLEX, [CNE])),),
     ),
     Claim(
         "R5",
         "CCGA, MESP, CONE detect more value in complex than in simple environments",
         "5.4.1",
-        "rover",
         (Part(across("value", COEVOLUTION, zip(COMPLEX, SIMPLE, strict=True))),),
         decided=BY_WORLD,
     ),
@@ -85,7 +80,6 @@ ROVER: tuple[Claim, ...] = (
         "R6",
         "area covered alike among the five methods in most simple and complex environments",
         "5.4.1",
-        "rover",
         (Part(alike("area", SIMPLE + COMPLEX, combinations(METHODS, 2)), need=11),),
         contradiction="5.4.1 has it alike in most environments, 5.4.2 in some of 7 to 10 only",
     ),
@@ -93,14 +87,12 @@ ROVER: tuple[Claim, ...] = (
         "R7",
         "extended 1-10: CONE above all others in value",
         "5.4.3",
-        "rover",
         (Part(above("value", EXTENDED, ("cone",), OTHERS)),),
     ),
     Claim(
         "R8",
         "extended: CCGA and MESP alike (9 of 10), both above HomCNE and HetCNE",
         "5.4.3",
-        "rover",
         (
             Part(alike("value", EXTENDED, [ISOLATED]), need=9),
             Part(above("value", EXTENDED, ISOLATED, CNE)),
@@ -110,7 +102,6 @@ ROVER: tuple[Claim, ...] = (
         "R9",
         "fittest CONE teams, complex: one non-specialized and at least two specialized castes",
         "5.5.2",
-        "rover",
         has_castes("several castes", COMPLEX, ("cone",)),
         caution="tables 5.15 and 5.16 show three specialized castes in all ten, as R23 has it",
     ),
@@ -118,7 +109,6 @@ ROVER: tuple[Claim, ...] = (
         "R10",
         "fittest HomCNE and HetCNE teams consist of one caste",
         "5.4.1",
-        "rover",
         has_castes("one caste", SIMPLE + COMPLEX, CNE),
         caution="tables 5.7 and 5.8 name the caste, med or hi, as R17 does; here any one counts",
     ),
@@ -127,7 +117,6 @@ ROVER: tuple[Claim, ...] = (
         "replacing a caste by heuristic rovers lowers value; loss CONE > CCGA, MESP > HomCNE, "
         "HetCNE",
         "5.5.3",
-        "rover",
         (
             Part(lesioned(COMPLEX)),
             Part(above("loss", COMPLEX, ("cone",), ISOLATED)),
@@ -138,21 +127,18 @@ ROVER: tuple[Claim, ...] = (
         "R12",
         "teams of clones of one specialist detect less than CCGA, MESP, CONE teams",
         "5.5.4",
-        "rover",
         (Part(cloned("clones of a specialist", COMPLEX, COEVOLUTION)),),
     ),
     Claim(
         "R13",
         "complex: CONE above CONE-1, CONE-2, CONE-3 in value",
         "5.5.5",
-        "rover",
         (Part(above("value", COMPLEX, ("cone",), VARIANTS)),),
     ),
     Claim(
         "R14",
         "CCGA, MESP, CONE: multiple castes in complex environments, not in simple ones",
         "5.4.1",
-        "rover",
         (
             *has_castes("two castes", COMPLEX, COEVOLUTION),
             *lacks_castes("two castes", SIMPLE, COEVOLUTION),
@@ -162,7 +148,6 @@ ROVER: tuple[Claim, ...] = (
         "R15",
         "fittest CCGA and MESP teams, complex: one non-specialized caste, and low, med or hi",
         "5.5.2",
-        "rover",
         has_castes("mixed castes", COMPLEX, ISOLATED),
     ),
     Claim(
@@ -170,7 +155,6 @@ ROVER: tuple[Claim, ...] = (
         "complex: low castes of CCGA in 1-4 only and of MESP in 1-3 only, med castes of CCGA in 1-8"
         " only and of MESP in all, hi castes of both in all",
         "5.5.3",
-        "rover",
         (
             *has_only_in("some low", range(1, 5), COMPLEX, "ccga"),
             *has_only_in("some low", range(1, 4), COMPLEX, "mesp"),
@@ -183,7 +167,6 @@ ROVER: tuple[Claim, ...] = (
         "R17",
         "fittest teams, complex: HomCNE med only in 1-6 and hi only in 7-10, HetCNE hi only",
         "5.5.3",
-        "rover",
         (
             *has_castes("only med", COMPLEX[:6], ("homcne",)),
             *has_castes("only hi", COMPLEX[6:], ("homcne",)),
@@ -194,7 +177,6 @@ ROVER: tuple[Claim, ...] = (
         "R18",
         "complex: every method detects most in environment 10",
         "5.4.3",
-        "rover",
         (Part(across("value", METHODS, [(COMPLEX[9], place) for place in COMPLEX[:9]])),),
         decided="heuristic teams, which nothing evolved, detect most in environment 10 as well",
     ),
@@ -203,7 +185,6 @@ ROVER: tuple[Claim, ...] = (
         "complex: value of CONE, CONE-1, CONE-2, CONE-3 between 1,000 and 4,500, the axis of "
         "figure 5.16",
         "5.5.5",
-        "rover",
         (
             Part(
                 tuple(
@@ -219,7 +200,6 @@ ROVER: tuple[Claim, ...] = (
         "complex, value: clones of the non-specialized and of med (1-6) or hi (7-10) alike to "
         "HomCNE; of hi (1-6) or the non-specialized (7-10) alike to HetCNE",
         "5.5.4",
-        "rover",
         (
             as_cloned("clones of the non-specialized", COMPLEX, "homcne"),
             as_cloned("clones of med", COMPLEX[:6], "homcne"),
@@ -234,7 +214,6 @@ ROVER: tuple[Claim, ...] = (
         "complex, area alike: HomCNE and CCGA in 7, 9; HomCNE and MESP in 7-10; HetCNE and CCGA in "
         "7, 8; HetCNE and MESP in 7, 9",
         "5.4.2",
-        "rover",
         (
             Part(alike("area", (COMPLEX[6], COMPLEX[8]), [("homcne", "ccga")])),
             Part(alike("area", COMPLEX[6:], [("homcne", "mesp")])),
@@ -248,7 +227,6 @@ ROVER: tuple[Claim, ...] = (
         "settings changed by a fifth (learning), a quarter (generations, epochs) or 30 % (world): "
         "value changes by 25 % at most",
         "5.3.2",
-        "rover",
         changes_little(COMPLEX[4], 0.25),
         caution="the thesis names no environment: judged by plans as rover-sensitivity, at each "
         "combination of levels by itself",
@@ -257,7 +235,6 @@ ROVER: tuple[Claim, ...] = (
         "R23",
         "fittest CONE teams, complex: a non-specialized, a low, a med and a hi caste in all ten",
         "5.5.3",
-        "rover",
         has_castes("all castes", COMPLEX, ("cone",)),
     ),
     Claim(
@@ -265,7 +242,6 @@ ROVER: tuple[Claim, ...] = (
         "extended, area: CCGA above HomCNE in 3, 6, 7 and HetCNE in 6, 7; MESP above HomCNE in 3 "
         "and HetCNE in 7, 8",
         "5.4.3",
-        "rover",
         (
             Part(above("area", (EXTENDED[2], *EXTENDED[5:7]), ("ccga",), ("homcne",))),
             Part(above("area", EXTENDED[5:7], ("ccga",), ("hetcne",))),
@@ -280,7 +256,6 @@ ROVER: tuple[Claim, ...] = (
         "replacing a caste by heuristic rovers lowers area; loss CONE > CCGA, MESP > HomCNE, "
         "HetCNE",
         "5.5.3",
-        "rover",
         (
             Part(lesioned(COMPLEX, " area")),
             Part(above("loss of area", COMPLEX, ("cone",), ISOLATED)),
@@ -291,7 +266,6 @@ ROVER: tuple[Claim, ...] = (
         "R26",
         "extended: multiple castes of CCGA, MESP, CONE, one caste of HomCNE and HetCNE",
         "5.4.3",
-        "rover",
         (
             *has_castes("two castes", EXTENDED, COEVOLUTION),
             *has_castes("one caste", EXTENDED, CNE),
@@ -301,14 +275,12 @@ ROVER: tuple[Claim, ...] = (
         "R27",
         "complex: CONE above CONE-1, CONE-2, CONE-3 in area",
         "5.5.5",
-        "rover",
         (Part(above("area", COMPLEX, ("cone",), VARIANTS)),),
     ),
     Claim(
         "R28",
         "complex: every method covers most in environment 10",
         "5.4.3",
-        "rover",
         (Part(across("area", METHODS, [(COMPLEX[9], place) for place in COMPLEX[:9]])),),
     ),
 )

@@ -23,6 +23,7 @@ __all__ = [
 
 
 Expected = Literal["above", "alike"]
+WORLDS = {"R": "rover", "P": "pursuit", "G": "gacc"}
 
 
 @dataclass(frozen=True)
@@ -104,24 +105,29 @@ class Claim:
     """One claim of the thesis; it is reproduced if all its parts are.
 
     Attributes:
-        id: letter of the world (R, P, G) and number.
+        id: letter of the world (R, P, G) and number, or a number of several worlds and the letter.
         text: what is claimed.
         source: section of the thesis.
-        world: name without version.
         parts: what has to hold.
         contradiction: where the thesis says the opposite; such a claim is not judged.
         decided: what decides it besides the methods; it then has a verdict of its own.
         caution: what a verdict does not cover.
+        other_world: in which it is tested, without its version, if not in that of its letter.
     """
 
     id: str
     text: str
     source: str
-    world: str
     parts: tuple[Part, ...]
     contradiction: str = ""
     decided: str = ""
     caution: str = ""
+    other_world: str = ""
+
+    @property
+    def world(self) -> str:
+        """The world in which it is tested, without its version."""
+        return self.other_world or next(WORLDS[letter] for letter in self.id if letter in WORLDS)
 
 
 def comparison(
