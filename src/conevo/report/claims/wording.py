@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Sequence
 
+from conevo.evolution.methods.registry import title_of
 from conevo.report.claims.evidence import Evidence
 from conevo.report.claims.outcomes import Answer, Decision
 from conevo.report.claims.quantities import QUANTITIES
@@ -24,22 +25,12 @@ __all__ = [
     "what_of",
 ]
 
-NAMES = {
-    "homcne": "HomCNE",
-    "hetcne": "HetCNE",
-    "ccga": "CCGA",
-    "mesp": "MESP",
-    "cone": "CONE",
-    "cone-1": "CONE-1",
-    "cone-2": "CONE-2",
-    "cone-3": "CONE-3",
-}
 SHOWN = 4  # of a list
 
 
 def name_of(method: str) -> str:
     """Return a method's name as in the thesis' tables."""
-    return NAMES.get(method, method)
+    return "MESP" if method == "mesp" else title_of(method)
 
 
 def place_of(statement: Statement) -> str:
