@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from conevo.cli.run_to_end import accept_option, time_limit_option
+from conevo.cli.run_to_end import accept_option, all_of, time_limit_option
 from conevo.errors import UsageError
 from conevo.terms import counted, quoted
 
@@ -18,9 +17,8 @@ if TYPE_CHECKING:
 
 __all__ = ["campaign"]
 
-Function = TypeVar("Function", bound=Callable[..., Any])
 FAILED = 1  # exit code when runs of a campaign have failed
-EXECUTION = (
+execution_options = all_of(
     click.option(
         "--executor", default="processes", show_default=True, metavar="NAME",
         help="processes, serial or ray.",
@@ -46,7 +44,8 @@ EXECUTION = (
     click.option("--json", "as_json", is_flag=True, help="Print one JSON object per ended run."),
     click.option("--quiet", is_flag=True, help="Print only the campaign's directory."),
 )  # fmt: skip
-PLAN = (
+"""Options that say where and how runs are carried out."""
+plan_options = all_of(
     click.argument("name", metavar="NAME|FILE|DIR"),
     click.option("--preset", metavar="NAME", help="smoke, desk (default), night, thesis."),
     click.option("--seeds", type=int, help="Runs per cell (default: the plan's)."),
@@ -56,20 +55,7 @@ PLAN = (
     ),
     click.option("--out", metavar="DIR", help="Output directory (default: campaigns/NAME)."),
 )  # fmt: skip
-
-
-def plan_options(function: Function) -> Function:
-    """Add what says which campaign is meant, and at which scale."""
-    for option in reversed(PLAN):
-        function = option(function)
-    return function
-
-
-def execution_options(function: Function) -> Function:
-    """Add the options that say where and how runs are carried out."""
-    for option in reversed(EXECUTION):
-        function = option(function)
-    return function
+"""Options that say which campaign is meant, and at which scale."""
 
 
 @click.group("campaign", short_help="Start, monitor, stop and retry campaigns of many runs.")

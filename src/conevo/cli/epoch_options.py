@@ -7,11 +7,11 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from conevo.cli.run_to_end import device_option, threads_option
+from conevo.cli.run_to_end import all_of, device_option, threads_option
 from conevo.errors import UsageError
 
 if TYPE_CHECKING:
@@ -21,8 +21,7 @@ if TYPE_CHECKING:
 __all__ = ["REPLAYS", "bar", "epoch_options", "name_of", "playbacks", "trajectories"]
 
 REPLAYS = Path("replays")  # where pages and films are put unless told otherwise
-Function = TypeVar("Function", bound=Callable[..., Any])
-OPTIONS = (
+epoch_options = all_of(
     click.option(
         "--beside", metavar="RUN|FILE", help="A second team, in the same scenario, side by side."
     ),
@@ -41,13 +40,7 @@ OPTIONS = (
     threads_option,
     device_option,
 )  # fmt: skip
-
-
-def epoch_options(function: Function) -> Function:
-    """Add the options that say which epoch of which team is meant."""
-    for option in reversed(OPTIONS):
-        function = option(function)
-    return function
+"""Options that say which epoch of which team is meant."""
 
 
 def trajectories(

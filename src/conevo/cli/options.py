@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import shlex
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from conevo.cli.run_to_end import carry_on, style_of, threads_option, time_limit_option
+from conevo.cli.run_to_end import all_of, carry_on, style_of, threads_option, time_limit_option
 from conevo.errors import UsageError
 
 if TYPE_CHECKING:
@@ -20,9 +20,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Order", "setting_options", "settings_only"]
 
-Function = TypeVar("Function", bound=Callable[..., Any])
 PLACE = "on the command line"
-SETTINGS = (
+settings_only = all_of(
     click.option(
         "--method", metavar="NAME",
         help="cone (default), mesp, ccga, hetcne, homcne, cone-1..3, cone-es, hom-es, or "
@@ -41,8 +40,9 @@ SETTINGS = (
         "--config", metavar="FILE", help="TOML file with settings, such as a run's config.toml."
     ),
 )  # fmt: skip
-OPTIONS = (
-    *SETTINGS,
+"""Options that say what a run would be, for a command that starts none."""
+setting_options = all_of(
+    settings_only,
     click.option(
         "--budget-evaluations", type=int,
         help="Spend at most this many team evaluations."
@@ -55,20 +55,7 @@ OPTIONS = (
     click.option("--out", metavar="DIR", help="Output directory (default: a new one under runs/)."),
     time_limit_option,
 )  # fmt: skip
-
-
-def setting_options(function: Function) -> Function:
-    """Add the options that say what to start, and where."""
-    for option in reversed(OPTIONS):
-        function = option(function)
-    return function
-
-
-def settings_only(function: Function) -> Function:
-    """Add the options that say what a run would be, for a command that starts none."""
-    for option in reversed(SETTINGS):
-        function = option(function)
-    return function
+"""Options that say what to start, and where."""
 
 
 @dataclass

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "accept_option",
+    "all_of",
     "carry_on",
     "device_option",
     "drop_output",
@@ -31,15 +32,22 @@ __all__ = [
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
-def output_options(function: Function) -> Function:
-    """Add --json, --quiet and --verbose to a command."""
-    for option in (
-        click.option("--verbose", is_flag=True, help="Print one plain line per generation."),
-        click.option("--quiet", is_flag=True, help="Print only the run's directory."),
-        click.option("--json", "as_json", is_flag=True, help="Print one JSON line per generation."),
-    ):
-        function = option(function)
-    return function
+def all_of(*options: Callable[[Any], Any]) -> Callable[[Function], Function]:
+    """Return what adds all of these options to a command, in their order."""
+
+    def add(function: Function) -> Function:
+        for option in reversed(options):
+            function = option(function)
+        return function
+
+    return add
+
+
+output_options = all_of(
+    click.option("--json", "as_json", is_flag=True, help="Print one JSON line per generation."),
+    click.option("--quiet", is_flag=True, help="Print only the run's directory."),
+    click.option("--verbose", is_flag=True, help="Print one plain line per generation."),
+)
 
 
 def accept_option(function: Function) -> Function:
