@@ -15,7 +15,7 @@ from pathlib import Path
 from conevo.campaigns.campaign import create
 from conevo.campaigns.executors.registry import EXECUTORS, make_executor
 from conevo.campaigns.plan import Plan
-from conevo.kernels.devices import usable_cores
+from conevo.kernels.threads import usable_cores
 from machine import machine, table
 
 METHODS = ("homcne", "hetcne", "ccga", "mesp", "cone")

@@ -78,12 +78,12 @@ def test_treatments_stand_in_the_order_of_the_registry_then_by_level() -> None:
 
 def test_a_summary_has_mean_deviation_and_interval_of_the_runs() -> None:
     reached = sample(5.0)
-    (one,) = summarize(cells_of({("complex-1", CONE): reached}))
+    (one,) = map(summarize, cells_of({("complex-1", CONE): reached}).values())
     low, high = stats.t.interval(0.95, 11, np.mean(reached), stats.sem(reached))
     assert one.mean.value == pytest.approx(np.mean(reached))
     assert one.sd == pytest.approx(np.std(reached, ddof=1))
     assert (one.mean.low, one.mean.high) == pytest.approx((low, high))
-    (single,) = summarize(cells_of({("complex-1", CONE): [3.0]}))
+    (single,) = map(summarize, cells_of({("complex-1", CONE): [3.0]}).values())
     assert (single.mean.value, single.sd, single.mean.low) == (3.0, None, None)
 
 

@@ -23,7 +23,7 @@ from conevo.cli.lookup import campaigns_in
 from conevo.cli.text import duration, table
 from conevo.errors import ConevoError
 from conevo.evolution.methods.registry import name_in
-from conevo.kernels.devices import usable_cores
+from conevo.kernels.threads import usable_cores
 from conevo.terms import counted
 
 __all__ = [

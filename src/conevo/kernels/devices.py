@@ -3,7 +3,6 @@
 Names are known without loading Warp, which is asked for the rest.
 """
 
-import os
 import re
 
 from conevo.errors import EnvironmentFailure, UsageError, shown
@@ -16,16 +15,10 @@ __all__ = [
     "device_here",
     "is_here",
     "refuse_unknown_device",
-    "usable_cores",
 ]
 
 AUTO, CPU = "auto", "cpu"
 DEVICE = re.compile(r"auto|cpu|cuda(:[0-9]{1,3})?")
-
-
-def usable_cores() -> int:
-    """Return the number of hardware threads this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def refuse_unknown_device(name: str) -> None:

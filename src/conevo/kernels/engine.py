@@ -20,7 +20,6 @@ from typing import Any
 import warp as wp
 
 from conevo.errors import EnvironmentFailure, UsageError
-from conevo.kernels.devices import usable_cores
 
 __all__ = [
     "OutOfMemory",
@@ -31,14 +30,12 @@ __all__ = [
     "memory_named",
     "options",
     "start",
-    "threads_of",
 ]
 
 # Measured: no adjoints and no unrolling pay; fast_math and -O3 do not. No fused
 # multiply-add: CPU and CUDA must agree to the bit.
 options = {"enable_backward": False, "max_unroll": 0, "fuse_fp": False}
 
-MOST_THREADS = 4096
 
 # Held while kernels are made, identified, compiled and loaded: Warp generates code for one of them
 # at a time, whatever the number of threads that ask for it.
@@ -149,19 +146,6 @@ def _without_line(word: bytes) -> Iterator[None]:
             for line in caught:
                 if word not in line:
                     real.write(line)
-
-
-def threads_of(given: Any) -> int:
-    """Return how many CPU threads are meant: those that are given, or all that are usable.
-
-    Raises:
-        UsageError: not a number of threads.
-    """
-    if given is None:
-        return usable_cores()
-    if isinstance(given, bool) or not isinstance(given, int) or not 1 <= given <= MOST_THREADS:
-        raise UsageError(f"threads = {given!r}: must be an integer from 1 to {MOST_THREADS}")
-    return given
 
 
 def launch(

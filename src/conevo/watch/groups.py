@@ -15,7 +15,7 @@ from conevo.campaigns.inputs import shown_as
 from conevo.campaigns.ledger import Entry
 from conevo.errors import ConevoError, UsageError
 from conevo.evolution.methods.registry import name_in
-from conevo.kernels.devices import usable_cores
+from conevo.kernels.threads import usable_cores
 from conevo.runs.directory import kind_of
 from conevo.runs.outline import span
 from conevo.watch.comparisons import CurvePanel, panels_of

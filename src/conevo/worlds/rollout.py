@@ -21,6 +21,7 @@ from conevo.errors import UsageError
 from conevo.kernels import engine
 from conevo.kernels.arrays import allocate, dimensions, shapes
 from conevo.kernels.devices import device_here
+from conevo.kernels.threads import threads_of
 from conevo.kernels.views import SHARED_BYTES, near_arrays
 from conevo.terms import counted
 from conevo.worlds.contract import refuse_faults, scenario_faults, shapes_of, stages_of
@@ -88,7 +89,7 @@ class Rollout:
         self.world = world
         self.controller = controller or make_controller(world=world)
         self.device = device = device_here(device)
-        self.n_threads = engine.threads_of(n_threads)
+        self.n_threads = threads_of(n_threads)
         self._chunk = CHUNK if device == "cpu" else CUDA_CHUNK
         with engine.building:
             self._simulation = world.simulation()

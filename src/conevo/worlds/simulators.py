@@ -48,7 +48,7 @@ def simulator(
         EnvironmentFailure: there is no such device, it gives other results than the CPU, or there
             is no place for compiled kernels.
     """
-    from conevo.kernels.engine import threads_of
+    from conevo.kernels.threads import threads_of
 
     device = device_for(world, device)
     if not has_own_simulator(world):

@@ -25,7 +25,7 @@ from conevo.campaigns.executors.worker import spawn, why_lost
 from conevo.campaigns.object_store import ObjectStore
 from conevo.campaigns.places import Places
 from conevo.errors import EnvironmentFailure, UsageError
-from conevo.kernels.devices import usable_cores
+from conevo.kernels.threads import usable_cores
 
 __all__ = ["RayCluster"]
 

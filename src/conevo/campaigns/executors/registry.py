@@ -8,7 +8,7 @@ from conevo.campaigns.devices import CPU, devices_here
 from conevo.campaigns.executors.local import Processes, Serial
 from conevo.campaigns.executors.protocol import Executor
 from conevo.errors import UsageError, unknown_name
-from conevo.kernels.devices import usable_cores
+from conevo.kernels.threads import usable_cores
 
 __all__ = ["EXECUTORS", "make_executor"]
 
