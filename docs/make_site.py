@@ -59,7 +59,7 @@ def build(folder, tools, version):
     """Build the pages in an empty folder and return where the site is."""
     pages = folder / "pages"
     site_pages.write_pages(pages)
-    shutil.copytree(ROOT / "src", folder / "src", ignore=shutil.ignore_patterns("__pycache__"))
+    site_pages.write_sources(folder / "src")
     katex = tools / "node_modules" / "katex" / "dist"
     shutil.copytree(
         katex / "fonts", pages / "theme" / "fonts", ignore=shutil.ignore_patterns("*.ttf", "*.woff")
@@ -71,7 +71,7 @@ def build(folder, tools, version):
         f'{{ "{title}" = "{path}" }},\n' for path, (title, _) in site_pages.api().items()
     )
     config = config.replace("# API: docs/make_site.py\n", entries)
-    head = f'[project]\ndocs_dir = "pages"\nsite_dir = "built"\nsite_url = "/{version}/"\n'
+    head = '[project]\ndocs_dir = "pages"\nsite_dir = "built"\n'
     (folder / "zensical.toml").write_text(config.replace("[project]\n", head, 1), encoding="utf-8")
     run(Path(sys.executable).parent / "zensical", "build", "--strict", cwd=folder)
     return folder / "built"

@@ -19,6 +19,7 @@ FOLDERS = {"docs/results": "results.md"}
 LANGUAGES = {".py": "python", ".toml": "toml", ".cff": "yaml"}
 SECTION = re.compile(r"^## (.+)\n\n((?:- .*\n(?: .*\n)*)+)", re.MULTILINE)
 MODULE = re.compile(r"\[conevo\.[a-z_.]+\]\(\.\./src/(\S+)\.py\)")
+RST_TABLE = re.compile(r"^(=+ +=+)\n(.*?)\n=+ +=+\n(.*?)\n=+ +=+$", re.DOTALL | re.MULTILINE)
 FENCED = re.compile(r"^( *)(```|~~~).*?^\1\2 *$", re.DOTALL | re.MULTILINE)
 LINK = re.compile(
     r"(?P<before>!?\[(?:[^\[\]]|\[[^\]]*\])*\]\()(?P<path>[^)#:\s]+)(?P<anchor>#[^)\s]*)?\)"
@@ -131,6 +132,31 @@ def write_pages(folder):
     for path, (title, modules) in api().items():
         directives = "\n\n".join(f"::: {module}" for module in modules)
         write(folder / path, f"# {title}\n\n{directives}\n")
+
+
+def write_sources(folder):
+    """Copy the package into a folder, with the docstrings of its API in Markdown."""
+    ignored = shutil.ignore_patterns("__pycache__")
+    shutil.copytree(ROOT / "src", folder, ignore=ignored)
+    for source in sources():
+        if source.startswith("src/"):
+            path = folder / source.removeprefix("src/")
+            write(path, docstrings(path.read_text(encoding="utf-8")))
+
+
+def docstrings(code):
+    """Return code whose docstrings have Markdown's tables and examples, not reStructuredText's."""
+
+    def table(match):
+        column = match[1].index(" =") + 1
+        rows = [
+            f"| {line[:column].strip()} | {line[column:].strip()} |"
+            for line in f"{match[2]}\n{match[3]}".split("\n")
+        ]
+        return "\n".join([rows[0], "| --- | --- |", *rows[1:]])
+
+    code = re.sub(r"^::\n", "", RST_TABLE.sub(table, code), flags=re.MULTILINE)
+    return re.sub(r"::$", ":", code, flags=re.MULTILINE)
 
 
 def write(path, text):

@@ -123,6 +123,18 @@ def test_lists_are_written_as_python_markdown_reads_them():
     )
 
 
+def test_tables_and_examples_of_docstrings_are_markdown():
+    rule = "=====  ======="
+    table = f"{rule}\nname   meaning\n{rule}\n``x``  a\n{rule}"
+    code = f'"""A file.\n\n::\n\n    x = 1\n\n{table}\n"""'
+    assert site_pages.docstrings(code) == (
+        '"""A file.\n\n\n    x = 1\n\n| name | meaning |\n| --- | --- |\n| ``x`` | a |\n"""'
+    )
+    assert site_pages.docstrings('"""So (``x``)::\n\n    x[::2]\n"""') == (
+        '"""So (``x``):\n\n    x[::2]\n"""'
+    )
+
+
 @pytest.mark.parametrize(
     ("body", "fault"),
     [
