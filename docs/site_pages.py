@@ -82,6 +82,8 @@ def linked(text, source, pages):
 
     def moved(match):
         path = os.path.normpath(os.path.join(os.path.dirname(source), match["path"]))
+        if not (ROOT / path).exists():
+            raise SystemExit(f"{source}: {match['path']} does not exist")
         place = place_of(path, pages)
         if place is None:
             return match["before"][:-1].strip("[]")

@@ -3,7 +3,12 @@ import { readFileSync } from "node:fs";
 import katex from "katex";
 
 const formulas = JSON.parse(readFileSync(0, "utf8"));
-const html = formulas.map(({ tex, display }) =>
-  katex.renderToString(tex, { displayMode: display, throwOnError: true, strict: "error" }),
-);
-process.stdout.write(JSON.stringify(html));
+try {
+  const html = formulas.map(({ tex, display }) =>
+    katex.renderToString(tex, { displayMode: display, throwOnError: true, strict: "error" }),
+  );
+  process.stdout.write(JSON.stringify(html));
+} catch (error) {
+  process.stderr.write(`${error.message}\n`);
+  process.exitCode = 1;
+}
