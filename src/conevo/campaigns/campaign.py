@@ -22,11 +22,13 @@ is missing, and a finished run is never run twice.
 from __future__ import annotations
 
 import dataclasses
+import logging
 import time
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from conevo.campaigns.admission import admit_code
 from conevo.campaigns.devices import next_device
@@ -40,7 +42,7 @@ from conevo.campaigns.plan import Plan, PlannedRun
 from conevo.campaigns.plan_file import read_plan
 from conevo.campaigns.progress import is_held
 from conevo.campaigns.work import planned_runs
-from conevo.errors import UsageError
+from conevo.errors import UsageError, unknown_name
 from conevo.reading import read_json
 from conevo.runs.directory import Directory, appearing
 from conevo.runs.durable import is_there, replace_file
@@ -48,8 +50,12 @@ from conevo.runs.time_limit import TimeLimit
 from conevo.terms import quoted
 from conevo.worlds.registry import resolve as resolve_world
 
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
 __all__ = ["ATTEMPTS", "CAMPAIGNS", "Campaign", "Stopped", "check", "create"]
 
+log = logging.getLogger("conevo")
 CAMPAIGNS = Path("campaigns")  # where campaigns are made and looked for unless told otherwise
 ATTEMPTS = 3  # of a run whose worker is lost, or whose machine refused
 SEAL_EVERY = 60.0  # seconds at least between two makings of the tables while runs go on
@@ -161,6 +167,40 @@ class Campaign:
 
     def __repr__(self) -> str:
         return f"Campaign({str(self.path)!r})"
+
+    def _repr_html_(self) -> str:
+        from conevo.campaigns.html import campaign_card
+
+        return campaign_card(self)
+
+    def frame(self, table: str = "runs") -> DataFrame:
+        """Return a table of the finished runs, one of ``SCHEMA``, as a pandas DataFrame.
+
+        Raises:
+            UsageError: no such table, or every run is damaged.
+            EnvironmentFailure: pandas is not installed, or tables cannot be made anywhere.
+        """
+        from conevo.campaigns.schema import SCHEMA
+
+        if table not in SCHEMA:
+            raise unknown_name("table", table, SCHEMA, "of a campaign")
+        return self.query(f"SELECT * FROM {table}")
+
+    def query(self, sql: str) -> DataFrame:
+        """Return what one SQL query of these tables gives, as a pandas DataFrame.
+
+        Raises:
+            UsageError: not a query, DuckDB's reason for refusing it, or every run is damaged.
+            EnvironmentFailure: as ``frame``.
+        """
+        from conevo.campaigns.sealing import sealed_tables
+        from conevo.campaigns.tables import Tables
+
+        def note(why: str) -> None:
+            log.warning("%s; its tables are made for this query only", why)
+
+        with sealed_tables(self, note) as folder, Tables(folder, may_be_empty=True) as tables:
+            return tables.frame(sql)
 
     @property
     def is_running(self) -> bool:

@@ -7,13 +7,18 @@ pass locks on to other machines, the time of the last line is all that can be kn
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+from conevo.campaigns.inputs import shown_as
+from conevo.campaigns.ledger import Entry
 from conevo.campaigns.places import Places
 from conevo.campaigns.plan import PlannedRun
 from conevo.errors import ConevoError
+from conevo.evolution.methods.registry import name_in
 from conevo.reading import parse_json, read_last_line, read_toml
 from conevo.runs import locks
 from conevo.runs.directory import CONFIG, LOCK, SHAPING
@@ -22,7 +27,7 @@ from conevo.runs.progress import Done, share_of
 from conevo.runs.records import Generation
 from conevo.runs.store import GENERATIONS
 
-__all__ = ["RunProgress", "is_held", "last_written", "progress_of"]
+__all__ = ["RunProgress", "cell_text", "cells", "is_held", "last_written", "progress_of"]
 
 
 @dataclass(frozen=True)
@@ -44,6 +49,28 @@ class RunProgress:
     budget: int
     share: float
     written: float | None
+
+
+def cells(
+    planned: Iterable[PlannedRun], entries: Mapping[str, Entry]
+) -> dict[str, dict[str, list[Entry]]]:
+    """Return the runs of each environment and variant, and of these by method."""
+    found: dict[str, dict[str, list[Entry]]] = {}
+    for run in planned:
+        if run.label in entries:
+            row = found.setdefault(f"{shown_as(run.world)} {run.variant}".rstrip(), {})
+            row.setdefault(name_in(run.method), []).append(entries[run.label])
+    return found
+
+
+def cell_text(entries: Sequence[Entry]) -> str:
+    """Return "3/6", with what is running ("+1") and what has failed ("!1")."""
+    if not entries:
+        return "-"
+    found = Counter(entry.state for entry in entries)
+    more = f" +{found['running']}" if found["running"] else ""
+    failed = f" !{found['failed']}" if found["failed"] else ""
+    return f"{found['finished']}/{len(entries)}{more}{failed}"
 
 
 def is_held(places: Places, label: str) -> bool:

@@ -8,14 +8,17 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING
 
 from conevo.campaigns.ended import read_ended
 from conevo.campaigns.places import Places
 from conevo.campaigns.plan import PlannedRun
 from conevo.campaigns.schema import SCHEMA
-from conevo.errors import ConevoError
+from conevo.errors import ConevoError, EnvironmentFailure
 from conevo.evolution.methods.registry import title_of
 from conevo.reading import DamagedFile, read_json
 from conevo.runs.code import changes_text, sessions_of
@@ -31,7 +34,10 @@ from conevo.studies.exchange import exchanged
 from conevo.studies.records import SignalStudy, Study
 from conevo.typing import Record
 
-__all__ = ["is_sealed", "left_out", "seal_tables"]
+if TYPE_CHECKING:
+    from conevo.campaigns.campaign import Campaign
+
+__all__ = ["is_sealed", "left_out", "seal_tables", "sealed_tables"]
 
 MANIFEST = "tables.json"
 
@@ -45,6 +51,36 @@ def is_sealed(places: Places, finished: Sequence[PlannedRun]) -> bool:
         return path.is_file() and read_json(path) == _manifest(finished) | {"left_out": {}}
     except DamagedFile:
         return False
+
+
+@contextmanager
+def sealed_tables(campaign: Campaign, note: Callable[[str], None]) -> Iterator[Path]:
+    """Yield the folder with the tables of all that is finished; without a finished run it is empty.
+
+    While the campaign runs they are as its coordinator last made them. Where they are out of date
+    and cannot be written, as on a read-only file system, they are made in a temporary folder.
+
+    Args:
+        campaign: whose tables.
+        note: called with the reason for a temporary folder.
+
+    Raises:
+        UsageError: every run is damaged.
+        EnvironmentFailure: they cannot be made anywhere.
+    """
+    with ExitStack() as stack:
+        tables = campaign.places.tables
+        if not (campaign.is_running or campaign.is_sealed):
+            try:
+                with campaign.locked():
+                    campaign.seal()
+            except EnvironmentFailure as error:
+                folder = stack.enter_context(TemporaryDirectory(prefix="conevo-"))
+                tables = Path(folder) / "tables"
+                campaign.seal(tables)
+                if tables.is_dir():
+                    note(str(error))
+        yield tables
 
 
 def seal_tables(

@@ -5,15 +5,19 @@ from __future__ import annotations
 from collections import defaultdict
 from pathlib import Path
 from types import TracebackType
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from conevo.campaigns.schema import SCHEMA
 from conevo.errors import UsageError
 from conevo.evolution.methods.registry import remember_title
+from conevo.runs.frames import pandas
 from conevo.typing import Floats, Record
 from conevo.worlds.measures import Measure
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 __all__ = ["Tables", "RunValue"]
 
@@ -64,8 +68,12 @@ class Tables:
     Use as a context, or ``close`` it.
     """
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, may_be_empty: bool = False) -> None:
         """Open the Parquet files of a folder.
+
+        Args:
+            folder: of the tables.
+            may_be_empty: no run need be finished; tables without a file are empty.
 
         Raises:
             UsageError: no runs.parquet there, or a file without one of the columns.
@@ -73,7 +81,7 @@ class Tables:
         import duckdb
 
         self.folder = Path(folder)
-        if not (self.folder / "runs.parquet").is_file():
+        if not (may_be_empty or (self.folder / "runs.parquet").is_file()):
             raise UsageError(f"no table of runs in {self.folder} (runs.parquet)")
         # One thread: sums of floats then have one order, so that a report has one text.
         self._connection = duckdb.connect(":memory:", config={"threads": 1})
@@ -87,7 +95,8 @@ class Tables:
             " evaluations, team_steps FROM runs ORDER BY ALL"
         )[1]
         named = sorted(_budgets(rows).items())
-        self._connection.executemany("INSERT INTO budgets VALUES (?, ?)", named or [("", "")])
+        if named:
+            self._connection.executemany("INSERT INTO budgets VALUES (?, ?)", named)
         self._connection.execute("SET enable_external_access = false")
         self._connection.execute("SET lock_configuration = true")
 
@@ -97,6 +106,27 @@ class Tables:
         Raises:
             UsageError: a statement that is not a query, or as ``query``.
         """
+        self._refuse_orders(sql)
+        return self.query(sql)
+
+    def frame(self, sql: str) -> DataFrame:
+        """Return the same as a pandas DataFrame: NULL is NaN, and numbers with it are float64.
+
+        Raises:
+            UsageError: as ``ask``.
+            EnvironmentFailure: pandas is not installed.
+        """
+        import duckdb
+
+        pandas()
+        self._refuse_orders(sql)
+        try:
+            return self._connection.execute(sql).df()
+        except duckdb.Error as error:
+            raise _refused(error) from error
+
+    def _refuse_orders(self, sql: str) -> None:
+        """Raise UsageError unless a text has queries, and these alone."""
         import duckdb
 
         try:
@@ -106,7 +136,8 @@ class Tables:
         for one in statements:
             if one.type.name not in QUERIES:
                 raise UsageError(f"{one.type.name} is not a query; ask as in {QUERY}")
-        return self.query(sql)
+        if not statements:
+            raise UsageError(f"no SQL statement, as in {QUERY}")
 
     def query(self, sql: str) -> tuple[list[str], list[tuple[Any, ...]]]:
         """Return the column names and the rows that one SQL statement gives.

@@ -188,7 +188,7 @@ def _evolve(
             places.study(planned.label, kind).unlink(missing_ok=True)
         found.extend_as(longer, **how)
     if found.status != "finished":
-        found.resume(time_limit=limit, **how)
+        found.resume(time_limit=limit, progress=False, **how)
     return found
 
 

@@ -14,15 +14,13 @@ import click
 
 from conevo.campaigns.campaign import CAMPAIGNS, Campaign
 from conevo.campaigns.estimate import remaining_seconds
-from conevo.campaigns.inputs import shown_as
 from conevo.campaigns.ledger import Entry
 from conevo.campaigns.plan import PlannedRun
 from conevo.campaigns.plan_file import preset_names, read_preset
-from conevo.campaigns.progress import last_written, progress_of
+from conevo.campaigns.progress import cell_text, cells, last_written, progress_of
 from conevo.cli.lookup import campaigns_in
 from conevo.cli.text import duration, table
 from conevo.errors import ConevoError
-from conevo.evolution.methods.registry import name_in
 from conevo.kernels.threads import usable_cores
 from conevo.terms import counted
 
@@ -200,24 +198,7 @@ def grid(
     planned: Iterable[PlannedRun], entries: Mapping[str, Entry]
 ) -> tuple[list[str], list[list[str]]]:
     """Return a table of finished runs: a row per environment and variant, a column per method."""
-    cells: dict[tuple[str, str], dict[str, list[Entry]]] = {}
-    for run in planned:
-        if run.label in entries:
-            row = cells.setdefault((shown_as(run.world), run.variant), {})
-            row.setdefault(name_in(run.method), []).append(entries[run.label])
-    methods = list(dict.fromkeys(method for row in cells.values() for method in row))
-    lines = [
-        [" ".join(name for name in key if name), *(_cell(row.get(m, [])) for m in methods)]
-        for key, row in cells.items()
-    ]
+    rows = cells(planned, entries)
+    methods = list(dict.fromkeys(method for row in rows.values() for method in row))
+    lines = [[name, *(cell_text(row.get(m, [])) for m in methods)] for name, row in rows.items()]
     return ["finished", *methods], lines
-
-
-def _cell(entries: list[Entry]) -> str:
-    """Return "3/6", with what is at work ("+1") and what has failed ("!1")."""
-    if not entries:
-        return "-"
-    found = Counter(entry.state for entry in entries)
-    more = f" +{found['running']}" if found["running"] else ""
-    failed = f" !{found['failed']}" if found["failed"] else ""
-    return f"{found['finished']}/{len(entries)}{more}{failed}"

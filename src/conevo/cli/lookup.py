@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from conevo.errors import EnvironmentFailure, UsageError, unknown_name, without_team
+from conevo.errors import UsageError, unknown_name, without_team
 from conevo.runs.directory import CAMPAIGN, kind_of
 from conevo.runs.durable import is_there
 from conevo.runs.run import RUNS, Run
@@ -161,33 +161,21 @@ def only_campaign() -> Campaign:
 def sealed(campaign: Campaign) -> Iterator[Path]:
     """Yield the folder with the tables of all that is finished.
 
-    While the campaign runs they are as its coordinator last made them. Where they are out of date
-    and cannot be written, as on a read-only file system, they are made for this command only.
-
     Raises:
         UsageError: no run is finished yet.
         EnvironmentFailure: they cannot be made anywhere.
     """
-    import tempfile
+    from conevo.campaigns.sealing import sealed_tables
 
-    with ExitStack() as stack:
-        tables = campaign.places.tables
-        if not (campaign.is_running or campaign.is_sealed):
-            try:
-                with campaign.locked():
-                    campaign.seal()
-            except EnvironmentFailure as error:
-                folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="conevo-"))
-                tables = Path(folder) / "tables"
-                campaign.seal(tables)
-                if tables.is_dir():
-                    note = f"conevo: note: {error}; its tables are made for this command only"
-                    click.echo(note, err=True)
-        if not (tables / "runs.parquet").is_file():
+    def note(why: str) -> None:
+        click.echo(f"conevo: note: {why}; its tables are made for this command only", err=True)
+
+    with sealed_tables(campaign, note) as folder:
+        if not (folder / "runs.parquet").is_file():
             raise UsageError(
                 f"{campaign.path} has no finished run yet, so there is nothing to show"
             )
-        yield tables
+        yield folder
 
 
 def open_directory(path: Path) -> Run | Shaping:

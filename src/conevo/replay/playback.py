@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from conevo.playback.check import DAMAGE, checked, refusal
 from conevo.playback.schema import Playback
 from conevo.replay.captions import facts, subtitle, title
-from conevo.replay.trajectory import Trajectory
 from conevo.worlds.drawing import drawing
+
+if TYPE_CHECKING:
+    from conevo.replay.trajectory import Trajectory
 
 __all__ = ["playback_of"]
 

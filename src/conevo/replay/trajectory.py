@@ -30,7 +30,7 @@ import io
 import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -42,13 +42,16 @@ from conevo.reading import parse_json, read_arrays
 from conevo.replay.validation import channel_of, validated
 from conevo.runs.durable import write_new
 
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
 __all__ = ["FORMAT", "Trajectory"]
 
 FORMAT = 1
 MOST_BYTES = 2**30  # of a file when it is unpacked: what a small file can ask for is limited
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Trajectory:
     """What one team did in one epoch.
 
@@ -70,6 +73,30 @@ class Trajectory:
         buffer = io.BytesIO()
         np.savez_compressed(buffer, allow_pickle=False, about=text, **arrays)
         return buffer.getvalue()
+
+    def frame(self, *arrays: str) -> DataFrame:
+        """Return a row per iteration and robot as a pandas DataFrame; see ``replay.frame``.
+
+        Args:
+            arrays: further arrays of the world over robots, such as "energy".
+
+        Raises:
+            UsageError: no such array, or one of other things than robots.
+            EnvironmentFailure: pandas is not installed.
+        """
+        from conevo.replay.frame import frame_of
+
+        return frame_of(self, *arrays)
+
+    def __repr__(self) -> str:
+        about = self.about
+        what = f"{about['task']}, generation {about['generation']}, epoch {about['epoch']}"
+        return f"Trajectory({what!r})"
+
+    def _repr_html_(self) -> str:
+        from conevo.replay.html import replay_card
+
+        return replay_card(self)
 
     def save(self, path: Path) -> None:
         """Write the file, all at once.

@@ -13,7 +13,7 @@ from conevo.evolution.protocol import Progress
 __all__ = ["Finalists", "Team", "finalists", "fittest_team", "sampled_generations"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Team:
     """The controllers of one team, as genotypes.
 
@@ -66,6 +66,14 @@ class Team:
         selected on. Of equal teams the earlier is first.
         """
         return -self.mean_fitness if np.isfinite(self.mean_fitness) else np.inf
+
+    def __repr__(self) -> str:
+        return f"Team(generation={self.generation}, robots={len(self.genes)})"
+
+    def _repr_html_(self) -> str:
+        from conevo.runs.html import team_card
+
+        return team_card(self)
 
     def as_trial(self) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.int32]]:
         """Return a genotype pool [R * U, G] and the one team [1, R, U] that uses all of it."""

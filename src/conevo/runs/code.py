@@ -11,6 +11,7 @@ from typing import Any
 
 import conevo
 from conevo.errors import UsageError
+from conevo.runs.directory import CONFIG
 from conevo.terms import quoted
 from conevo.worlds.registry import refuse_earlier
 
@@ -23,6 +24,7 @@ __all__ = [
     "last_code",
     "other_code",
     "refuse_other_code",
+    "refuse_other_kernels",
     "sessions_of",
     "version",
 ]
@@ -120,6 +122,23 @@ def refuse_other_code(path: Path, task: str, code: str, is_accepted: bool) -> No
         raise UsageError(
             f"{problem}: use that version, or continue with 'conevo resume {quoted(path)} "
             f"--accept-other-code'"
+        )
+
+
+def refuse_other_kernels(path: Path, provenance: Record, fingerprint: str) -> None:
+    """Raise UsageError unless a run was made with the kernels that are here.
+
+    Args:
+        path: of the run.
+        provenance: of the run.
+        fingerprint: of the simulator here.
+    """
+    if fingerprint != provenance["kernel_hash"]:
+        raise UsageError(
+            f"{path} was made with other kernels ({provenance['kernel_hash']}, here "
+            f"{fingerprint}): install conevo {provenance['conevo']} and warp-lang "
+            f"{provenance['warp']}, or start another run with "
+            f"'conevo run --config {quoted(path / CONFIG)}'"
         )
 
 

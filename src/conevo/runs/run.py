@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from conevo.errors import UsageError, without_team
 from conevo.runs import provenance
-from conevo.runs.code import last_code, refuse_other_code
-from conevo.runs.directory import CONFIG, refuse_existing
+from conevo.runs.code import last_code, refuse_other_code, refuse_other_kernels
+from conevo.runs.directory import refuse_existing
 from conevo.runs.outline import Outline
 from conevo.runs.store import Store, create
 from conevo.runs.time_limit import TimeLimit
@@ -20,6 +20,8 @@ from conevo.typing import Record
 
 # A run is looked at more often than it is carried on: what simulates it is loaded where it is used.
 if TYPE_CHECKING:
+    from pandas import DataFrame
+
     from conevo.evolution.protocol import Method, State
     from conevo.runs.champions import Team
     from conevo.runs.config import RunConfig
@@ -41,7 +43,7 @@ def evolve(
     overrides: Mapping[str, Any] | None = None,
     threads: int | None = None,
     device: str = "cpu",
-    progress: bool = False,
+    progress: bool | None = None,
     origin: Run | str | Path | None = None,
     of_champion: bool = False,
 ) -> Run:
@@ -57,7 +59,7 @@ def evolve(
         overrides: single settings, for example ``{"run.generations": 5}``.
         threads: CPU threads, all by default; results do not depend on it.
         device: "cpu", "cuda", or "auto": "cuda" if there is one; results do not depend on it.
-        progress: print a line per generation.
+        progress: as for ``Run.resume``.
         origin: a finished run with whose populations this one begins, if its controllers fit.
         of_champion: breed the populations from the origin's champion instead.
 
@@ -73,7 +75,7 @@ def evolve(
     origin = origin if origin is None or isinstance(origin, Run) else Run(origin)
     how: Record = {"threads": threads, "device": device, "of_champion": of_champion}
     run = start(settings, out, origin=origin, **how)
-    return run.resume(threads=threads, watch=_print_line if progress else None)
+    return run.resume(threads=threads, progress=progress)
 
 
 def start(
@@ -175,6 +177,11 @@ class Run:
     def __repr__(self) -> str:
         return f"Run({str(self.path)!r})"
 
+    def _repr_html_(self) -> str:
+        from conevo.runs.html import run_card
+
+        return run_card(self)
+
     @property
     def status(self) -> str:
         """Return "finished", "running" or "interrupted"."""
@@ -227,6 +234,17 @@ class Run:
         """Return the record of every finished generation."""
         return self._store.read_generations()
 
+    def frame(self, table: str = "generations") -> DataFrame:
+        """Return "generations", "tests", "robots" or "finalists" as a pandas DataFrame.
+
+        Raises:
+            UsageError: no such table.
+            EnvironmentFailure: pandas is not installed.
+        """
+        from conevo.runs.frames import frame_of
+
+        return frame_of(self, table)
+
     def team(self, generation: int) -> Team | None:
         """Return the fittest team of a generation, None if it was not kept."""
         return self._store.load_team(generation)
@@ -263,6 +281,7 @@ class Run:
         time_limit: float | TimeLimit | None = None,
         threads: int | None = None,
         device: str | None = None,
+        progress: bool | None = None,
         watch: Watch | None = None,
         remark: Callable[[str], None] | None = None,
         accept_other_code: bool = False,
@@ -277,6 +296,8 @@ class Run:
                 "interrupted", and resuming it again carries it on.
             threads: CPU threads, all by default.
             device: by default the one of the last session, or the CPU where that is not here.
+            progress: None: a bar in a notebook, nothing elsewhere; True: elsewhere a printed line
+                per generation; False: nothing.
             watch: called with the run and the record of each finished generation.
             remark: told about a checkpoint that could not be used.
             accept_other_code: go on although another conevo made the run so far; it is recorded.
@@ -286,6 +307,7 @@ class Run:
                 kernels, no usable checkpoint, or a length that is less than what is done.
             EnvironmentFailure: the machine refused; the run can be resumed when it no longer does.
         """
+        from conevo.runs.notebook import showing
         from conevo.runs.session import evolve_on, finish
 
         limit = time_limit if isinstance(time_limit, TimeLimit) else TimeLimit(time_limit)
@@ -300,16 +322,10 @@ class Run:
             )
         self.refuse_finished()
         self.refuse_other_code(accept_other_code)
-        with self._open():
+        with self._open(), showing(self, progress, watch) as show:
             self.refuse_finished()
             lab = self.equip(threads, device)
-            stopped_by = evolve_on(
-                self._store,
-                lab,
-                limit,
-                watch=lambda record: watch(self, record) if watch is not None else None,
-                remark=remark,
-            )
+            stopped_by = evolve_on(self._store, lab, limit, watch=show, remark=remark)
             if stopped_by != "time":
                 finish(self._store, lab, stopped_by)
         return self
@@ -480,18 +496,5 @@ class Run:
         about = self.provenance
         if lab is None or device not in (None, lab.device):
             lab = Lab.equip(self.config, threads, provenance.device_of(about, device))
-        if lab.simulator.fingerprint != about["kernel_hash"]:
-            raise UsageError(
-                f"{self.path} was made with other kernels ({about['kernel_hash']}, here "
-                f"{lab.simulator.fingerprint}): install conevo {about['conevo']} and warp-lang "
-                f"{about['warp']}, or start another run with "
-                f"'conevo run --config {quoted(self.path / CONFIG)}'"
-            )
+        refuse_other_kernels(self.path, about, lab.simulator.fingerprint)
         return lab
-
-
-def _print_line(run: Run, record: Record) -> None:
-    """Print one generation (``progress=True``)."""
-    name, value = next(iter(record["performance"].items()))
-    done, planned = record["generation"] + 1, run.outline.generations
-    print(f"generation {done}/{planned}  {name} {value:g}", flush=True)  # noqa: T201 (asked for)

@@ -40,6 +40,8 @@ from conevo.typing import Record
 from conevo.worlds.registry import product_of
 
 if TYPE_CHECKING:
+    from pandas import DataFrame
+
     from conevo.evolution.protocol import State
     from conevo.runs.champions import Team
     from conevo.runs.config import RunConfig
@@ -253,6 +255,19 @@ class Shaping:
             ]
         return found
 
+    def frame(self) -> DataFrame:
+        """Return ``generations`` as a pandas DataFrame, with the columns of ``Run.frame``.
+
+        Raises:
+            EnvironmentFailure: pandas is not installed.
+        """
+        from conevo.runs.frames import generations_frame, header_of
+
+        stages = self.stages
+        header = header_of(stages[0].provenance if stages else {}, lambda: self.configs[0])
+        first = {"number": "int64", "stage": "int64", "task": "str"}
+        return generations_frame(self.generations(), header, first)
+
     @property
     def sessions(self) -> list[Mapping[str, Any]]:
         """The sessions of all stages, each from a generation as it is numbered through them."""
@@ -332,6 +347,7 @@ class Shaping:
         time_limit: float | TimeLimit | None = None,
         threads: int | None = None,
         device: str | None = None,
+        progress: bool | None = None,
         watch: Watch | None = None,
         remark: Callable[[str], None] | None = None,
         accept_other_code: bool = False,
@@ -346,6 +362,7 @@ class Shaping:
             time_limit: seconds after which it stops at a checkpoint, as ``Run.resume``.
             threads: CPU threads, all by default.
             device: by default the one of the last session, or the CPU where that is not here.
+            progress: of every stage, as for ``Run.resume``.
             watch: called with the stage and the record of each finished generation.
             remark: told about a checkpoint that could not be used.
             accept_other_code: go on although another conevo made it so far; it is recorded.
@@ -361,6 +378,7 @@ class Shaping:
                 time_limit=limit,
                 threads=threads,
                 device=device,
+                progress=progress,
                 watch=watch,
                 remark=remark,
                 accept_other_code=accept_other_code,
