@@ -5,6 +5,8 @@ from __future__ import annotations
 import dataclasses
 import html
 import re
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -16,6 +18,11 @@ from conevo.replay.playback import playback_of
 from conevo.replay.recording import record
 from conevo.replay.trajectory import Trajectory
 from runs.tiny import evolve_tiny
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Page
+
+pytest_plugins = ["replay.browser"]
 
 TASKS = ("rover/complex-1", "pursuit/team-3", "gacc/complex-1")
 
@@ -76,6 +83,17 @@ def test_a_notebook_shows_the_replay_page_in_a_sandbox(recording: Trajectory) ->
     assert html.unescape(page) == replay_page([playback_of(recording)])
     assert re.findall(r'sandbox="([^"]*)"', frame) == ["allow-scripts"]
     assert "height: 720px" in frame
+
+
+@pytest.mark.browser
+def test_the_replay_works_in_its_sandbox(recording: Trajectory, tab: Page, tmp_path: Path) -> None:
+    path = tmp_path / "notebook.html"
+    path.write_text(f"<!doctype html><meta charset=utf-8>{recording._repr_html_()}")
+    tab.goto(path.as_uri())
+    page = tab.frame_locator("iframe")
+    page.get_by_text("iteration 0 of 12").wait_for()
+    page.get_by_role("slider").first.press("End")
+    page.get_by_text("iteration 11 of 12").wait_for()
 
 
 def test_a_page_that_is_too_large_is_named_instead(

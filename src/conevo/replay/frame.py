@@ -66,8 +66,9 @@ def frame_of(trajectory: Trajectory, *arrays: str) -> DataFrame:
     for name in about["performance"]:
         values = trajectory.channels[f"performance/{name}"].values
         found[f"performance.{name}"] = np.repeat(values, robots)
-    texts = dict.fromkeys(("caste", "action"), "str")
-    return frames.DataFrame(found).astype(texts)
+    for name in ("caste", "action"):
+        found[name] = frames.Series(found[name], dtype="str")
+    return frames.DataFrame(found)
 
 
 def _of_robots(trajectory: Trajectory, name: str) -> npt.NDArray[np.generic]:
