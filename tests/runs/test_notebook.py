@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 
 import conevo
+from conevo.playback.words import number
 from conevo.runs.run import start
 from runs.tiny import TASK, evolve_tiny, tiny_settings
 
@@ -63,7 +64,7 @@ def test_a_notebook_shows_one_bar_and_nothing_is_printed(
     texts = [one["text/plain"] for one in notebook.shown]
     assert texts[0] == f"generation 0 of 5 · starts · {run.path}"
     value = run.generations()[1]["performance"]["value"]
-    assert re.fullmatch(rf"generation 2 of 5 · value {value:g} · \d s left · .*", texts[2])
+    assert re.fullmatch(rf"generation 2 of 5 · value {number(value)} · \d s left · .*", texts[2])
     assert " · testing · " in texts[-2]
     assert " · finished · " in texts[-1]
     assert capsys.readouterr().out == ""
@@ -101,7 +102,9 @@ def test_elsewhere_lines_are_printed_only_on_request(
     run.resume(generations=7, progress=True)
     lines = capsys.readouterr().out.splitlines()
     values = [record["performance"]["value"] for record in run.generations()[5:]]
-    assert lines == [f"generation {k}/7  value {v:g}" for k, v in zip((6, 7), values, strict=True)]
+    assert lines == [
+        f"generation {k}/7  value {number(v)}" for k, v in zip((6, 7), values, strict=True)
+    ]
 
 
 class Balanced(HTMLParser):
