@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
 import sys
 from pathlib import Path
@@ -70,12 +71,12 @@ def test_without_pandas_it_is_one_line(campaign: Campaign, monkeypatch: pytest.M
 
 
 def test_the_card_has_a_bar_for_every_cell(tmp_path: Path) -> None:
-    campaign = tiny_campaign(tmp_path / "a<b>", 'title = "<i>T</i>"\nstudies = []')
-    first, _, third, _ = campaign.planned
+    campaign = tiny_campaign(tmp_path / "a<b>")
+    campaign.plan = dataclasses.replace(campaign.plan, title="<i>T</i>")
+    first = next(iter(campaign.planned))
     campaign.ledger.enrol(campaign.planned)
     campaign.ledger.end(first, "failed", "<script>why")
     html = campaign._repr_html_()
-    assert "2 pending" not in html
     assert "3 pending, 1 failed" in html
     for text in ("&lt;i&gt;T&lt;/i&gt;", "a&lt;b&gt;", "&lt;script&gt;why"):
         assert text in html
@@ -83,7 +84,6 @@ def test_the_card_has_a_bar_for_every_cell(tmp_path: Path) -> None:
     bars = re.findall(r'<span class="bar">(.*?)</span> ([^<]*)</td>', html)
     assert [text for _, text in bars] == ["0/2 !1", "0/2"]
     assert "width:50.0%;background:#d55e00" in bars[0][0]
-    assert third
     Campaign(campaign.path).retry()
     Campaign(campaign.path).carry_on(Serial(1))
     bars = re.findall(r'<span class="bar">(.*?)</span> ([^<]*)</td>', campaign._repr_html_())

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from conevo.playback.channel import Channel
 
 from conevo.errors import UsageError
+from conevo.playback.quantized import Channel
 from conevo.replay.page import replay_page
 from conevo.replay.playback import playback_of
 from conevo.replay.recording import record
