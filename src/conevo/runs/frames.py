@@ -14,6 +14,7 @@ from conevo.errors import EnvironmentFailure, unknown_name
 from conevo.runs.provenance import describe_world
 from conevo.runs.records import own_numbers
 from conevo.terms import NON_SPECIALIZED
+from conevo.typing import Record
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
 
 __all__ = ["TABLES", "frame_of", "generations_frame", "header_of", "pandas", "typed"]
 
-Record = Mapping[str, Any]
 Columns = dict[str, str]  # name -> dtype
 WHOLE, REAL, TEXT = "int64", "float64", "str"
 TEAMS = {"champion": "champion", "generation_0": "generation 0"}

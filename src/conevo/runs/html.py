@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from html import escape
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from conevo.errors import ConevoError
 from conevo.evolution.methods.registry import title_of
 from conevo.playback.words import number
 from conevo.terms import S_SCALE, counted
+from conevo.typing import Record
 
 if TYPE_CHECKING:
     from conevo.runs.champions import Team
@@ -36,7 +37,6 @@ div.conevo :is(td, th) { padding: .1em .8em .1em 0; text-align: left !important;
 div.conevo th { font-weight: 600; }
 </style>"""
 INK = "currentColor"
-Record = Mapping[str, Any]
 
 
 def card(title: str, about: Iterable[str], parts: Callable[[], Iterable[str]]) -> str:

@@ -6,11 +6,12 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from conevo.playback.words import number
 from conevo.runs.html import STYLE, escape
 from conevo.runs.progress import Done, seconds_left, share_of
+from conevo.typing import Record
 
 if TYPE_CHECKING:
     from conevo.runs.run import Run
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
 __all__ = ["in_notebook", "showing"]
 
 PAUSE = 0.25  # seconds between two updates of a bar
-Record = dict[str, Any]
 
 
 def in_notebook() -> bool:
