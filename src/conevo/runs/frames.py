@@ -7,7 +7,7 @@ that a method adds of its own.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 from conevo.errors import EnvironmentFailure, unknown_name
@@ -209,7 +209,7 @@ def _flat(record: Record, prefix: str = "") -> dict[str, Any]:
     found: dict[str, Any] = {}
     for name, value in record.items():
         key = f"{prefix}{name}"
-        found |= _flat(value, f"{key}.") if isinstance(value, Mapping) else {key: value}
+        found |= _flat(value, f"{key}.") if isinstance(value, dict) else {key: value}
     return found
 
 
