@@ -23,7 +23,8 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from conevo.kernels.devices import CPU, device_here, usable_cores
+from conevo.kernels.devices import CPU, device_here
+from conevo.kernels.threads import usable_cores
 from conevo.rng import fold
 from conevo.worlds.agreement import difference
 from conevo.worlds.registry import world as build_world
