@@ -5,10 +5,12 @@ import re
 from pathlib import Path
 
 import pytest
+import tomli_w
 
 from campaigns.plans import tiny_campaign, write_plan
 from conevo.campaigns import work
 from conevo.cli.main import main
+from watch.followed import record, tables
 from worlds.test_outside import written
 
 
@@ -285,8 +287,8 @@ def test_status_shows_runs_that_slurm_tasks_or_a_resume_carry_out(conevo, tmp_pa
     for label, n in ((first, 1), (second, 0)):
         path = campaign.places.run(label)
         path.mkdir(parents=True)
-        (path / "config.toml").write_text("[run]\ngenerations = 2\nbudget_evaluations = 0\n")
-        lines = [f'{{"generation": {k}, "team_evaluations": 9}}\n' for k in range(n)]
+        (path / "config.toml").write_text(tomli_w.dumps(tables(generations=2)))
+        lines = [f"{json.dumps(record(k, team_evaluations=9))}\n" for k in range(n)]
         (path / "generations.jsonl").write_text("".join(lines))
     with Directory(campaign.places.run(first), "run").locked():
         code, out, _ = conevo("campaign", "status", "tiny", "--runs")
