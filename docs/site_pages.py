@@ -1,5 +1,6 @@
 """The pages of the documentation site: where each comes from, in Markdown that Zensical reads."""
 
+import json
 import os
 import re
 import shutil
@@ -13,6 +14,7 @@ OTHERS = {
     "CHANGELOG.md": "changelog.md",
     "benchmarks/README.md": "benchmarks.md",
     "examples/README.md": "examples/index.md",
+    "examples/tutorial.ipynb": "examples/tutorial.md",
     "experiments/README.md": "experiments.md",
 }
 FOLDERS = {"docs/results": "results.md"}
@@ -119,21 +121,35 @@ def write_pages(folder):
     for source, page in pages.items():
         if source.endswith(".py"):
             continue
-        text, more = linked((ROOT / source).read_text(encoding="utf-8"), source, pages)
+        text = (ROOT / source).read_text(encoding="utf-8")
+        text = notebook(text) if source.endswith(".ipynb") else text
+        text, more = linked(text, source, pages)
         files |= more
         write(folder / page, dialect(text))
     for file in sorted(files):
         target = folder / place_of(file, pages)
         if target.suffix == ".md":
             code = (ROOT / file).read_text(encoding="utf-8")
-            language = LANGUAGES[Path(file).suffix]
-            write(target, f"# {file}\n\n```{language}\n{code.rstrip()}\n```\n")
+            write(target, f"# {file}\n\n{fenced(code, LANGUAGES[Path(file).suffix])}")
         elif not target.exists():
             target.parent.mkdir(parents=True, exist_ok=True)
             shutil.copy(ROOT / file, target)
     for path, (title, modules) in api().items():
         directives = "\n\n".join(f"::: {module}" for module in modules)
         write(folder / path, f"# {title}\n\n{directives}\n")
+
+
+def notebook(text):
+    """Return the cells of a notebook as a page, without their outputs."""
+    cells = [(one["cell_type"], "".join(one["source"])) for one in json.loads(text)["cells"]]
+    return "\n".join(
+        f"{source}\n" if kind == "markdown" else fenced(source, "python") for kind, source in cells
+    )
+
+
+def fenced(code, language):
+    """Return code as a block of a page."""
+    return f"```{language}\n{code.rstrip()}\n```\n"
 
 
 def write_sources(folder):

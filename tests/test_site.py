@@ -123,6 +123,12 @@ def test_lists_are_written_as_python_markdown_reads_them():
     )
 
 
+def test_a_notebook_is_shown_as_its_cells():
+    cells = [("markdown", ["# Title\n", "Text."]), ("code", ["x = 1\n", "x\n"])]
+    text = json.dumps({"cells": [{"cell_type": kind, "source": lines} for kind, lines in cells]})
+    assert site_pages.notebook(text) == "# Title\nText.\n\n```python\nx = 1\nx\n```\n"
+
+
 def test_tables_and_examples_of_docstrings_are_markdown():
     rule = "=====  ======="
     table = f"{rule}\nname   meaning\n{rule}\n``x``  a\n{rule}"
