@@ -58,7 +58,7 @@ def test_python_and_runs_have_them_and_nothing_counts_as_changed(number: int) ->
 def test_the_environments_of_the_thesis_have_those_of_the_class(family: str) -> None:
     for number in range(1, 11):
         config = resolve(f"rover/{family}-{number}")
-        assert config.world_params == RoverParams(iterations=DESK)
+        assert config.world_params == RoverParams(iterations=DESK, fitness="product")
         assert conevo.world(f"rover/{family}-{number}").params == RoverParams()
         assert config.changed == ()
 
@@ -93,12 +93,13 @@ def test_a_setting_wins_and_so_does_a_file_and_only_these_are_changed(tmp_path: 
     assert config.of_length({"generations": 7}).changed == ("run.generations", "world.starts")
 
 
-def test_a_presets_table_of_the_world_wins(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_environment_s_own_defaults_win_over_a_preset_s(monkeypatch: pytest.MonkeyPatch) -> None:
     own = dataclasses.replace(WORLDS["rover-v2"], defaults={"apart-1": {"iterations": 77}})
     monkeypatch.setitem(WORLDS, "rover-v2", own)
     assert conevo.world("rover/apart-1").params.iterations == 77
-    assert resolve("rover/apart-1", preset="desk").world_params.iterations == DESK
-    assert resolve("rover/apart-1", preset="desk").changed == ()
+    desk = resolve("rover/apart-1", preset="desk")
+    assert (desk.world_params.iterations, desk.world_params.fitness) == (77, "product")
+    assert desk.changed == ()
 
 
 def test_a_resolved_configuration_comes_back_from_its_own_file(tmp_path: Path) -> None:

@@ -35,7 +35,11 @@ WORLDS = {
 }
 METHODS = ("homcne", "hetcne", "ccga", "mesp", "cone", "cone-1", "cone-2", "cone-3")
 RUNS = {
-    "rover/complex-1": {"world.n_robots": 3, "world.iterations": 40},
+    "rover/complex-1": {
+        "world.n_robots": 3,
+        "world.iterations": 40,
+        "world.fitness": "cumulative",
+    },
     "pursuit/team-1": {"world.iterations": 40},
     "gacc/complex-1": {"world.n_robots": 3, "world.iterations": 40},
 }

@@ -124,9 +124,10 @@ def section_of(key: str, parts: Mapping[str, type], place: str) -> str:
 def read_preset(
     preset: str, world: WorldEntry, environment: str, method: MethodEntry, controller: str
 ) -> Layer:
-    """Return what a preset says about this world and method, over what the world suggests.
+    """Return a preset's settings for this world and method, with those that the world brings.
 
-    That is the environment's defaults and settings of a controller. A preset says nothing of a
+    An environment's own defaults make it the task that it is, so they win over the preset's, which
+    are about size. A controller's settings are suggestions, and lose. A preset says nothing of a
     method in a file.
     """
     if preset not in PRESETS:
@@ -141,12 +142,15 @@ def read_preset(
     sizes = {} if method.file else by_method.get(family, {}) | by_method.get(name, {})
     tables = generic | own | {"method": sizes}
     layer = as_layer(tables, f"in preset {preset!r}")
-    suggestion = {
+    brought = {
         "world": world.defaults.get(environment, {}),
         "controller": suggested(controller, world.world_class),
     }
-    of_world = as_layer(suggestion, f"of world {world.name!r}")
-    return layer | {part: of_world[part] | layer.get(part, {}) for part in of_world}
+    of_world = as_layer(brought, f"of world {world.name!r}")
+    return layer | {
+        "world": layer.get("world", {}) | of_world["world"],
+        "controller": of_world["controller"] | layer.get("controller", {}),
+    }
 
 
 def build(section: str, parts: Mapping[str, Any], layers: Iterable[Layer]) -> Any:
