@@ -32,6 +32,7 @@ def test_a_campaign_from_start_to_answers(conevo, tmp_path):
     write_plan(tmp_path, 'studies = ["teams"]')
     code, out, _ = conevo("campaign", "start", "tiny.toml", "--executor", "serial", "--seeds", "1")
     assert code == 0
+    assert out.splitlines()[0].endswith(" (preset smoke)")
     assert "campaigns/tiny" in out
     assert "2 runs, 2 pending" in out
     assert "(2 of 2 finished" in out

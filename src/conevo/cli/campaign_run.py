@@ -17,7 +17,7 @@ from conevo.campaigns.estimate import remaining_seconds
 from conevo.campaigns.executors.protocol import Ending, Executor
 from conevo.campaigns.executors.registry import make_executor
 from conevo.campaigns.ledger import Entry
-from conevo.cli.campaign_text import counts, grid, print_failed
+from conevo.cli.campaign_text import counts, grid, heading, print_failed
 from conevo.cli.run_to_end import drop_output, style_of
 from conevo.cli.text import duration
 from conevo.errors import EnvironmentFailure, UsageError
@@ -114,7 +114,7 @@ class View:
         """Return the context in which the live table is on the screen."""
         if self.execution.style == "plain":
             found = self.campaign
-            click.echo(f"{found.plan.title or found.plan.name}\n{found.path}")
+            click.echo(f"{heading(found.plan)}\n{found.path}")
             click.echo(f"{counted(len(found.planned), 'run')}, {counts(found.standings())}")
         if self.execution.style != "live":
             return nullcontext()
@@ -172,8 +172,7 @@ class View:
             table.add_row(*row)
         at_work = [entry.label for entry in entries.values() if entry.state == "running"]
         return Group(
-            f"[bold]{self.campaign.plan.title or self.campaign.plan.name}[/bold]\n"
-            f"{self.campaign.path}",
+            f"[bold]{heading(self.campaign.plan)}[/bold]\n{self.campaign.path}",
             bar,
             f"{self.line(entries)}, {duration(time.monotonic() - self.began)} so far",
             table,

@@ -15,7 +15,7 @@ import click
 from conevo.campaigns.campaign import CAMPAIGNS, Campaign
 from conevo.campaigns.estimate import remaining_seconds
 from conevo.campaigns.ledger import Entry
-from conevo.campaigns.plan import PlannedRun
+from conevo.campaigns.plan import Plan, PlannedRun
 from conevo.campaigns.plan_file import preset_names, read_preset
 from conevo.campaigns.progress import cell_text, cells, last_written, progress_of
 from conevo.cli.lookup import campaigns_in
@@ -29,6 +29,7 @@ __all__ = [
     "counts",
     "experiments",
     "grid",
+    "heading",
     "print_lists",
     "print_failed",
     "print_plan",
@@ -108,7 +109,7 @@ def print_status(campaign: Campaign, with_runs: bool, as_json: bool) -> bool:
         about = {"campaign": str(campaign.path), "running": campaign.is_running}
         click.echo(json.dumps(about | {"seconds_left": left, "runs": rows}))
         return bool(failed)
-    click.echo(f"{campaign.plan.title or campaign.plan.name} (preset {campaign.plan.preset})")
+    click.echo(heading(campaign.plan))
     rest = f", about {duration(left)} left" if left is not None else ""
     click.echo(f"{campaign.path}: {_whose(campaign, entries)}, {counts(entries)}{rest}")
     if sign := _sign_of_life(campaign, entries):
@@ -186,6 +187,11 @@ def _how_far(campaign: Campaign, entry: Entry) -> dict[str, Any]:
         "budget": found.budget,
         "written": found.written,
     }
+
+
+def heading(plan: Plan) -> str:
+    """Return a plan's title and preset."""
+    return f"{plan.title or plan.name} (preset {plan.preset})"
 
 
 def counts(entries: Mapping[str, Entry]) -> str:
