@@ -125,7 +125,7 @@ def test_a_champion_meets_the_settings_of_the_other_environment() -> None:
     there = _changed(here, "rover/apart-5", {}, None)
     assert there.world_params == RoverParams(**APART, n_robots=3, iterations=DESK)
     back = _changed(there, "complex-4", {}, None)
-    assert back.world_params == RoverParams(n_robots=3, iterations=DESK)
+    assert back.world_params == RoverParams(n_robots=3, iterations=DESK, fitness="product")
     half = resolve("rover/apart-5", overrides={"world.segregation": 0.5})
     params = RoverParams(**APART | {"segregation": 0.5}, iterations=DESK)
     assert _changed(half, "apart-6", {}, None).world_params == params
@@ -152,7 +152,7 @@ def test_plans_have_them_and_settings_of_a_plan_win(tmp_path: Path) -> None:
     assert runs == {
         "rover-v2/apart-1": apart,
         "rover-v2/apart-2": apart,
-        "rover-v2/complex-1": RoverParams(iterations=40),
+        "rover-v2/complex-1": RoverParams(iterations=40, fitness="product"),
     }
 
 
