@@ -75,15 +75,13 @@ def test_ray_itself_carries_a_run_on_whose_ray_worker_was_killed(long_run, undis
     assert outcome(run) == undisturbed
 
 
-@pytest.mark.parametrize("kind", ["file", "s3"])
 def test_results_come_through_an_object_store_where_nodes_do_not_see_the_campaign(
-    long_run, undisturbed, tmp_path, monkeypatch, request, kind
+    long_run, undisturbed, monkeypatch, bucket
 ):
     campaign, label = long_run
     scratch = Path(tempfile.mkdtemp())  # short, since Ray makes sockets below it
     monkeypatch.setenv("TMPDIR", str(scratch))  # of the workers
-    uri = request.getfixturevalue("bucket") if kind == "s3" else f"file://{tmp_path}/bucket"
-    executor = RayCluster(1, store=uri)
+    executor = RayCluster(1, store=bucket)
     executor.submit(RunJob(campaign.path, label, 1))
     (folder,) = until(lambda: list(scratch.glob("conevo-*")))
     made = folder / "runs" / label / "generations.jsonl"
@@ -92,7 +90,7 @@ def test_results_come_through_an_object_store_where_nodes_do_not_see_the_campaig
     executor.stop()
     done = n_generations(campaign, label)
     assert 2 < done < 30
-    standings = campaign.carry_on(RayCluster(2, store=uri))
+    standings = campaign.carry_on(RayCluster(2, store=bucket))
     assert {one.state for one in standings.values()} == {"finished"}
     assert list(scratch.glob("conevo-*")) == []
     run = conevo.Run(campaign.places.run(label))

@@ -33,6 +33,7 @@ NOT_DECIDING = {
     "conevo.runs.outline",
     "conevo.runs.settings",
     "conevo.terms",
+    "conevo.typing",
 }
 
 
