@@ -13,6 +13,7 @@ import pytest
 
 import conevo
 from conevo.playback.words import number
+from conevo.runs.html import card
 from conevo.runs.run import start
 from runs.tiny import TASK, evolve_tiny, tiny_settings
 
@@ -134,6 +135,15 @@ class Balanced(HTMLParser):
 
     def handle_data(self, data: str) -> None:
         self.text += "" if self.open[-1:] == ["style"] else f"{data} "
+
+
+def test_names_on_a_card_are_text() -> None:
+    text = card("<b>title</b>", ["<i>fact</i>"], lambda: ["<p>below</p>"])
+    assert "&lt;b&gt;title&lt;/b&gt;" in text
+    assert "&lt;i&gt;fact&lt;/i&gt;" in text
+    assert "<b>" not in text
+    assert "<i>" not in text
+    assert "<p>below</p>" in text
 
 
 def test_the_card_of_a_run_shows_its_curve_its_test_and_its_castes(tmp_path: Path) -> None:
