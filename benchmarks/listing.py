@@ -84,7 +84,7 @@ def make_campaign(run: Path, folder: Path, n_runs: int, generations: int) -> Pat
     (folder / "runs").mkdir()
     for k, label in enumerate(campaign.planned):
         if k % 10:
-            copy(run, campaign.places.run(label), {"seed": k}, generations)
+            copy(run, campaign.paths.run(label), {"seed": k}, generations)
     return folder
 
 

@@ -141,7 +141,7 @@ def claims_table(tables: Tables) -> str:
 
 def made_with(campaign: Campaign) -> str:
     """Return versions and machine of the runs, and how many failed."""
-    about = [Run(campaign.places.run(name)).provenance for name in campaign.planned]
+    about = [Run(campaign.paths.run(name)).provenance for name in campaign.planned]
     keys = ("conevo", "warp", "numpy", "python", "cpu")
     each = {key: sorted({str(one[key]) for one in about}) for key in keys}
     entries = campaign.standings().values()
@@ -154,7 +154,7 @@ def main() -> None:
     """Write the report and the page."""
     campaign = Campaign(Path(sys.argv[1]))
     folder = Path(sys.argv[2])
-    shutil.copyfile(campaign.places.plan, folder / "plan.toml")
+    shutil.copyfile(campaign.paths.plan, folder / "plan.toml")
     page = folder / "README.md"
     with sealed(campaign) as sources, Tables(sources) as tables:
         write_report(campaign, folder / "report", sources)

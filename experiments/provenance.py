@@ -20,7 +20,7 @@ def made_with(campaign: Campaign, rows: Sequence[Row]) -> str:
     """Return what was run and what it cost: seeds, budget, versions, machine, time."""
     standing = campaign.standings()
     done = [label for label, entry in standing.items() if entry.state == "finished"]
-    about = [Run(campaign.places.run(label)).provenance for label in done]
+    about = [Run(campaign.paths.run(label)).provenance for label in done]
     each = {title: sorted({str(one[key]) for one in about}) for title, key in PROVENANCE.items()}
     worlds = sorted({one["world"]["name"] for one in about})
     seeds = sorted({int(row["seed"]) for row in rows})

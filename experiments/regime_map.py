@@ -142,7 +142,7 @@ def rows_and_cost(name: str) -> tuple[list[Row], str]:
     planned: Mapping[str, PlannedRun] = campaign.planned
     with sealed(campaign) as folder, Tables(folder) as tables:
         names = [run for (run,) in tables.query("SELECT run FROM runs")[1]]
-        own = {name: own_numbers_of(Run(campaign.places.run(name))) for name in names}
+        own = {name: own_numbers_of(Run(campaign.paths.run(name))) for name in names}
         rows = rows_of(tables, list(planned.values()), own)
     if not rows:
         raise UsageError(f"{campaign.path} has no finished run of {INDIVIDUAL} or {CLONES}")

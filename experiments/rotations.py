@@ -82,7 +82,7 @@ def rows_of(name: str, methods: Sequence[str]) -> list[Row]:
         planned = campaign.planned[label]
         if entry.state != "finished" or planned.method not in methods:
             continue
-        run = Run(campaign.places.run(label))
+        run = Run(campaign.paths.run(label))
         if getattr(run.config.world_params, "starts", None) != "by_robot":
             continue
         levels = dict(part.partition("=")[::2] for part in planned.variant.split(", ") if part)

@@ -186,11 +186,11 @@ def test_the_page_of_a_campaign(campaign, tmp_path, capsys):
             label for label in campaign.planned if f"-{row['method']}-" in label
             and label.endswith(f"-s{row['seed']:g}")
         )  # fmt: skip
-        tested = Run(campaign.places.run(label)).test_result["champion"]["performance"]["value"]
+        tested = Run(campaign.paths.run(label)).test_result["champion"]["performance"]["value"]
         assert row["value"] == pytest.approx(np.mean(tested["values"]), rel=1e-5)
-        (*_, last) = Run(campaign.places.run(label)).generations()
+        (*_, last) = Run(campaign.paths.run(label)).generations()
         assert row.get("individual_share") == last.get("individual_share")
-        study = json.loads(campaign.places.study(label).read_text())
+        study = json.loads(campaign.paths.study(label).read_text())
         of_c = [one["count"] for one in study["actions"]
                 if one["robot"] in (2, 6, 10, 14, 18) and one["action"] == "med"]  # fmt: skip
         assert row["C med"] == sum(of_c)

@@ -18,14 +18,14 @@ def workers(root: Path) -> dict[int, list[str]]:
             words = (place / "cmdline").read_text().split("\0")[:-1]
         except OSError:  # gone since
             continue
-        if "conevo.campaigns.work" in words and str(root.resolve()) in words:
+        if "conevo.campaigns.worker" in words and str(root.resolve()) in words:
             found[int(place.name)] = words
     return found
 
 
 def n_generations(campaign: Campaign, label: str) -> int:
     """Return how many generations a run has behind it, 0 if it has not begun."""
-    path = campaign.places.run(label) / "generations.jsonl"
+    path = campaign.paths.run(label) / "generations.jsonl"
     return path.read_bytes().count(b"\n") if path.is_file() else 0
 
 

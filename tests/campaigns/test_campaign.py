@@ -11,7 +11,7 @@ from conevo.campaigns.campaign import ATTEMPTS, Campaign, Stopped, create
 from conevo.campaigns.executors.local import Serial
 from conevo.campaigns.executors.protocol import Ending, RunJob
 from conevo.campaigns.plan_file import read_plan
-from conevo.campaigns.work import carry_out
+from conevo.campaigns.worker import carry_out
 from conevo.errors import EnvironmentFailure, UsageError
 from conevo.runs.run import Run
 
@@ -47,7 +47,7 @@ def end_as(campaign, **how):
     about = {"message": "", "origin": "", "traceback": "", "core_seconds": 1.0} | how
 
     def fate(job):
-        path = campaign.places.ended(job.label)
+        path = campaign.paths.ended(job.label)
         path.parent.mkdir(exist_ok=True)
         path.write_text(json.dumps(about))
 
@@ -61,7 +61,7 @@ def test_a_campaign_is_carried_out_and_its_runs_are_as_any_other(tmp_path):
     assert {entry.state for entry in entries.values()} == {"finished"}
     assert [job.label for job in executor.begun] == list(campaign.planned)
     for label, planned in campaign.planned.items():
-        run = Run(campaign.places.run(label))
+        run = Run(campaign.paths.run(label))
         assert (run.status, run.config.run_id) == ("finished", planned.run_ids[0])
     again = Scripted()
     campaign.carry_on(again)
@@ -76,7 +76,7 @@ def test_serial_runs_have_all_cores_one_after_the_other(tmp_path):
     costs = [entry.core_seconds for entry in entries.values()]
     assert min(costs) > 0
     assert sum(costs) <= time.process_time() - began + 0.01
-    sessions = [Run(campaign.places.run(x)).provenance["sessions"] for x in campaign.planned]
+    sessions = [Run(campaign.paths.run(x)).provenance["sessions"] for x in campaign.planned]
     assert [[one["threads"] for one in of_run] for of_run in sessions] == [[2]] * 4
 
 
@@ -137,9 +137,9 @@ def test_what_is_on_the_disk_counts_not_the_ledger(tmp_path):
     campaign = tiny_campaign(tmp_path)
     campaign.carry_on(Scripted())
     first, second, *_ = campaign.planned
-    shutil.rmtree(campaign.places.run(first))
+    shutil.rmtree(campaign.paths.run(first))
     assert campaign.standings()[first].state == "pending"
-    campaign.places.ledger.unlink()
+    campaign.paths.ledger.unlink()
     executor = Scripted()
     entries = campaign.carry_on(executor)
     assert [job.label for job in executor.begun] == [first]
@@ -159,7 +159,7 @@ def test_an_order_to_stop_is_obeyed_and_what_was_at_work_goes_on_later(tmp_path)
     states = [entry.state for entry in campaign.standings().values()]
     assert states == ["finished", "pending", "pending", "pending"]
     assert executor.stopped == 1
-    assert not campaign.places.stop.exists()
+    assert not campaign.paths.stop.exists()
     assert {e.state for e in campaign.carry_on(Scripted()).values()} == {"finished"}
     with pytest.raises(UsageError, match="is not running"):
         campaign.stop()
@@ -208,11 +208,11 @@ def test_a_foreign_run_in_its_place_is_left_alone(tmp_path):
     campaign = tiny_campaign(tmp_path)
     first, second, *_ = campaign.planned
     campaign.carry_on(Scripted())
-    shutil.rmtree(campaign.places.run(first))
-    shutil.copytree(campaign.places.run(second), campaign.places.run(first))
+    shutil.rmtree(campaign.paths.run(first))
+    shutil.copytree(campaign.paths.run(second), campaign.paths.run(first))
     shutil.rmtree(campaign.path / "ended")
     assert not carry_out(campaign.path, first, 1)
-    ended = json.loads(campaign.places.ended(first).read_text())
+    ended = json.loads(campaign.paths.ended(first).read_text())
     assert (ended["origin"], "not the run that was planned" in ended["message"]) == (
         "request",
         True,

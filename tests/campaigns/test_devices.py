@@ -9,11 +9,11 @@ import pytest
 
 import conevo
 from campaigns.plans import tiny_campaign
-from conevo.campaigns import devices, slurm, work
+from conevo.campaigns import devices, slurm, worker
 from conevo.campaigns.devices import devices_here, next_device, parse_devices
+from conevo.campaigns.executors.process import worker_command
 from conevo.campaigns.executors.protocol import Ending, RunJob
 from conevo.campaigns.executors.registry import make_executor
-from conevo.campaigns.executors.worker import worker_command
 from conevo.cli.campaign_run import ready
 from conevo.cli.main import main
 from conevo.errors import EnvironmentFailure, UsageError
@@ -92,17 +92,17 @@ def test_the_device_reaches_the_run_that_is_begun(campaign, monkeypatch):
     job = RunJob(campaign.path, label, 1, "cuda:1")
     assert worker_command(job)[-4:] == [str(campaign.path.resolve()), label, "1", "cuda:1"]
     asked = []
-    monkeypatch.setattr(work, "start", lambda *_, **more: asked.append(more["device"]))
-    monkeypatch.setattr(sys, "argv", ["work", *worker_command(job)[-4:]])
-    monkeypatch.setattr(work.os, "_exit", lambda code: asked.append(code))
-    monkeypatch.setattr(work.signal, "signal", lambda *_: None)
+    monkeypatch.setattr(worker, "start", lambda *_, **more: asked.append(more["device"]))
+    monkeypatch.setattr(sys, "argv", ["worker", *worker_command(job)[-4:]])
+    monkeypatch.setattr(worker.os, "_exit", lambda code: asked.append(code))
+    monkeypatch.setattr(worker.signal, "signal", lambda *_: None)
     monkeypatch.setattr(sys.stdin, "isatty", lambda: True, raising=False)
-    work.main()
+    worker.main()
     assert asked == ["cuda:1", 1]  # nothing was begun, and so nothing finished
     monkeypatch.setattr(
-        sys, "argv", ["work", *worker_command(RunJob(campaign.path, label, 1))[-3:]]
+        sys, "argv", ["worker", *worker_command(RunJob(campaign.path, label, 1))[-3:]]
     )
-    work.main()
+    worker.main()
     assert asked[2:] == ["cpu", 1]  # where none is named
 
 
@@ -138,19 +138,19 @@ def test_auto_is_every_card_or_the_cpu(two_cards, monkeypatch):
 
 def test_a_run_goes_on_where_it_was_on_the_cpu_or_on_the_device_that_is_named(campaign, caplog):
     label, other = list(campaign.planned)[:2]
-    path = campaign.places.run(label)
-    run = work.start(campaign.planned[label].configs()[0], path, threads=1)
+    path = campaign.paths.run(label)
+    run = worker.start(campaign.planned[label].configs()[0], path, threads=1)
     about = json.loads((path / "provenance.json").read_text())
     (path / "provenance.json").write_text(json.dumps(about | {"device": "cuda:7"}))
-    assert not work.carry_out(campaign.path, label, 1, device="cuda:7")
-    ended = json.loads(campaign.places.ended(label).read_text())
+    assert not worker.carry_out(campaign.path, label, 1, device="cuda:7")
+    ended = json.loads(campaign.paths.ended(label).read_text())
     assert ended["origin"] == "machine"
     assert ended["message"].startswith("device 'cuda:7': ")
-    assert work.carry_out(campaign.path, label, 1)
+    assert worker.carry_out(campaign.path, label, 1)
     assert run.status == "finished"
     assert [session["device"] for session in run.provenance["sessions"]] == ["cpu"]
-    assert work.carry_out(campaign.path, other, 1, device="auto")
-    about = json.loads((campaign.places.run(other) / "provenance.json").read_text())
+    assert worker.carry_out(campaign.path, other, 1, device="auto")
+    about = json.loads((campaign.paths.run(other) / "provenance.json").read_text())
     assert about["device"] == about["sessions"][0]["device"] == devices_here(("auto",))[0]
 
 

@@ -49,7 +49,7 @@ def test_what_a_running_run_has_had_is_not_to_come(campaign):
 
 def test_while_none_is_finished_the_progress_of_those_at_work_counts(campaign):
     first = next(iter(campaign.planned))
-    log = campaign.places.run(first) / "generations.jsonl"
+    log = campaign.paths.run(first) / "generations.jsonl"
     log.parent.mkdir(parents=True)
     (log.parent / "config.toml").write_text(tomli_w.dumps(tables(generations=2)))
     log.write_text(json.dumps(record(0)) + '\n{"team_eval')  # one of two generations, one torn

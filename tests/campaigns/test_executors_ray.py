@@ -70,7 +70,7 @@ def test_ray_itself_carries_a_run_on_whose_ray_worker_was_killed(long_run, undis
     finally:
         executor.stop()
     assert (ending.label, ending.lost) == (label, "")
-    run = conevo.Run(campaign.places.run(label))
+    run = conevo.Run(campaign.paths.run(label))
     assert run.provenance["sessions"][1]["from_generation"] >= 2
     assert outcome(run) == undisturbed
 
@@ -86,21 +86,21 @@ def test_results_come_through_an_object_store_where_nodes_do_not_see_the_campaig
     (folder,) = until(lambda: list(scratch.glob("conevo-*")))
     made = folder / "runs" / label / "generations.jsonl"
     until(lambda: made.is_file() and made.read_bytes().count(b"\n") > 2)
-    assert not campaign.places.run(label).exists()
+    assert not campaign.paths.run(label).exists()
     executor.stop()
     done = n_generations(campaign, label)
     assert 2 < done < 30
     standings = campaign.carry_on(RayCluster(2, store=bucket))
     assert {one.state for one in standings.values()} == {"finished"}
     assert list(scratch.glob("conevo-*")) == []
-    run = conevo.Run(campaign.places.run(label))
+    run = conevo.Run(campaign.paths.run(label))
     assert run.changed_files == []
     assert run.provenance["sessions"][1]["from_generation"] in (done - 1, done)  # records go first
     assert outcome(run) == undisturbed
     shutil.rmtree(scratch)
     for label in campaign.planned:
-        assert campaign.places.log(label).is_file()
-        assert campaign.places.ended(label).is_file()
+        assert campaign.paths.log(label).is_file()
+        assert campaign.paths.ended(label).is_file()
 
 
 def test_a_cluster_by_address_has_the_cores_of_its_nodes_and_survives_the_loss_of_one(
@@ -129,7 +129,7 @@ def test_a_cluster_by_address_has_the_cores_of_its_nodes_and_survives_the_loss_o
     finally:
         cluster.shutdown()
     assert ending.lost == ""
-    run = conevo.Run(campaign.places.run(label))
+    run = conevo.Run(campaign.paths.run(label))
     assert [one["threads"] for one in run.provenance["sessions"]] == [1, 1]
     assert outcome(run) == undisturbed
 

@@ -14,7 +14,7 @@ from campaigns.plans import tiny_campaign
 from campaigns.test_campaign import Scripted
 from conevo.campaigns.campaign import Campaign, Stopped, create
 from conevo.campaigns.executors.local import Serial
-from conevo.campaigns.work import carry_out
+from conevo.campaigns.worker import carry_out
 from conevo.errors import UsageError
 from conevo.runs.run import Run
 from runs.crashes import Crash, fail_at
@@ -49,9 +49,9 @@ def campaign(done: Path, tmp_path: Path) -> Campaign:
 def same_as(whole: Campaign, campaign: Campaign) -> bool:
     """Whether the runs, studies and lists of both are the same."""
     for label in whole.planned:
-        if content(campaign.places.run(label)) != content(whole.places.run(label)):
+        if content(campaign.paths.run(label)) != content(whole.paths.run(label)):
             return False
-        studies = [json.loads(one.places.study(label).read_text()) for one in (whole, campaign)]
+        studies = [json.loads(one.paths.study(label).read_text()) for one in (whole, campaign)]
         if studies[0] != studies[1]:
             return False
     return {k: v.run_ids for k, v in whole.planned.items()} == {
@@ -60,14 +60,14 @@ def same_as(whole: Campaign, campaign: Campaign) -> bool:
 
 
 def test_a_longer_plan_extends_every_run(campaign: Campaign, whole: Campaign) -> None:
-    tables = (campaign.places.tables / "tables.json").read_text()
+    tables = (campaign.paths.tables / "tables.json").read_text()
     longer = create(campaign.plan.at(settings=LONGER), campaign.path)
     assert {one.state for one in longer.standings().values()} == {"pending"}
     entries = longer.carry_on(Scripted())
     assert {one.state for one in entries.values()} == {"finished"}
     assert same_as(whole, longer)
-    assert (campaign.places.tables / "tables.json").read_text() != tables
-    ends = Run(longer.places.run(next(iter(longer.planned)))).provenance["extended"]
+    assert (campaign.paths.tables / "tables.json").read_text() != tables
+    ends = Run(longer.paths.run(next(iter(longer.planned)))).provenance["extended"]
     assert [end["generations"] for end in ends] == [2]
     again = Scripted()
     Campaign(campaign.path).carry_on(again)
@@ -75,12 +75,12 @@ def test_a_longer_plan_extends_every_run(campaign: Campaign, whole: Campaign) ->
 
 
 def test_a_shorter_plan_is_refused(campaign: Campaign) -> None:
-    before = campaign.places.runs.read_bytes()
+    before = campaign.paths.runs.read_bytes()
     with pytest.raises(UsageError, match=r"would be shorter in this plan .*= 1, planned: 2"):
         create(campaign.plan.at(settings={"run.generations": 1}), campaign.path)
     with pytest.raises(UsageError, match=r"shorter .*budget_evaluations = 5000, planned: no limit"):
         create(campaign.plan.at(settings={"run.budget_evaluations": 5000}), campaign.path)
-    assert campaign.places.runs.read_bytes() == before
+    assert campaign.paths.runs.read_bytes() == before
 
 
 def test_a_budget_that_adds_nothing_is_a_longer_plan_too(tmp_path: Path) -> None:
@@ -91,7 +91,7 @@ def test_a_budget_that_adds_nothing_is_a_longer_plan_too(tmp_path: Path) -> None
     entries = longer.carry_on(Scripted())
     assert {one.state for one in entries.values()} == {"finished"}
     for label, planned in longer.planned.items():
-        assert Run(longer.places.run(label)).provenance["run_id"] == planned.run_ids[0]
+        assert Run(longer.paths.run(label)).provenance["run_id"] == planned.run_ids[0]
 
 
 def test_a_new_plan_is_there_whole_or_not_at_all(
@@ -100,7 +100,7 @@ def test_a_new_plan_is_there_whole_or_not_at_all(
     new = tmp_path / "new"
     shutil.copytree(campaign.path, new)
     longer = create(campaign.plan.at(settings=LONGER), new)
-    plans = (campaign.places.plan.read_text(), longer.places.plan.read_text())
+    plans = (campaign.paths.plan.read_text(), longer.paths.plan.read_text())
     runs = [list(one.planned.values()) for one in (campaign, longer)]
     call, calls = 0, 1
     while call < calls:
@@ -115,9 +115,9 @@ def test_a_new_plan_is_there_whole_or_not_at_all(
         broken = Campaign(path)
         with broken.locked():
             broken.settle()
-        state = (broken.places.plan.read_text(), list(broken.planned.values()))
+        state = (broken.paths.plan.read_text(), list(broken.planned.values()))
         assert state in list(zip(plans, runs, strict=True)), call
-        assert not broken.places.extension.exists()
+        assert not broken.paths.extension.exists()
         shutil.rmtree(path)
         call += 1
     assert call >= 6
@@ -140,7 +140,7 @@ def test_a_worker_that_is_killed_while_it_extends_a_run_goes_on(
 
 def test_a_changed_run_fails_and_the_others_go_on(campaign: Campaign) -> None:
     label = next(iter(campaign.planned))
-    with (campaign.places.run(label) / "champion.npz").open("ab") as file:
+    with (campaign.paths.run(label) / "champion.npz").open("ab") as file:
         file.write(b"x")
     entries = create(campaign.plan.at(settings=LONGER), campaign.path).carry_on(Scripted())
     assert [one.state for one in entries.values()] == ["failed", *["finished"] * 3]

@@ -13,7 +13,7 @@ from conevo.campaigns.plan import Plan
 from conevo.campaigns.plan_file import read_plan
 from conevo.campaigns.progress import progress_of
 from conevo.campaigns.tables import Tables
-from conevo.campaigns.work import planned_runs
+from conevo.campaigns.worker import planned_runs
 from conevo.errors import UsageError
 from conevo.reading import read_json
 from conevo.report.files import write_report
@@ -150,11 +150,11 @@ def test_a_wrong_plan_is_one_clear_line(tmp_path: Path, old: str, new: str, word
 
 
 def test_both_stages_are_one_run_in_the_tables(campaign: Campaign, label: str) -> None:
-    first, second = Shaping(campaign.places.run(label)).stages
+    first, second = Shaping(campaign.paths.run(label)).stages
     one, two = first.generations(), second.generations()
     spent = one[-1]["team_evaluations"] + two[-1]["team_evaluations"]
     steps = one[-1]["team_steps"] + two[-1]["team_steps"]
-    with Tables(campaign.places.tables) as tables:
+    with Tables(campaign.paths.tables) as tables:
         assert tables.query("SELECT count(*) FROM runs")[1] == [(3,)]
         rows = tables.query(
             "SELECT method, variant, generations, planned_evaluations, evaluations, team_steps "
@@ -195,15 +195,15 @@ def test_the_report_compares_it_with_both(campaign: Campaign, tmp_path: Path) ->
 
 
 def test_the_second_stage_is_studied(campaign: Campaign, label: str) -> None:
-    found = read_json(campaign.places.study(label))
-    made = study(Run(campaign.places.run(f"{label}/stage-2")), threads=1)
+    found = read_json(campaign.paths.study(label))
+    made = study(Run(campaign.paths.run(f"{label}/stage-2")), threads=1)
     assert found == json.loads(as_json(made))
-    assert not campaign.places.study(f"{label}/stage-1").exists()
+    assert not campaign.paths.study(f"{label}/stage-1").exists()
 
 
 def test_its_progress_is_that_of_both_stages(campaign: Campaign, label: str) -> None:
-    found = progress_of(campaign.places, campaign.planned[label])
-    stages = Shaping(campaign.places.run(label)).stages
+    found = progress_of(campaign.paths, campaign.planned[label])
+    stages = Shaping(campaign.paths.run(label)).stages
     assert found.generations == sum(len(run.generations()) for run in stages)
     assert (found.of, found.budget) == (50, 60)
     assert found.share > 0.5
@@ -215,7 +215,7 @@ def test_stages_that_have_begun_keep_their_length(campaign: Campaign) -> None:
 
 
 def test_a_list_of_runs_that_an_earlier_version_wrote_is_read(campaign: Campaign) -> None:
-    lines = campaign.places.runs.read_text().splitlines()
+    lines = campaign.paths.runs.read_text().splitlines()
     earlier = [{k: v for k, v in json.loads(one).items() if k != "of_first"} for one in lines[:2]]
     root = campaign.path.parent / "earlier"
     root.mkdir()

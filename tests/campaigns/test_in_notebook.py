@@ -61,7 +61,7 @@ def test_without_a_finished_run_frames_are_empty_with_the_same_types(
         assert len(empty) == 0
         assert list(empty) == list(full)
     assert empty["generation"].dtype == full["generation"].dtype == "int32"
-    assert not other.places.tables.exists()
+    assert not other.paths.tables.exists()
 
 
 def test_without_pandas_it_is_one_line(campaign: Campaign, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -51,7 +51,7 @@ def test_a_moved_campaign_goes_on_without_the_files_of_its_plan(tmp_path: Path) 
     assert str(tmp_path) not in text
     longer = create(moved.plan.at(seeds=2), moved.path)
     assert carried_out(longer) == ["finished"] * 4
-    runs = [Run(longer.places.run(label)) for label in longer.planned]
+    runs = [Run(longer.paths.run(label)) for label in longer.planned]
     assert {run.outline.task for run in runs} == {"light-v1/dark-1"}
     assert all((run.path / "inputs" / "light.py").is_file() for run in runs)
 
@@ -61,13 +61,13 @@ def test_tables_and_reports_run_no_world_file(
 ) -> None:
     made = create(read_plan(light_plan(tmp_path / "plans")).at(seeds=1), tmp_path / "made")
     carried_out(made)
-    shutil.rmtree(made.places.tables)
+    shutil.rmtree(made.paths.tables)
     for file in (made.path / "inputs" / "light.py", *made.path.glob("runs/*/inputs/light.py")):
         file.write_text("raise SystemExit")
     again = Campaign(made.path)
     again.seal()
     rows = duckdb.sql(
-        f"SELECT task, n_robots, measure, code, changes FROM '{made.places.tables}/runs.parquet'"
+        f"SELECT task, n_robots, measure, code, changes FROM '{made.paths.tables}/runs.parquet'"
     ).fetchall()
     code = current_code().partition("(")[2].rstrip(")")
     assert rows == [("light-v1/dark-1", 3, "nearness", code, "")] * 2
@@ -116,11 +116,11 @@ def begun_by_another(folder: Path) -> Campaign:
     """Make a campaign of which half was made by another version."""
     made = create(read_plan(write_plan(folder / "plans", "studies = []")), folder / "made")
     carried_out(made)
-    made.places.code.write_text(json.dumps({"codes": [OTHER]}))
-    shutil.rmtree(made.places.tables)
+    made.paths.code.write_text(json.dumps({"codes": [OTHER]}))
+    shutil.rmtree(made.paths.tables)
     first, *_, last = made.planned
-    shutil.rmtree(made.places.run(last))
-    file = made.places.run(first) / "provenance.json"
+    shutil.rmtree(made.paths.run(last))
+    file = made.paths.run(first) / "provenance.json"
     about: dict[str, Any] = json.loads(file.read_text())
     for one in (about, *about["sessions"]):
         one |= {"conevo": "0.9.0", "code": "abc123abc123"}
@@ -143,17 +143,17 @@ def test_other_code_does_not_carry_a_campaign_on_unless_it_is_accepted(
     start = ["campaign", "start", str(made.path), "--executor", "serial", "--quiet"]
     with pytest.raises(SystemExit, match="0"):
         main([*start, "--accept-other-code"])
-    assert json.loads(made.places.code.read_text()) == {"codes": [OTHER, here]}
+    assert json.loads(made.paths.code.read_text()) == {"codes": [OTHER, here]}
     with pytest.raises(SystemExit, match="0"):
         main(start)
-    with Tables(made.places.tables) as tables:
+    with Tables(made.paths.tables) as tables:
         text = " ".join(overview(tables, made).text)
     assert "runs of rover-v2/complex-1 that are compared here were made by different code" in text
 
 
 def test_a_campaign_of_the_first_release_is_other_code(tmp_path: Path) -> None:
     made = begun_by_another(tmp_path)
-    made.places.code.unlink()
+    made.paths.code.unlink()
     file = next(made.path.glob("runs/*/provenance.json"))
     about = json.loads(file.read_text())
     del about["code"]

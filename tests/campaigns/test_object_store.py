@@ -11,7 +11,7 @@ import pytest
 import conevo
 from campaigns.plans import tiny_campaign
 from conevo.campaigns.object_store import ObjectStore
-from conevo.campaigns.work import carry_out
+from conevo.campaigns.worker import carry_out
 from conevo.errors import EnvironmentFailure, UsageError
 
 MORE = '[[where]]\nsettings = { "run.generations" = 9 }'
@@ -49,9 +49,9 @@ def begun(campaign, label):
     """Begin a run as a worker does, and leave it after two generations."""
     planned = campaign.planned[label]
     (config,) = planned.configs()
-    conevo.runs.run.start(config, campaign.places.run(label), threads=1)
-    advance(campaign.places.run(label), 2)
-    return campaign.places.run(label)
+    conevo.runs.run.start(config, campaign.paths.run(label), threads=1)
+    advance(campaign.paths.run(label), 2)
+    return campaign.paths.run(label)
 
 
 def outcome(path):
@@ -77,17 +77,17 @@ def undisturbed(campaign, label, tmp_path):
     """What the run comes to where nothing is copied."""
     folder = tmp_path / "undisturbed"
     folder.mkdir()
-    shutil.copy(campaign.places.runs, folder)
+    shutil.copy(campaign.paths.runs, folder)
     assert carry_out(folder, label, 1)
     return outcome(folder / "runs" / label)
 
 
 def test_a_finished_run_comes_back_as_it_was(campaign, label, store, tmp_path):
     assert carry_out(campaign.path, label, 1)
-    for path in (campaign.places.study(label), campaign.places.log(label)):
+    for path in (campaign.paths.study(label), campaign.paths.log(label)):
         path.parent.mkdir()
         path.write_text("{}")
-    (campaign.places.run(label) / "half.tmp").write_text("a draft")
+    (campaign.paths.run(label) / "half.tmp").write_text("a draft")
     store.put_plan(campaign.path)
     assert not store.has_run(label)
     store.put_run(campaign.path, label)
@@ -102,7 +102,7 @@ def test_a_finished_run_comes_back_as_it_was(campaign, label, store, tmp_path):
     }  # fmt: skip
     assert found <= known
     assert all((elsewhere / p).read_bytes() == (campaign.path / p).read_bytes() for p in found)
-    assert outcome(elsewhere / "runs" / label) == outcome(campaign.places.run(label))
+    assert outcome(elsewhere / "runs" / label) == outcome(campaign.paths.run(label))
 
 
 def test_what_is_fetched_takes_the_place_of_what_was_there(campaign, label, store):
@@ -117,7 +117,7 @@ def test_what_is_fetched_takes_the_place_of_what_was_there(campaign, label, stor
 
 def test_how_a_run_ended_is_forgotten_when_it_is_tried_again(campaign, label, store):
     store.forget_ending(campaign.path, label)
-    ended = campaign.places.ended(label)
+    ended = campaign.paths.ended(label)
     ended.parent.mkdir()
     ended.write_text("{}")
     store.put_run(campaign.path, label)

@@ -54,7 +54,7 @@ def say(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
 def test_it_is_next_to_the_others_and_nothing_of_its_file_is_run_to_show_it(
     made: Campaign, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    text = made.places.plan.read_text() + made.places.runs.read_text()
+    text = made.paths.plan.read_text() + made.paths.runs.read_text()
     assert "inputs/mine.py:random-search" in text
     assert str(made.path.parent) not in text
     for file in (made.path / "inputs" / "mine.py", *made.path.glob("runs/*/inputs/mine.py")):
@@ -64,7 +64,7 @@ def test_it_is_next_to_the_others_and_nothing_of_its_file_is_run_to_show_it(
     say(capsys, "report", str(made.path))
     page = (made.path / "report" / "index.html").read_text()
     assert "random search" in page
-    rows = duckdb.sql(f"SELECT method, title FROM '{made.places.tables}/runs.parquet'").fetchall()
+    rows = duckdb.sql(f"SELECT method, title FROM '{made.paths.tables}/runs.parquet'").fetchall()
     assert sorted(rows) == [("cone", "CONE"), ("random-search", "random search")]
     monkeypatch.setattr(registry, "_TITLES", {})
     seen = Watched([made.path]).snapshot()
@@ -76,7 +76,7 @@ def test_it_goes_on_from_the_campaigns_own_copy(made: Campaign) -> None:
     longer = create(made.plan.at(seeds=2), made.path)
     states = [one.state for one in longer.carry_on(make_executor("serial", 1)).values()]
     assert states == ["finished"] * 4
-    runs = [Run(longer.places.run(label)) for label in longer.planned]
+    runs = [Run(longer.paths.run(label)) for label in longer.planned]
     own = [run for run in runs if run.outline.method == "random-search"]
     assert [run.config.method_config.genotypes for run in own] == [7, 7]
     assert all((run.path / "inputs" / "mine.py").is_file() for run in own)

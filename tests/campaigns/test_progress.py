@@ -10,7 +10,7 @@ import conevo
 from campaigns.plans import tiny_campaign
 from conevo.campaigns.executors.registry import make_executor
 from conevo.campaigns.progress import RunProgress, last_written, progress_of
-from conevo.campaigns.work import carry_out
+from conevo.campaigns.worker import carry_out
 from conevo.runs.directory import Directory
 from watch.followed import record
 
@@ -33,13 +33,13 @@ def write_log(path, n, budget=0, more=""):
 
 def held(campaign, label):
     """Return a context in which a process is at work on a run."""
-    path = campaign.places.run(label)
+    path = campaign.paths.run(label)
     write_log(path, 3)
     return Directory(path, "run").locked()
 
 
 def write_ended(campaign, label, **changes):
-    path = campaign.places.ended(label)
+    path = campaign.paths.ended(label)
     path.parent.mkdir(exist_ok=True)
     text = {"status": "failed", "origin": "machine", "message": "no disk", "core_seconds": 1.5}
     path.write_text(json.dumps(text | changes))
@@ -87,7 +87,7 @@ def test_what_a_coordinator_knows_counts_for_more_than_what_a_worker_wrote(campa
 def test_a_coordinator_waits_for_runs_that_others_carry_out(campaign, is_finished_there):
     label = next(iter(campaign.planned))
     planned = campaign.planned[label]
-    run = conevo.runs.run.start(planned.configs()[0], campaign.places.run(label), threads=1)
+    run = conevo.runs.run.start(planned.configs()[0], campaign.paths.run(label), threads=1)
     hold = contextlib.ExitStack()
     hold.enter_context(Directory(run.path, "run").locked())
     endings = []
@@ -108,13 +108,13 @@ def test_a_coordinator_waits_for_runs_that_others_carry_out(campaign, is_finishe
 
 
 def test_a_worker_leaves_a_run_that_another_one_has(campaign, monkeypatch):
-    monkeypatch.setattr("conevo.campaigns.work.PATIENCE", 0.0)
+    monkeypatch.setattr("conevo.campaigns.worker.PATIENCE", 0.0)
     label = next(iter(campaign.planned))
     planned = campaign.planned[label]
-    run = conevo.runs.run.start(planned.configs()[0], campaign.places.run(label), threads=1)
+    run = conevo.runs.run.start(planned.configs()[0], campaign.paths.run(label), threads=1)
     with Directory(run.path, "run").locked():
         assert not carry_out(campaign.path, label, 1)
-    assert not campaign.places.ended(label).exists()  # that is for the other to write
+    assert not campaign.paths.ended(label).exists()  # that is for the other to write
 
 
 # --- how far --------------------------------------------------------------------------------------
@@ -126,35 +126,35 @@ def test_a_worker_leaves_a_run_that_another_one_has(campaign, monkeypatch):
 )
 def test_a_run_is_as_far_as_its_last_line_and_its_settings_say(campaign, n, budget, expected):
     label = next(iter(campaign.planned))
-    path = campaign.places.run(label)
+    path = campaign.paths.run(label)
     write_log(path, n, budget, more='{"generation": 99, "team_eval')
     os.utime(path / "generations.jsonl", (1000, 2000))
-    found = progress_of(campaign.places, campaign.planned[label])
+    found = progress_of(campaign.paths, campaign.planned[label])
     assert found == RunProgress(*expected, written=2000.0)
-    assert last_written(campaign.places, label) == 2000.0
+    assert last_written(campaign.paths, label) == 2000.0
 
 
 @pytest.mark.parametrize("line", ["{}", "[1]", '{"generation": "x"}', "[" * 40_000, "\x00"])
 def test_a_log_whose_last_line_is_damaged_counts_as_not_done(campaign, line):
     label = next(iter(campaign.planned))
-    write_log(campaign.places.run(label), 3, more=f"{line}\n")
-    found = progress_of(campaign.places, campaign.planned[label])
+    write_log(campaign.paths.run(label), 3, more=f"{line}\n")
+    found = progress_of(campaign.paths, campaign.planned[label])
     assert (found.generations, found.share, found.written) == (0, 0.0, None)
 
 
 @pytest.mark.parametrize("text", ["", "run = 3", "[run]\ngenerations = 0\nbudget_evaluations = 0"])
 def test_a_run_without_readable_settings_has_no_plan(campaign, text):
     label = next(iter(campaign.planned))
-    write_log(campaign.places.run(label), 3)
-    (campaign.places.run(label) / "config.toml").write_text(text)
-    found = progress_of(campaign.places, campaign.planned[label])
+    write_log(campaign.paths.run(label), 3)
+    (campaign.paths.run(label) / "config.toml").write_text(text)
+    found = progress_of(campaign.paths, campaign.planned[label])
     assert (found.generations, found.of, found.share) == (3, 0, 0.0)
 
 
 def test_a_run_that_has_not_begun_has_nothing(campaign):
     label = next(iter(campaign.planned))
-    assert progress_of(campaign.places, campaign.planned[label]) == NOTHING
-    assert last_written(campaign.places, label) is None
+    assert progress_of(campaign.paths, campaign.planned[label]) == NOTHING
+    assert last_written(campaign.paths, label) is None
 
 
 def test_a_shaping_is_as_far_as_its_stages(tmp_path):
@@ -166,7 +166,7 @@ def test_a_shaping_is_as_far_as_its_stages(tmp_path):
 
     campaign = create(read_plan(path), tmp_path / "c")
     ((label, planned),) = campaign.planned.items()
-    run = campaign.places.run(label)
+    run = campaign.paths.run(label)
     write_log(run / "stage-1", 10, 70)
     write_log(run / "stage-2", 5, 140)
     stages = "".join(
@@ -177,6 +177,6 @@ def test_a_shaping_is_as_far_as_its_stages(tmp_path):
     (run / "config.toml").unlink(missing_ok=True)
     os.utime(run / "stage-2" / "generations.jsonl", (1000, 2000))
     os.utime(run / "stage-1" / "generations.jsonl", (1000, 1000))
-    found = progress_of(campaign.places, planned)
+    found = progress_of(campaign.paths, planned)
     assert found == RunProgress(15, 20, 105, 210, 0.75, 2000.0)
-    assert last_written(campaign.places, label) == 2000.0
+    assert last_written(campaign.paths, label) == 2000.0

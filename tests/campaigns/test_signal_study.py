@@ -33,22 +33,22 @@ def campaign(tmp_path_factory: pytest.TempPathFactory) -> Campaign:
 
 
 def test_a_study_that_a_plan_gets_later_is_all_that_is_missing(campaign) -> None:
-    before = {name: campaign.places.run(name) / "DONE" for name in campaign.planned}
+    before = {name: campaign.paths.run(name) / "DONE" for name in campaign.planned}
     sealed = {name: path.stat().st_mtime_ns for name, path in before.items()}
     assert not any(campaign.is_finished(label) for label in campaign.planned)
     campaign.carry_on(Serial(1))
     assert all(campaign.is_finished(label) for label in campaign.planned)
     assert {name: path.stat().st_mtime_ns for name, path in before.items()} == sealed
     for label in campaign.planned:
-        study = read_json(campaign.places.study(label, "signal"))
-        run = Run(campaign.places.run(label))
+        study = read_json(campaign.paths.study(label, "signal"))
+        run = Run(campaign.paths.run(label))
         assert study == signal_of_run(run, threads=1) | {"not_measured": ""}
-        assert not campaign.places.study(label).exists()
-    with Tables(campaign.places.tables) as tables:
+        assert not campaign.paths.study(label).exists()
+    with Tables(campaign.paths.tables) as tables:
         for label in campaign.planned:
             columns = [name for name in SCHEMA["signal"] if name != "run"]
             sql = f"SELECT {', '.join(columns)} FROM signal WHERE run = '{label}' ORDER BY ALL"
-            study = read_json(campaign.places.study(label, "signal"))["signal"]
+            study = read_json(campaign.paths.study(label, "signal"))["signal"]
             rows = [tuple(row[name] for name in columns) for row in study]
             assert tables.query(sql)[1] == rows
         sections = sections_of(tables, campaign)
@@ -69,8 +69,8 @@ settings = {{ "method.genotypes" = 6 }}
     campaign.carry_on(Serial(1))
     (label,) = campaign.planned
     assert campaign.is_finished(label)
-    study = json.loads(campaign.places.study(label, "signal").read_text())
+    study = json.loads(campaign.paths.study(label, "signal").read_text())
     assert study["signal"] == []
     assert study["not_measured"].startswith("Team ES has no populations")
-    with Tables(campaign.places.tables) as tables:
+    with Tables(campaign.paths.tables) as tables:
         assert tables.query("SELECT count(*) FROM signal")[1] == [(0,)]

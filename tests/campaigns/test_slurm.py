@@ -49,7 +49,7 @@ def test_the_tasks_carry_out_all_runs_and_the_campaign_finds_them(tmp_path, task
     assert {path: path.stat().st_mtime_ns for path in before} == before
     standings = campaign.carry_on(make_executor("processes", 1))
     assert {one.state for one in standings.values()} == {"finished"}
-    assert [len(conevo.Run(campaign.places.run(n)).provenance["sessions"]) for n in standings] == [
+    assert [len(conevo.Run(campaign.paths.run(n)).provenance["sessions"]) for n in standings] == [
         1, 1, 1, 1,
     ]  # fmt: skip
 
@@ -65,7 +65,7 @@ def test_a_task_whose_time_is_up_lets_its_worker_leave_and_goes_back_into_the_qu
     assert job.wait(60) == 0
     assert (tmp_path / "said.txt").read_text() == "requeue 77_0\n"
     assert workers(campaign.path) == {}
-    run = conevo.Run(campaign.places.run(label))
+    run = conevo.Run(campaign.paths.run(label))
     assert run.status == "interrupted"
     done = len(run.generations())
     job = task(script, 0)
@@ -127,10 +127,10 @@ def test_what_the_array_asks_for_is_what_was_said(tmp_path):
 
 def test_a_run_that_was_finished_and_is_to_go_on_is_not_passed_over(tmp_path):
     campaign = tiny_campaign(tmp_path)
-    ended = campaign.places.ended("a")
+    ended = campaign.paths.ended("a")
     ended.parent.mkdir()
     ended.write_text('{"status": "finished"}')
-    failed = campaign.places.ended("b")
+    failed = campaign.paths.ended("b")
     failed.write_text('{"status": "failed"}')
     slurm.write_array(campaign.path, ["a", "b"])
     assert (ended.exists(), failed.exists()) == (False, True)

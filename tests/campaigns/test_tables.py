@@ -11,7 +11,7 @@ import pytest
 from campaigns.plans import tiny_campaign
 from conevo.campaigns.campaign import Campaign
 from conevo.campaigns.executors.local import Serial
-from conevo.campaigns.places import Places
+from conevo.campaigns.paths import Paths
 from conevo.campaigns.schema import SCHEMA
 from conevo.campaigns.sealing import seal_tables
 from conevo.campaigns.tables import Tables
@@ -38,7 +38,7 @@ def campaign(tmp_path_factory):
 
 @pytest.fixture
 def tables(campaign):
-    with Tables(campaign.places.tables) as opened:
+    with Tables(campaign.paths.tables) as opened:
         yield opened
 
 
@@ -49,7 +49,7 @@ def test_every_run_has_its_row_as_it_was(campaign, tables):
     )
     assert [row[0] for row in rows] == sorted(campaign.planned)
     for row in rows:
-        run = Run(campaign.places.run(row[0]))
+        run = Run(campaign.paths.run(row[0]))
         last = run.generations()[-1]
         assert row[1:] == (
             run.config.method,
@@ -74,7 +74,7 @@ def test_costs_of_all_attempts_count(campaign, tables):
 
 def test_scores_are_those_of_the_testing_phase(campaign, tables):
     for label in campaign.planned:
-        tested = Run(campaign.places.run(label)).test_result
+        tested = Run(campaign.paths.run(label)).test_result
         for team, title in (("champion", "champion"), ("generation_0", "generation 0")):
             for measure, values in tested[team]["performance"].items():
                 _, rows = tables.query(
@@ -86,7 +86,7 @@ def test_scores_are_those_of_the_testing_phase(campaign, tables):
 
 def test_champions_are_those_of_the_validation(campaign, tables):
     for label in campaign.planned:
-        run = Run(campaign.places.run(label))
+        run = Run(campaign.paths.run(label))
         columns, rows = tables.query(f"SELECT * FROM champions WHERE run = '{label}'")
         about = run.test_result["validation"]
         expected = [
@@ -107,16 +107,16 @@ def test_champions_are_those_of_the_validation(campaign, tables):
 
 
 def test_a_value_that_is_not_finite_keeps_its_scenario(campaign, tmp_path):
-    places = Places(shutil.copytree(campaign.path, tmp_path / "copy"))
+    paths = Paths(shutil.copytree(campaign.path, tmp_path / "copy"))
     label = min(campaign.planned)
-    path = places.run(label) / "test.json"
+    path = paths.run(label) / "test.json"
     test = read_json(path)
     test["champion"]["performance"]["value"]["values"][1] = None
     path.write_text(json.dumps(test))
-    Store(places.run(label)).seal()
-    shutil.rmtree(places.tables)
-    seal_tables(places, list(campaign.planned.values()), {})
-    with Tables(places.tables) as opened:
+    Store(paths.run(label)).seal()
+    shutil.rmtree(paths.tables)
+    seal_tables(paths, list(campaign.planned.values()), {})
+    with Tables(paths.tables) as opened:
         _, rows = opened.query(
             f"SELECT scenario, value FROM scores WHERE run = '{label}' AND study = 'test' "
             "AND team = 'champion' AND measure = 'value' ORDER BY scenario"
@@ -126,7 +126,7 @@ def test_a_value_that_is_not_finite_keeps_its_scenario(campaign, tmp_path):
 
 def test_generations_and_castes_are_those_of_the_log(campaign, tables):
     for label in campaign.planned:
-        for record in Run(campaign.places.run(label)).generations():
+        for record in Run(campaign.paths.run(label)).generations():
             where = f"WHERE run = '{label}' AND generation = {record['generation']}"
             _, rows = tables.query(
                 f"SELECT evaluations, value, fitness, specialization, sst, gst, recombinations, "
@@ -150,7 +150,7 @@ def test_generations_and_castes_are_those_of_the_log(campaign, tables):
 
 def test_studies_are_kept_whole(campaign, tables):
     for label in campaign.planned:
-        study = read_json(campaign.places.study(label))
+        study = read_json(campaign.paths.study(label))
         for table in ("robots", "actions", "behaviours"):
             columns = [name for name in SCHEMA[table] if name != "run"]
             _, rows = tables.query(f"SELECT {', '.join(columns)} FROM {table} WHERE run='{label}'")
@@ -166,13 +166,13 @@ def test_studies_are_kept_whole(campaign, tables):
 def test_studies_of_earlier_versions_have_no_favourites_and_are_reported(campaign, tmp_path):
     copy = Campaign(shutil.copytree(campaign.path, tmp_path / "copy"))
     old, *new = copy.planned
-    study = read_json(copy.places.study(old))
+    study = read_json(copy.paths.study(old))
     first = ("robot", "caste", "specialization", "fitness", "hidden")
     study["robots"] = [{name: row[name] for name in first} for row in study["robots"]]
-    copy.places.study(old).write_text(json.dumps(study))
-    shutil.rmtree(copy.places.tables)
+    copy.paths.study(old).write_text(json.dumps(study))
+    shutil.rmtree(copy.paths.tables)
     copy.seal()
-    with Tables(copy.places.tables) as tables:
+    with Tables(copy.paths.tables) as tables:
         sql = "SELECT DISTINCT run FROM robots WHERE relative IS {} ORDER BY ALL"
         assert tables.query(sql.format("NULL"))[1] == [(old,)]
         assert tables.query(sql.format("NOT NULL"))[1] == [(label,) for label in sorted(new)]
@@ -182,28 +182,28 @@ def test_studies_of_earlier_versions_have_no_favourites_and_are_reported(campaig
 
 
 def test_tables_are_made_again_only_when_more_is_finished(campaign):
-    made = (campaign.places.tables / "runs.parquet").stat().st_mtime_ns
+    made = (campaign.paths.tables / "runs.parquet").stat().st_mtime_ns
     campaign.seal()
-    assert (campaign.places.tables / "runs.parquet").stat().st_mtime_ns == made
-    manifest = campaign.places.tables / "tables.json"
+    assert (campaign.paths.tables / "runs.parquet").stat().st_mtime_ns == made
+    manifest = campaign.paths.tables / "tables.json"
     found = json.loads(manifest.read_text())
     assert sorted(found["runs"]) == sorted(campaign.planned)
     found["runs"].popitem()
     manifest.write_text(json.dumps(found))
     campaign.seal()
-    assert (campaign.places.tables / "runs.parquet").stat().st_mtime_ns != made
+    assert (campaign.paths.tables / "runs.parquet").stat().st_mtime_ns != made
     assert not list(campaign.path.glob(".tables*"))
 
 
 @pytest.mark.parametrize("table", ["runs", "generations", "scores"])
 def test_a_table_that_is_lost_is_made_again(campaign, table):
-    path = campaign.places.tables / f"{table}.parquet"
-    with Tables(campaign.places.tables) as opened:
+    path = campaign.paths.tables / f"{table}.parquet"
+    with Tables(campaign.paths.tables) as opened:
         before = opened.query(f"SELECT count(*) FROM {table}")
     path.unlink()
     assert not campaign.is_sealed
     campaign.seal()
-    with Tables(campaign.places.tables) as opened:
+    with Tables(campaign.paths.tables) as opened:
         assert opened.query(f"SELECT count(*) FROM {table}") == before
     path.unlink()
     os.mkfifo(path)
@@ -213,9 +213,9 @@ def test_a_table_that_is_lost_is_made_again(campaign, table):
 
 def test_a_damaged_run_is_left_out_and_the_rest_is_reported(campaign, tmp_path):
     copy = Campaign(shutil.copytree(campaign.path, tmp_path / "copy"))
-    shutil.rmtree(copy.places.tables)
+    shutil.rmtree(copy.paths.tables)
     damaged, ended = list(copy.planned)[:2]
-    test = copy.places.run(damaged) / "test.json"
+    test = copy.paths.run(damaged) / "test.json"
     whole = test.read_text()
     test.write_text(whole.replace('"labels"', '"lables"'))
     for name, content in (
@@ -224,10 +224,10 @@ def test_a_damaged_run_is_left_out_and_the_rest_is_reported(campaign, tmp_path):
         ("random", bytes(range(256))),
         ("nested", b"[" * 50_000),
     ):
-        copy.places.ended(name).write_bytes(content)
-    os.mkfifo(copy.places.ended("pipe"))
+        copy.paths.ended(name).write_bytes(content)
+    os.mkfifo(copy.paths.ended("pipe"))
     copy.seal()
-    with Tables(copy.places.tables) as tables:
+    with Tables(copy.paths.tables) as tables:
         runs = [run for (run,) in tables.query("SELECT run FROM runs")[1]]
     assert sorted(runs) == sorted(set(copy.planned) - {damaged})
     names = (ended, "utf-16", "random", "nested", "pipe")
@@ -240,7 +240,7 @@ def test_a_damaged_run_is_left_out_and_the_rest_is_reported(campaign, tmp_path):
     assert all(file in text and html.escape(why) in text for file, why in unread.items())
     test.write_text(whole)  # as soon as it is whole it counts
     copy.seal()
-    with Tables(copy.places.tables) as tables:
+    with Tables(copy.paths.tables) as tables:
         assert tables.query("SELECT count(*) FROM runs")[1] == [(len(copy.planned),)]
 
 
@@ -254,14 +254,14 @@ def test_a_damaged_run_is_left_out_and_the_rest_is_reported(campaign, tmp_path):
 )
 def test_a_run_that_was_changed_is_left_out(campaign, tmp_path, file, old, new):
     copy = Campaign(shutil.copytree(campaign.path, tmp_path / "copy"))
-    shutil.rmtree(copy.places.tables)
+    shutil.rmtree(copy.paths.tables)
     label = list(copy.planned)[1]
-    path = copy.places.run(label) / file
+    path = copy.paths.run(label) / file
     whole = path.read_text()
     assert old in whole
     path.write_text(whole.replace(old, new, 1))
     copy.seal()
-    with Tables(copy.places.tables) as tables:
+    with Tables(copy.paths.tables) as tables:
         runs = [run for (run,) in tables.query("SELECT run FROM runs")[1]]
     assert sorted(runs) == sorted(set(copy.planned) - {label})
     assert unread_of(write_report(copy, tmp_path / "report")) == {

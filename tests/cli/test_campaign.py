@@ -8,7 +8,7 @@ import pytest
 import tomli_w
 
 from campaigns.plans import tiny_campaign, write_plan
-from conevo.campaigns import work
+from conevo.campaigns import worker
 from conevo.cli.main import main
 from watch.followed import record, tables
 from worlds.test_outside import written
@@ -198,9 +198,9 @@ def test_the_programs_own_failure_is_recorded_with_its_place(tmp_path, monkeypat
 
     campaign = tiny_campaign(tmp_path)
     label = next(iter(campaign.planned))
-    monkeypatch.setattr(work, "start", fail)
-    assert not work.carry_out(campaign.path, label, 1)
-    ended = json.loads(campaign.places.ended(label).read_text())
+    monkeypatch.setattr(worker, "start", fail)
+    assert not worker.carry_out(campaign.path, label, 1)
+    ended = json.loads(campaign.paths.ended(label).read_text())
     line = fail.__code__.co_firstlineno + 1
     assert ended["message"] == f"ValueError('boom') in fail ({__file__}:{line})"
 
@@ -286,12 +286,12 @@ def test_status_shows_runs_that_slurm_tasks_or_a_resume_carry_out(conevo, tmp_pa
     campaign = tiny_campaign(tmp_path / "campaigns")
     first, second, *_ = campaign.planned
     for label, n in ((first, 1), (second, 0)):
-        path = campaign.places.run(label)
+        path = campaign.paths.run(label)
         path.mkdir(parents=True)
         (path / "config.toml").write_text(tomli_w.dumps(tables(generations=2)))
         lines = [f"{json.dumps(record(k, team_evaluations=9))}\n" for k in range(n)]
         (path / "generations.jsonl").write_text("".join(lines))
-    with Directory(campaign.places.run(first), "run").locked():
+    with Directory(campaign.paths.run(first), "run").locked():
         code, out, _ = conevo("campaign", "status", "tiny", "--runs")
         found = json.loads(conevo("campaign", "status", "tiny", "--json")[1])
     assert code == 0

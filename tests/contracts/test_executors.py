@@ -97,7 +97,7 @@ def outcome(run):
 
 
 def run_of(campaign, label):
-    return conevo.Run(campaign.places.run(label))
+    return conevo.Run(campaign.paths.run(label))
 
 
 def coordinate(campaign, name):
@@ -148,7 +148,7 @@ def test_every_run_is_carried_out_once(name, campaign, undisturbed):
     assert_finished(made, undisturbed)
     for label in made.planned:
         assert len(run_of(made, label).provenance["sessions"]) == 1
-        ended = read_json(made.places.ended(label))
+        ended = read_json(made.paths.ended(label))
         assert ended["status"] == "finished"
         assert 0 < ended["core_seconds"] < 60
     assert workers(made.path) == {}

@@ -84,7 +84,7 @@ def build(folder: Path) -> None:
     shaped.resume(threads=1)
     campaign = tiny_campaign(folder, 'studies = ["teams", "signal"]')
     campaign.carry_on(Serial(1))
-    report = campaign.places.report
+    report = campaign.paths.report
     report.mkdir()
     (report / "manifest.json").write_text('{"files": {}}')  # as of a report of nothing
     record(run, threads=1).save(folder / "epoch.npz")

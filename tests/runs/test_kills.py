@@ -133,8 +133,8 @@ def test_campaigns(seed: int, tmp_path: Path) -> None:
     whole, killed = Campaign(tmp_path / "whole"), Campaign(path)
     assert {entry.state for entry in killed.standings().values()} == {"finished"}
     for label in whole.planned:
-        assert content(killed.places.run(label)) == content(whole.places.run(label))
-        studies = [one.places.study(label).read_bytes() for one in (whole, killed)]
+        assert content(killed.paths.run(label)) == content(whole.paths.run(label))
+        studies = [one.paths.study(label).read_bytes() for one in (whole, killed)]
         assert studies[0] == studies[1]
 
 

@@ -26,10 +26,10 @@ def labels_of(campaign):
 
 def test_runs_of_a_campaign_stand_as_its_ledger_and_their_files_say(campaign):
     homcne_1, mesp_1, homcne_2, _ = labels_of(campaign)
-    write_run(campaign.places.run(homcne_1), 4, is_finished=True, method="homcne", generations=4)
+    write_run(campaign.paths.run(homcne_1), 4, is_finished=True, method="homcne", generations=4)
     campaign.ledger.end(homcne_1, "finished", core_seconds=8.0)
     plan_run(campaign, homcne_1)
-    write_run(campaign.places.run(mesp_1), 2, method="mesp", generations=4)
+    write_run(campaign.paths.run(mesp_1), 2, method="mesp", generations=4)
     campaign.ledger.begin(mesp_1, 1, time.time() - 3.0)
     campaign.ledger.end(homcne_2, "failed", "out of luck")
     watched = Watched([campaign.path])
@@ -52,13 +52,13 @@ def test_runs_of_a_campaign_stand_as_its_ledger_and_their_files_say(campaign):
         "pending",
     ]
     assert (state["groups"][0]["running"], state["groups"][0]["ends_at"]) == (False, None)
-    with at_work(campaign.places.run(mesp_1)):  # a worker that outlived it
+    with at_work(campaign.paths.run(mesp_1)):  # a worker that outlived it
         assert watched.snapshot()["runs"][1]["status"] == "running"
 
 
 def plan_run(campaign, label):
     """Let a run be the one that is planned."""
-    file = campaign.places.run(label) / "provenance.json"
+    file = campaign.paths.run(label) / "provenance.json"
     about = json.loads(file.read_text()) | {"run_id": campaign.planned[label].run_ids[0]}
     file.write_text(json.dumps(about | {"finished": "now", "stopped_by": "generations"}))
 
@@ -67,7 +67,7 @@ def test_a_finished_run_that_is_not_in_the_ledger_yet_is_finished(campaign):
     label = labels_of(campaign)[0]
     watched = Watched([campaign.path])
     assert by_label(watched)[label]["status"] == "pending"
-    path = write_run(campaign.places.run(label), 4, method="homcne", generations=4)
+    path = write_run(campaign.paths.run(label), 4, method="homcne", generations=4)
     assert by_label(watched)[label]["status"] == "interrupted"
     plan_run(campaign, label)
     (path / "DONE").write_text("{}")

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable
 
-from conevo.campaigns.places import Places
+from conevo.campaigns.paths import Paths
 from conevo.errors import UsageError
 from conevo.reading import DamagedFile, read_json
 from conevo.runs.code import current_code, last_code
@@ -19,11 +19,11 @@ from conevo.terms import quoted
 __all__ = ["admit_code", "admitted_codes"]
 
 
-def admit_code(places: Places, labels: Iterable[str], accept: bool = False) -> None:
+def admit_code(paths: Paths, labels: Iterable[str], accept: bool = False) -> None:
     """Let this conevo carry a campaign on.
 
     Args:
-        places: of the campaign.
+        paths: of the campaign.
         labels: of its runs; the first code is admitted while none of them has begun.
         accept: admit it although others have begun the campaign.
 
@@ -31,31 +31,31 @@ def admit_code(places: Places, labels: Iterable[str], accept: bool = False) -> N
         UsageError: it was begun by other code, and this one is not accepted.
         EnvironmentFailure: ``code.json`` cannot be written.
     """
-    here, codes = current_code(), admitted_codes(places)
+    here, codes = current_code(), admitted_codes(paths)
     if here in codes:
         return
     if not codes:  # not begun, or by conevo 0.1.0
-        runs = [places.run(label) for label in labels]
+        runs = [paths.run(label) for label in labels]
         files = [file for run in runs for file in run.glob("**/provenance.json")]
         codes = sorted({last_code(read_json(file)) for file in files} - {here})
     if codes and not accept:
         raise UsageError(
-            f"{places.root} was begun by conevo {', '.join(codes)}, and this is {here}, which may "
+            f"{paths.root} was begun by conevo {', '.join(codes)}, and this is {here}, which may "
             f"give other results: use that version, or continue with 'conevo campaign start "
-            f"{quoted(places.root)} --accept-other-code'"
+            f"{quoted(paths.root)} --accept-other-code'"
         )
-    replace_file(places.code, json.dumps({"codes": [*codes, here]}, indent=1).encode() + b"\n")
+    replace_file(paths.code, json.dumps({"codes": [*codes, here]}, indent=1).encode() + b"\n")
 
 
-def admitted_codes(places: Places) -> list[str]:
+def admitted_codes(paths: Paths) -> list[str]:
     """Return the versions, each with its code, that may carry a campaign on; none if not begun.
 
     Raises:
         UsageError: the list is damaged.
     """
-    if not places.code.is_file():
+    if not paths.code.is_file():
         return []
-    codes = read_json(places.code).get("codes")
+    codes = read_json(paths.code).get("codes")
     if not isinstance(codes, list) or not all(isinstance(code, str) for code in codes):
-        raise DamagedFile(f"{places.code} is damaged: codes must be a list of texts")
+        raise DamagedFile(f"{paths.code} is damaged: codes must be a list of texts")
     return codes

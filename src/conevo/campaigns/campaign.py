@@ -37,11 +37,11 @@ from conevo.campaigns.executors.protocol import Ending, Executor, RunJob
 from conevo.campaigns.extension import check_plan, settle, texts_of, write_plan
 from conevo.campaigns.inputs import located
 from conevo.campaigns.ledger import Entry, Ledger
-from conevo.campaigns.places import Places
+from conevo.campaigns.paths import Paths
 from conevo.campaigns.plan import Plan, PlannedRun
 from conevo.campaigns.plan_file import read_plan
 from conevo.campaigns.progress import is_held
-from conevo.campaigns.work import planned_runs
+from conevo.campaigns.worker import planned_runs
 from conevo.errors import UsageError, unknown_name
 from conevo.reading import read_json
 from conevo.runs.directory import Directory, appearing
@@ -76,7 +76,7 @@ def check(plan: Plan, path: Path) -> list[PlannedRun]:
         UsageError: a run that cannot be, or ``path`` holds a campaign that this does not extend.
     """
     runs = plan.write_out()
-    if is_there(Places(path).plan):
+    if is_there(Paths(path).plan):
         check_plan(Campaign(path), {run.label: run for run in runs})
     return runs
 
@@ -100,11 +100,11 @@ def create(plan: Plan, path: Path, accept_other_code: bool = False) -> Campaign:
     plan = plan.mapped(lambda value: located(value, Path.cwd()))
     runs = check(plan, path)
     _build_worlds(runs)
-    if not is_there(Places(path).plan):
+    if not is_there(Paths(path).plan):
         with appearing(path) as draft:
-            places, texts = Places(draft), texts_of(plan, runs, draft)
-            replace_file(places.plan, texts["plan"].encode())
-            replace_file(places.runs, texts["runs"].encode())
+            paths, texts = Paths(draft), texts_of(plan, runs, draft)
+            replace_file(paths.plan, texts["plan"].encode())
+            replace_file(paths.runs, texts["runs"].encode())
         return Campaign(path)
     campaign = Campaign(path)
     with campaign.locked():
@@ -150,19 +150,19 @@ class Campaign:
     def __init__(self, path: str | Path) -> None:
         self._directory = Directory(Path(path), "campaign")
         self.path = self._directory.path
-        self.places = Places(self.path)
+        self.paths = Paths(self.path)
         self._load()
-        self.ledger = Ledger(self.places.ledger)
+        self.ledger = Ledger(self.paths.ledger)
         self.locked = self._directory.locked
 
     def _load(self) -> None:
-        self.plan: Plan = read_plan(self.places.plan)
+        self.plan: Plan = read_plan(self.paths.plan)
         self.planned: dict[str, PlannedRun] = planned_runs(self.path)
         self._shorter: set[str] | None = None  # runs that had not the planned length when found
 
     def settle(self) -> None:
         """Put a new plan in place that a killed process has left; the lock is held."""
-        settle(self.places)
+        settle(self.paths)
         self._load()
 
     def __repr__(self) -> str:
@@ -209,7 +209,7 @@ class Campaign:
 
     def is_finished(self, label: str) -> bool:
         """Whether a run is sealed, has the planned length, and is studied."""
-        if not ((self.places.run(label) / "DONE").is_file() and self._is_studied(label)):
+        if not ((self.paths.run(label) / "DONE").is_file() and self._is_studied(label)):
             return False
         if self._shorter is None:
             self._shorter = {one for one in self.planned if self._is_shorter(one)}
@@ -217,7 +217,7 @@ class Campaign:
 
     def _is_shorter(self, label: str) -> bool:
         """Whether a sealed run has another length than the plan, which was extended meanwhile."""
-        planned, path = self.planned[label], self.places.run(label)
+        planned, path = self.planned[label], self.paths.run(label)
         if planned.in_stages or not (path / "DONE").is_file():
             return False
         return read_json(path / "provenance.json").get("run_id") != planned.run_ids[0]
@@ -225,7 +225,7 @@ class Campaign:
     def _is_studied(self, label: str) -> bool:
         planned = self.planned[label]
         return all(
-            self.places.study(name, kind).is_file()
+            self.paths.study(name, kind).is_file()
             for name in planned.names
             for kind in planned.studies
         )
@@ -244,7 +244,7 @@ class Campaign:
             entry = known.get(label, Entry(label))
             if self.is_finished(label):
                 entry = dataclasses.replace(entry, state="finished")
-            elif is_held(self.places, label):
+            elif is_held(self.paths, label):
                 entry = dataclasses.replace(entry, state="running")
             elif entry.state == "finished" or (entry.state == "running" and not is_coordinated):
                 entry = dataclasses.replace(entry, state="pending")
@@ -255,7 +255,7 @@ class Campaign:
 
     def _ended_alone(self, entry: Entry) -> Entry:
         """Return what is known of a run whose end no coordinator has seen."""
-        ended = read_ended(self.places.ended(entry.label))
+        ended = read_ended(self.paths.ended(entry.label))
         if ended is None or ended["status"] != "failed":
             return entry
         return dataclasses.replace(entry, state="failed", reason=ended["message"])
@@ -266,7 +266,7 @@ class Campaign:
         Raises:
             UsageError: other code has begun it, and this one is not accepted.
         """
-        admit_code(self.places, self.planned, accept)
+        admit_code(self.paths, self.planned, accept)
 
     def stop(self) -> None:
         """Ask the coordinator to stop: its workers write their checkpoints and leave.
@@ -278,7 +278,7 @@ class Campaign:
             raise UsageError(
                 f"{self.path} is not running; see 'conevo campaign status {quoted(self.path)}'"
             )
-        replace_file(self.places.stop, b"")
+        replace_file(self.paths.stop, b"")
 
     def retry(self) -> list[str]:
         """Let every failed run wait again, and return their labels.
@@ -291,7 +291,7 @@ class Campaign:
             self._reconcile()
             failed = [label for label, one in self.standings().items() if one.state == "failed"]
             for label in failed:
-                self.places.ended(label).unlink(missing_ok=True)
+                self.paths.ended(label).unlink(missing_ok=True)
             self.ledger.put(failed, "pending", "to be tried again")
         return failed
 
@@ -329,7 +329,7 @@ class Campaign:
             left = [run for label, run in self.planned.items() if not self.is_finished(label)]
             with suppress(UsageError):  # of a world: its runs record that
                 _build_worlds(left)
-            self.places.stop.unlink(missing_ok=True)
+            self.paths.stop.unlink(missing_ok=True)
             self._reconcile()
             try:
                 least = min(threads, executor.cores)
@@ -338,7 +338,7 @@ class Campaign:
                 executor.stop()
                 self.ledger.release()
                 self._reconcile()
-                self.places.stop.unlink(missing_ok=True)
+                self.paths.stop.unlink(missing_ok=True)
             self.seal()
         return self.standings()
 
@@ -347,7 +347,7 @@ class Campaign:
         """Whether its tables are those of all that is finished."""
         from conevo.campaigns.sealing import is_sealed
 
-        return is_sealed(self.places, self._finished)
+        return is_sealed(self.paths, self._finished)
 
     @property
     def _finished(self) -> list[PlannedRun]:
@@ -363,7 +363,7 @@ class Campaign:
             from conevo.campaigns.sealing import seal_tables  # loads numpy
 
             spent = {entry.label: entry.core_seconds for entry in self.ledger.entries()}
-            seal_tables(self.places, finished, spent, into)
+            seal_tables(self.paths, finished, spent, into)
 
     def _reconcile(self) -> None:
         """Make the ledger say what the directories say."""
@@ -400,21 +400,21 @@ class Campaign:
                 waiting.remove(job.label)
                 at_work[job.label] = job
                 free -= share
-                self.places.ended(job.label).unlink(missing_ok=True)
+                self.paths.ended(job.label).unlink(missing_ok=True)
                 self.ledger.begin(job.label, share, time.time())
                 executor.submit(job)
             if waiting and not at_work:
                 time.sleep(LOOK)  # others carry out what is left
             for ending in executor.wait(LOOK) if at_work else ():
                 del at_work[ending.label]
-                if limit.is_over and not (self.places.ended(ending.label).is_file() or ending.lost):
+                if limit.is_over and not (self.paths.ended(ending.label).is_file() or ending.lost):
                     waiting.appendleft(ending.label)  # it stopped in time
                     continue
                 if self._settle(ending) == "pending":
                     waiting.appendleft(ending.label)
                 if watch is not None:
                     watch(self, ending)
-            if self.places.stop.is_file():
+            if self.paths.stop.is_file():
                 raise Stopped("stopped")
             if limit.is_over and (waiting or at_work):
                 raise Stopped("time limit reached")
@@ -434,16 +434,16 @@ class Campaign:
             if self.is_finished(label):
                 waiting.remove(label)
                 self.ledger.put([label], "finished", "found finished")
-            elif not is_held(self.places, label):
+            elif not is_held(self.paths, label):
                 free.append(label)
         return free
 
     def _settle(self, ending: Ending) -> str:
         """Write down how a worker ended, and return the state of its run."""
-        label, path = ending.label, self.places.ended(ending.label)
+        label, path = ending.label, self.paths.ended(ending.label)
         attempts = 1 + next(e.attempts for e in self.ledger.entries() if e.label == label)
         if (ended := read_ended(path)) is None:
-            lost = ending.lost or f"worker exited without reporting; see {self.places.log(label)}"
+            lost = ending.lost or f"worker exited without reporting; see {self.paths.log(label)}"
             state = "pending" if attempts < ATTEMPTS else "failed"
             self.ledger.end(label, state, f"{lost} (attempt {attempts} of {ATTEMPTS})")
             return state

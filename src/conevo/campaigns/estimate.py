@@ -37,7 +37,7 @@ def remaining_seconds(
     running = [label for label, entry in entries.items() if entry.state == "running"]
     if not known:
         for label in running:
-            share = progress_of(campaign.places, planned[label]).share
+            share = progress_of(campaign.paths, planned[label]).share
             passed = _passed(entries[label], at)
             if share > 0 and passed > 0:
                 for key in _keys(campaign, label):

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from conevo.campaigns.inputs import keep_files, renamed
-from conevo.campaigns.places import Places
+from conevo.campaigns.paths import Paths
 from conevo.campaigns.plan import Plan, PlannedRun
 from conevo.errors import UsageError
 from conevo.reading import read_json
@@ -73,7 +73,7 @@ def check_plan(campaign: Campaign, runs: Mapping[str, PlannedRun]) -> None:
             cells[key] = _why_not(planned.configs(), runs[label].configs())
         if why := cells[key]:
             raise UsageError(f"{campaign.path} holds another campaign: run {label} {why}; {advice}")
-        if planned.in_stages and campaign.places.run(label).exists():
+        if planned.in_stages and campaign.paths.run(label).exists():
             raise UsageError(
                 f"{campaign.path}: {label} is a shaping that has begun, and stages keep their "
                 f"length; {advice}"
@@ -82,18 +82,18 @@ def check_plan(campaign: Campaign, runs: Mapping[str, PlannedRun]) -> None:
 
 def write_plan(campaign: Campaign, plan: Plan, runs: list[PlannedRun]) -> None:
     """Put a plan in place of the campaign's, in one step; its lock is held."""
-    replace_file(campaign.places.extension, as_json(texts_of(plan, runs, campaign.path)))
-    settle(campaign.places)
+    replace_file(campaign.paths.extension, as_json(texts_of(plan, runs, campaign.path)))
+    settle(campaign.paths)
 
 
-def settle(places: Places) -> None:
+def settle(paths: Paths) -> None:
     """Carry out what an interrupted ``write_plan`` left to do; the campaign's lock is held."""
-    if places.extension.is_file():
-        extension = read_json(places.extension)
-        replace_file(places.runs, extension["runs"].encode())
-        replace_file(places.plan, extension["plan"].encode())
-        with writing(places.extension):
-            places.extension.unlink()
+    if paths.extension.is_file():
+        extension = read_json(paths.extension)
+        replace_file(paths.runs, extension["runs"].encode())
+        replace_file(paths.plan, extension["plan"].encode())
+        with writing(paths.extension):
+            paths.extension.unlink()
 
 
 def _cell(planned: PlannedRun) -> list[object]:

@@ -56,7 +56,7 @@ def _cell(campaign: Campaign, entries: Sequence[Entry]) -> str:
         return text
     n, found = len(entries), Counter(entry.state for entry in entries)
     begun = [
-        progress_of(campaign.places, campaign.planned[entry.label]).share
+        progress_of(campaign.paths, campaign.planned[entry.label]).share
         for entry in entries
         if entry.state == "running"
     ]

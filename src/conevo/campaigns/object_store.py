@@ -15,9 +15,9 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from conevo.campaigns.places import Places
+from conevo.campaigns.paths import Paths
 from conevo.campaigns.plan_file import STUDIES
-from conevo.campaigns.work import planned_runs
+from conevo.campaigns.worker import planned_runs
 from conevo.errors import EnvironmentFailure, UsageError
 from conevo.runs.directory import appearing, kind_of
 from conevo.runs.durable import replace_file
@@ -56,24 +56,24 @@ class ObjectStore:
 
     def put_plan(self, root: Path) -> None:
         """Store what a worker reads of a plan: its runs, its inputs, and who may carry it on."""
-        places = Places(root)
+        paths = Paths(root)
         inputs = sorted((root / INPUTS).glob("*"))
-        for path in (places.runs, places.code, *inputs):
+        for path in (paths.runs, paths.code, *inputs):
             if path.is_file():
                 self._put(root, path, path.read_bytes())
 
     def get_plan(self, root: Path) -> None:
         """Write that into a directory."""
-        places = Places(root)
-        self._get(root, places.runs)
+        paths = Paths(root)
+        self._get(root, paths.runs)
         for name in self._names(INPUTS):
             self._get(root, root / INPUTS / name)
-        if self._has(root, places.code):
-            self._get(root, places.code)
+        if self._has(root, paths.code):
+            self._get(root, paths.code)
 
     def put_run(self, root: Path, label: str) -> None:
         """Store a run as it stands, at work or not, its studies and how it ended."""
-        run = Places(root).run(label)
+        run = Paths(root).run(label)
         contents: dict[Path, bytes] = {}
         for path in sorted(_results(run), key=lambda path: (_rank(path), path)):
             try:
@@ -96,7 +96,7 @@ class ObjectStore:
 
     def get_run(self, root: Path, label: str) -> None:
         """Put what is stored of a run into a directory, in place of what is there."""
-        run = Places(root).run(label)
+        run = Paths(root).run(label)
         if names := self._names(f"runs/{label}"):
             shutil.rmtree(run, ignore_errors=True)
             with appearing(run) as draft:
@@ -114,7 +114,7 @@ class ObjectStore:
 
     def forget_ending(self, root: Path, label: str) -> None:
         """Remove how a run ended last, since it is tried again."""
-        path = Places(root).ended(label)
+        path = Paths(root).ended(label)
         if self._has(root, path):
             self._delete(path.relative_to(root).as_posix())
 
@@ -184,7 +184,7 @@ def _rank(path: Path) -> int:
 
 def _beside(root: Path, label: str) -> list[Path]:
     """Return where a run's studies, its log and how it ended may be, in this order."""
-    places = Places(root)
+    paths = Paths(root)
     names = planned_runs(root)[label].names
-    studies = [places.study(name, kind) for name in names for kind in STUDIES]
-    return [*studies, places.log(label), places.ended(label)]
+    studies = [paths.study(name, kind) for name in names for kind in STUDIES]
+    return [*studies, paths.log(label), paths.ended(label)]

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from conevo.campaigns.inputs import shown_as
 from conevo.campaigns.ledger import Entry
-from conevo.campaigns.places import Places
+from conevo.campaigns.paths import Paths
 from conevo.campaigns.plan import PlannedRun
 from conevo.errors import ConevoError
 from conevo.evolution.methods.registry import name_in
@@ -73,17 +73,17 @@ def cell_text(entries: Sequence[Entry]) -> str:
     return f"{found['finished']}/{len(entries)}{more}{failed}"
 
 
-def is_held(places: Places, label: str) -> bool:
+def is_held(paths: Paths, label: str) -> bool:
     """Whether a process that this machine knows of holds a run."""
-    return locks.is_held(places.run(label) / LOCK)
+    return locks.is_held(paths.run(label) / LOCK)
 
 
-def last_written(places: Places, label: str) -> float | None:
+def last_written(paths: Paths, label: str) -> float | None:
     """Return when the log of a run, or of a shaping's newest stage, was last written.
 
     Seconds since 1970, by the clock of the machine that wrote it; None if nothing was.
     """
-    run = places.run(label)
+    run = paths.run(label)
     found: list[float] = []
     for path in (run / GENERATIONS, *run.glob(f"stage-*/{GENERATIONS}")):
         with suppress(OSError):
@@ -92,13 +92,13 @@ def last_written(places: Places, label: str) -> float | None:
     return max(found, default=None)
 
 
-def progress_of(places: Places, planned: PlannedRun) -> RunProgress:
+def progress_of(paths: Paths, planned: PlannedRun) -> RunProgress:
     """Return how far a run is; what is missing or damaged counts as not done."""
-    outlines = _outlines(places.run(planned.label), planned.in_stages)
+    outlines = _outlines(paths.run(planned.label), planned.in_stages)
     done: list[Done] = []
     written: list[float] = []
     for name in (part for parts in planned.courses.values() for part in parts):
-        *found, at = _last_generation(places.run(name) / GENERATIONS)
+        *found, at = _last_generation(paths.run(name) / GENERATIONS)
         if at is None:
             break
         done.append(Done(*found))

@@ -15,7 +15,7 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 from conevo.campaigns.ended import read_ended
-from conevo.campaigns.places import Places
+from conevo.campaigns.paths import Paths
 from conevo.campaigns.plan import PlannedRun
 from conevo.campaigns.schema import SCHEMA
 from conevo.errors import ConevoError, EnvironmentFailure
@@ -42,10 +42,10 @@ __all__ = ["is_sealed", "left_out", "seal_tables", "sealed_tables"]
 MANIFEST = "tables.json"
 
 
-def is_sealed(places: Places, finished: Sequence[PlannedRun]) -> bool:
+def is_sealed(paths: Paths, finished: Sequence[PlannedRun]) -> bool:
     """Whether the tables are those of exactly these runs."""
-    path = places.tables / MANIFEST
-    if not all((places.tables / f"{table}.parquet").is_file() for table in SCHEMA):
+    path = paths.tables / MANIFEST
+    if not all((paths.tables / f"{table}.parquet").is_file() for table in SCHEMA):
         return False
     try:
         return path.is_file() and read_json(path) == _manifest(finished) | {"left_out": {}}
@@ -69,7 +69,7 @@ def sealed_tables(campaign: Campaign, note: Callable[[str], None]) -> Iterator[P
         EnvironmentFailure: they cannot be made anywhere.
     """
     with ExitStack() as stack:
-        tables = campaign.places.tables
+        tables = campaign.paths.tables
         if not (campaign.is_running or campaign.is_sealed):
             try:
                 with campaign.locked():
@@ -84,7 +84,7 @@ def sealed_tables(campaign: Campaign, note: Callable[[str], None]) -> Iterator[P
 
 
 def seal_tables(
-    places: Places,
+    paths: Paths,
     finished: Sequence[PlannedRun],
     spent: Mapping[str, float],
     into: Path | None = None,
@@ -96,7 +96,7 @@ def seal_tables(
     were there before, or none.
 
     Args:
-        places: of the campaign.
+        paths: of the campaign.
         finished: its finished runs.
         spent: core seconds by label, as far as the ledger knows them.
         into: the folder to make, by default that of the campaign.
@@ -105,8 +105,8 @@ def seal_tables(
         UsageError: every run is damaged.
         EnvironmentFailure: they cannot be written.
     """
-    folder = into or places.tables
-    if into is None and is_sealed(places, finished):
+    folder = into or paths.tables
+    if into is None and is_sealed(paths, finished):
         return
     import duckdb
 
@@ -115,9 +115,9 @@ def seal_tables(
         files = {name: (draft / f"{name}.jsonl").open("w", encoding="utf-8") for name in SCHEMA}
         damaged: dict[str, str] = {}
         for planned in finished:
-            cost = max(spent.get(planned.label, 0.0), _last_cost(places, planned.label))
+            cost = max(spent.get(planned.label, 0.0), _last_cost(paths, planned.label))
             try:
-                rows = list(_rows(places, planned, cost))
+                rows = list(_rows(paths, planned, cost))
             except ConevoError as error:
                 damaged[planned.label] = str(error)
                 continue
@@ -159,16 +159,16 @@ def _quoted(path: Path) -> str:
     return "'" + str(path).replace("'", "''") + "'"
 
 
-def _last_cost(places: Places, label: str) -> float:
+def _last_cost(paths: Paths, label: str) -> float:
     """Return the core seconds of a run's last worker, which may have known no coordinator."""
-    ended = read_ended(places.ended(label))
+    ended = read_ended(paths.ended(label))
     return ended["core_seconds"] if ended is not None else 0.0
 
 
-def _rows(places: Places, planned: PlannedRun, cost: float) -> Iterator[tuple[str, Record]]:
+def _rows(paths: Paths, planned: PlannedRun, cost: float) -> Iterator[tuple[str, Record]]:
     """Yield every row that a finished run has in any table."""
     for name, parts in planned.courses.items():
-        runs = [Run(places.run(part)) for part in parts]
+        runs = [Run(paths.run(part)) for part in parts]
         tests = [_tested(run) for run in runs]
         run, provenance = runs[-1], runs[-1].provenance
         records, sessions, before = _joined(runs)
@@ -203,10 +203,10 @@ def _rows(places: Places, planned: PlannedRun, cost: float) -> Iterator[tuple[st
             yield "champions", _champion_row(name, test["validation"], row, before)
         for record in records:
             yield from _generation_rows(name, record)
-        if places.study(name).is_file():
-            yield from _study_rows(name, read_json(places.study(name), Study))
-        if places.study(name, "signal").is_file():
-            for row in read_json(places.study(name, "signal"), SignalStudy)["signal"]:
+        if paths.study(name).is_file():
+            yield from _study_rows(name, read_json(paths.study(name), Study))
+        if paths.study(name, "signal").is_file():
+            for row in read_json(paths.study(name, "signal"), SignalStudy)["signal"]:
                 yield "signal", {"run": name} | {k: row[k] for k in SCHEMA["signal"] if k in row}
 
 

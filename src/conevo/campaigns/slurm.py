@@ -15,8 +15,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from conevo.campaigns.devices import AUTO, CPU, parse_devices
-from conevo.campaigns.executors.worker import ONE_THREAD
-from conevo.campaigns.places import Places
+from conevo.campaigns.executors.process import ONE_THREAD
+from conevo.campaigns.paths import Paths
 from conevo.errors import UsageError, shown
 from conevo.reading import DamagedFile, read_json
 from conevo.runs.durable import replace_file
@@ -59,7 +59,7 @@ for ((k = SLURM_ARRAY_TASK_ID; k < {n_runs}; k += {tasks})); do
     label=${{runs[k]}}
     if grep -qs '"status": "finished"' "$campaign/ended/$label.json"; then continue; fi
     echo "$(date -Is) $(hostname) $label"
-    exec 3> >(exec {python} -m conevo.campaigns.work "$campaign" "$label" \\
+    exec 3> >(exec {python} -m conevo.campaigns.worker "$campaign" "$label" \\
         "$SLURM_CPUS_PER_TASK"{device} \\
         >> "$campaign/logs/$label.txt" 2>&1)
     worker=$!
@@ -135,7 +135,7 @@ def write_array(
         check="" if device in (None, AUTO, CPU) else check,
     )
     for label in labels:  # what the script would take for finished, and is not any more
-        _forget_finished(Places(root).ended(label))
+        _forget_finished(Paths(root).ended(label))
     replace_file(path, text.encode())
     return path
 

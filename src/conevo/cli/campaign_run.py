@@ -133,7 +133,7 @@ class View:
             self.live.update(self.render(entries))
         elif ending is not None and self.execution.style == "json":
             entry = entries[ending.label]
-            place = str(campaign.places.run(entry.label))
+            place = str(campaign.paths.run(entry.label))
             about = {"run": entry.label, "state": entry.state, "reason": entry.reason}
             spent = {"core_seconds": entry.core_seconds, "path": place}
             click.echo(json.dumps(about | spent | self.progress(entries)))

@@ -92,7 +92,7 @@ def print_status(campaign: Campaign, with_runs: bool, as_json: bool) -> bool:
     standings = campaign.standings()
     entries = {
         label: dataclasses.replace(entry, state="interrupted")
-        if entry.state == "pending" and last_written(campaign.places, label) is not None
+        if entry.state == "pending" and last_written(campaign.paths, label) is not None
         else entry
         for label, entry in standings.items()
     }  # as the live page has it: a run with a generation does not wait for its first
@@ -154,7 +154,7 @@ def _whose(campaign: Campaign, entries: Mapping[str, Entry]) -> str:
 def _sign_of_life(campaign: Campaign, entries: Mapping[str, Entry]) -> str:
     """Return when a run that is not finished was last written, whoever writes it and where."""
     labels = [e.label for e in entries.values() if e.state in ("pending", "interrupted", "running")]
-    at = max(filter(None, (last_written(campaign.places, label) for label in labels)), default=None)
+    at = max(filter(None, (last_written(campaign.paths, label) for label in labels)), default=None)
     return "" if at is None else f"last generation written {_ago(at)}"
 
 
@@ -164,7 +164,7 @@ def _ago(at: float) -> str:
 
 def _progress(campaign: Campaign, entry: Entry) -> tuple[str, str]:
     """Return how far a run is, and when it was last written, for a table."""
-    found = progress_of(campaign.places, campaign.planned[entry.label])
+    found = progress_of(campaign.paths, campaign.planned[entry.label])
     if found.written is None:
         return "", ""
     done = f"{found.generations}"
@@ -179,7 +179,7 @@ def _progress(campaign: Campaign, entry: Entry) -> tuple[str, str]:
 
 def _how_far(campaign: Campaign, entry: Entry) -> dict[str, Any]:
     """Return the same as JSON has it."""
-    found = progress_of(campaign.places, campaign.planned[entry.label])
+    found = progress_of(campaign.paths, campaign.planned[entry.label])
     return {
         "generations": found.generations,
         "generations_planned": found.of,

@@ -30,7 +30,7 @@ def report(name: str, out: str | None) -> None:
     found = find_campaign(name)
     with sealed(found) as tables:
         try:
-            page = write_report(found, Path(out) if out else found.places.report, tables)
+            page = write_report(found, Path(out) if out else found.paths.report, tables)
         except EnvironmentFailure as error:
             advice = "" if out else "; choose another place with --out"
             raise EnvironmentFailure(f"{error}{advice}") from error

@@ -80,7 +80,7 @@ def write_report(campaign: Campaign, out: Path, tables: Path | None = None) -> P
         EnvironmentFailure: it cannot be written.
     """
     _refuse_changed(out)
-    with Tables(tables or campaign.places.tables) as opened:
+    with Tables(tables or campaign.paths.tables) as opened:
         sections = sections_of(opened, campaign)
         files = dict(_files(campaign.plan, sections))
         files["marl-eval.json"] = _json(export(opened))

@@ -6,9 +6,9 @@ import subprocess
 import time
 from typing import ClassVar
 
+from conevo.campaigns.executors.process import spawn, why_lost
 from conevo.campaigns.executors.protocol import Ending, RunJob
-from conevo.campaigns.executors.worker import spawn, why_lost
-from conevo.campaigns.work import carry_out, core_seconds
+from conevo.campaigns.worker import carry_out, core_seconds
 
 __all__ = ["Processes", "Serial"]
 

@@ -1,4 +1,4 @@
-"""What an executor is. It only decides where runs are executed; what a run is, ``work`` knows.
+"""The protocol of executors. One only decides where runs are executed; ``worker`` executes them.
 
 Results are files in the campaign's directory. An executor reports that a worker is gone, never
 what it found.

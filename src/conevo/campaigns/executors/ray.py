@@ -20,10 +20,10 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from conevo.campaigns.devices import AUTO, CPU
+from conevo.campaigns.executors.process import spawn, why_lost
 from conevo.campaigns.executors.protocol import Ending, RunJob
-from conevo.campaigns.executors.worker import spawn, why_lost
 from conevo.campaigns.object_store import ObjectStore
-from conevo.campaigns.places import Places
+from conevo.campaigns.paths import Paths
 from conevo.errors import EnvironmentFailure, UsageError
 from conevo.kernels.threads import usable_cores
 
@@ -150,7 +150,7 @@ def _carry(root: str, label: str, threads: int, store: str, device: str | None =
         job = RunJob(Path(folder), label, threads, device)
         copies.get_plan(job.root)
         copies.get_run(job.root, label)
-        Places(job.root).ended(label).unlink(missing_ok=True)
+        Paths(job.root).ended(label).unlink(missing_ok=True)
         code = _supervise(job, copies)
         copies.put_run(job.root, label)
     return code

@@ -23,7 +23,7 @@ def overview(tables: Tables, campaign: Campaign) -> Section:
     """Return what was run, what it cost, what is missing, and with which versions."""
     runs = [run for (run,) in tables.query("SELECT run FROM runs ORDER BY run")[1]]
     finished = {run.partition("/")[0] for run in runs}
-    failed, unread = failures(campaign.places.ended("").parent)
+    failed, unread = failures(campaign.paths.ended("").parent)
     failed = {label: why for label, why in failed.items() if label not in finished}
     unread = {f"ended/{file}": why for file, why in unread.items()}
     unread |= {f"runs/{label}": why for label, why in left_out(tables.folder).items()}
@@ -87,7 +87,7 @@ def repetition(tables: Tables, campaign: Campaign) -> Section:
     if any(preset != "night" for (preset,) in presets):
         text.append("At a larger scale: conevo campaign start plan.toml --preset night")
     commands = f"conevo campaign start plan.toml\nconevo report {campaign.plan.name}\n"
-    plan = read_text(campaign.places.plan)
+    plan = read_text(campaign.paths.plan)
     return Section("How to repeat it", text, preformatted=f"{commands}\n# plan.toml\n{plan}")
 
 

@@ -1,6 +1,6 @@
 """One worker: carries one run of a campaign to its end, wherever it stands.
 
-``python -m conevo.campaigns.work CAMPAIGN LABEL THREADS [DEVICE]`` is the unit of work of every
+``python -m conevo.campaigns.worker CAMPAIGN LABEL THREADS [DEVICE]`` is the unit of work of every
 executor. It is idempotent: a finished run is left alone, an interrupted one goes on from its
 checkpoint, and how it ended is a file, ``ended/LABEL.json``, that holds plain data.
 """
@@ -27,7 +27,7 @@ from typing_extensions import TypedDict
 from conevo.campaigns.admission import admit_code
 from conevo.campaigns.devices import CPU
 from conevo.campaigns.inputs import located
-from conevo.campaigns.places import Places
+from conevo.campaigns.paths import Paths
 from conevo.campaigns.plan import PlannedRun
 from conevo.campaigns.plan_file import STUDIES
 from conevo.errors import ConevoError, EnvironmentFailure, UsageError
@@ -77,7 +77,7 @@ def planned_runs(root: Path) -> dict[str, PlannedRun]:
         UsageError: the list is damaged.
         EnvironmentFailure: it cannot be read.
     """
-    path = Places(root).runs
+    path = Paths(root).runs
     runs = [
         PlannedRun(**{k: _frozen(line[k]) for k in PlannedLine.__annotations__ if k in line})
         for line in read_json_lines(path, PlannedLine)
@@ -113,15 +113,15 @@ def carry_out(
     began = time.perf_counter()
     ending: dict[str, Any] = {"status": "finished", "origin": "", "message": "", "traceback": ""}
     try:
-        places = Places(root)
+        paths = Paths(root)
         planned = planned_runs(root)
         if label not in planned:
             raise UsageError(f"{root} has no run {label!r} in its plan")
-        admit_code(places, planned)
-        found = _evolve(places, planned[label], threads, device, limit or TimeLimit(None))
+        admit_code(paths, planned)
+        found = _evolve(paths, planned[label], threads, device, limit or TimeLimit(None))
         if found.status != "finished":
             return False  # its time was over
-        _study(places, planned[label], found, threads)
+        _study(paths, planned[label], found, threads)
     except _InUse:
         sys.stderr.write(f"{label} is in use by another worker, which will finish it\n")
         return False  # whoever has it writes how it ended
@@ -133,7 +133,7 @@ def carry_out(
         "wall_seconds": round(time.perf_counter() - began, 3),
         "host": platform.node(),
     }
-    path = Places(root).ended(label)
+    path = Paths(root).ended(label)
     path.parent.mkdir(exist_ok=True)
     replace_file(path, as_json(ending))
     return bool(ending["status"] == "finished")
@@ -159,10 +159,10 @@ def _describe(error: BaseException) -> dict[str, str]:
 
 
 def _evolve(
-    places: Places, planned: PlannedRun, threads: int, device: str | None, limit: TimeLimit
+    paths: Paths, planned: PlannedRun, threads: int, device: str | None, limit: TimeLimit
 ) -> Run | Shaping:
     """Return the run, finished by now unless its time was over."""
-    path = places.run(planned.label)
+    path = paths.run(planned.label)
     found: Run | Shaping
     if kind_of(path):
         found = Shaping(path) if kind_of(path) == "shaping" else Run(path)
@@ -185,14 +185,14 @@ def _evolve(
     how = {"threads": threads, "device": device, "accept_other_code": True}
     if longer and isinstance(found, Run):
         for kind in STUDIES:  # of a team, and of populations, that may not stay
-            places.study(planned.label, kind).unlink(missing_ok=True)
+            paths.study(planned.label, kind).unlink(missing_ok=True)
         found.extend_as(longer, **how)
     if found.status != "finished":
         found.resume(time_limit=limit, progress=False, **how)
     return found
 
 
-def _study(places: Places, planned: PlannedRun, found: Run | Shaping, threads: int) -> None:
+def _study(paths: Paths, planned: PlannedRun, found: Run | Shaping, threads: int) -> None:
     """Make the studies of a run, or of every stage, that were not made yet.
 
     Of a run whose first stage another method evolves, they are those of the second.
@@ -204,7 +204,7 @@ def _study(places: Places, planned: PlannedRun, found: Run | Shaping, threads: i
     runs = [found] if isinstance(found, Run) else found.stages[-len(planned.names) :]
     for name, run in zip(planned.names, runs, strict=True):
         for kind in planned.studies:
-            path = places.study(name, kind)
+            path = paths.study(name, kind)
             if not path.is_file():
                 path.parent.mkdir(parents=True, exist_ok=True)
                 replace_file(path, as_json(make[kind](run, threads=threads)))

@@ -7,11 +7,11 @@ from pathlib import Path
 
 from conevo.runs.directory import CAMPAIGN
 
-__all__ = ["Places"]
+__all__ = ["Paths"]
 
 
 @dataclass(frozen=True)
-class Places:
+class Paths:
     """Paths in the directory of a campaign."""
 
     root: Path

@@ -7,7 +7,7 @@ import subprocess
 import sys
 
 from conevo.campaigns.executors.protocol import RunJob
-from conevo.campaigns.places import Places
+from conevo.campaigns.paths import Paths
 
 __all__ = ["ONE_THREAD", "spawn", "why_lost", "worker_command"]
 
@@ -16,7 +16,7 @@ ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 def spawn(job: RunJob) -> subprocess.Popen[bytes]:
     """Begin a worker, which leaves when its stdin ends; what it says goes to the run's log."""
-    log = Places(job.root).log(job.label)
+    log = Paths(job.root).log(job.label)
     log.parent.mkdir(exist_ok=True)
     with log.open("ab") as file:
         return subprocess.Popen(
@@ -33,7 +33,7 @@ def worker_command(job: RunJob) -> list[str]:
     """Return the command that carries a job out."""
     arguments = [str(job.root.resolve()), job.label, str(job.threads)]
     arguments += [job.device] if job.device else []
-    return [sys.executable, "-m", "conevo.campaigns.work", *arguments]
+    return [sys.executable, "-m", "conevo.campaigns.worker", *arguments]
 
 
 def why_lost(code: int) -> str:
