@@ -1,8 +1,9 @@
 """Build the documentation site: ``python docs/make_site.py [--out site]``.
 
 It writes ``OUT/VERSION/``, keeps the versions that are already there, and makes ``OUT/latest/``
-lead to the newest one; ``OUT/versions.json`` lists them. It needs the packages of the extra
-``docs`` and npm. Warnings, formulas with errors, and links that lead nowhere are errors.
+lead to the newest one; ``OUT/versions.json`` lists them, for the list of versions on every page. It
+replaces only what it has made: anything else in these places is refused. It needs the packages of
+the extra ``docs`` and npm. Warnings, formulas with errors, and links that lead nowhere are errors.
 
 Pages are those of the repository, in Zensical's dialect of Markdown. A link from one of them to a
 file that is not a page leads to a copy of the file.
@@ -30,6 +31,7 @@ FORMULA = re.compile(
     r'<(?P<tag>span|div) class="arithmatex">\\(?P<kind>[(\[])(?P<tex>.*?)\\[)\]]</(?P=tag)>',
     re.DOTALL,
 )
+MARK = ".made-by-make-site"  # a file in OUT and in each of its folders
 LONG_CELL = re.compile(r"<td>(?=[^\n]{60})")
 
 
@@ -106,11 +108,27 @@ def order(version):
     return [int(n) for n in numbers.split(".")], not rest, int(rest or 0)
 
 
+def foreign(out, version):
+    """Return the first thing that ``publish`` would replace and has not made, or None."""
+    folders = {out / name: out / name / MARK for name in (version, "latest")}
+    files = {out / name: out / MARK for name in ("versions.json", "index.html")}
+    if out.exists() and not out.is_dir():
+        return out
+    for place, mark in (folders | files).items():
+        if place.is_symlink() or (place.exists() and not mark.is_file()):
+            return place
+    return None
+
+
 def publish(built, out, version):
     """Put a built site into its folder, and make the list of versions and ``latest`` again."""
     target = out / version
     shutil.rmtree(target, ignore_errors=True)
     shutil.copytree(built, target)
+    shutil.rmtree(out / "latest", ignore_errors=True)
+    (out / "latest").mkdir()
+    for folder in (out, target, out / "latest"):
+        (folder / MARK).touch()
     versions = sorted(
         (path.parent.name for path in out.glob("*.*/index.html")), key=order, reverse=True
     )
@@ -120,7 +138,6 @@ def publish(built, out, version):
         {"version": one, "title": one, "aliases": ["latest"] * (one == latest)} for one in versions
     ]
     (out / "versions.json").write_text(json.dumps(listed, indent=1) + "\n", encoding="utf-8")
-    shutil.rmtree(out / "latest", ignore_errors=True)
     pages = [page.relative_to(out / latest) for page in (out / latest).rglob("index.html")]
     for page in pages:
         up = "../" * len(page.parts)
@@ -146,6 +163,8 @@ def main():
     arguments = parser.parse_args()
     began = time.monotonic()
     version = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
+    if place := foreign(arguments.out, version):
+        parser.error(f"{place} was not made by this script; move it away, or choose another --out")
     with tempfile.TemporaryDirectory() as folder:
         tools = formula_tools(Path(folder))
         built = build(Path(folder), tools, version)

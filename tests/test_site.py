@@ -177,3 +177,30 @@ def test_versions_are_kept_and_latest_leads_to_the_newest_release(tmp_path):
     (target,) = re.findall(r"url=([^\"]+)", (out / "latest" / "index.html").read_text())
     assert (out / "latest" / target).resolve() == out / "0.9.0"
     assert 'url=latest/"' in (out / "index.html").read_text()
+
+
+def test_only_what_the_script_made_is_replaced(tmp_path, monkeypatch, capsys):
+    built, out = tmp_path / "built", tmp_path / "site"
+    built.mkdir()
+    (built / "index.html").write_text("page")
+    make_site.publish(built, out, "0.2.0")
+    assert make_site.foreign(out, "0.2.0") is None
+    assert make_site.foreign(tmp_path / "absent", "0.2.0") is None
+    assert make_site.foreign(built / "index.html", "0.2.0") == built / "index.html"
+    assert make_site.foreign(built, "0.2.0") == built / "index.html"
+    (out / "0.3.0").mkdir()
+    assert make_site.foreign(out, "0.3.0") == out / "0.3.0"
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "latest").symlink_to(out)
+    assert make_site.foreign(tmp_path / "mine", "0.2.0") == tmp_path / "mine" / "latest"
+
+    monkeypatch.setattr("sys.argv", ["make_site.py", "--out", str(built)])
+    monkeypatch.setattr(make_site, "formula_tools", lambda _: pytest.fail("it started to build"))
+    with pytest.raises(SystemExit, match=r"^2$"):
+        make_site.main()
+    error = capsys.readouterr().err.splitlines()[-1]
+    assert error.endswith(
+        f"error: {built / 'index.html'} was not made by this script; move it away, "
+        "or choose another --out"
+    )
+    assert [path.name for path in built.iterdir()] == ["index.html"]
