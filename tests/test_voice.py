@@ -22,6 +22,10 @@ CHECKED = (
     "experiments/README.md",
     "examples/*.md",
     "examples/*.py",
+    "src/conevo/*.py",
+    "src/conevo/controllers/*.py",
+    "src/conevo/kernels/*.py",
+    "src/conevo/specialization/*.py",
 )
 # Each phrase, a regular expression in which a space is any white space, and what to write.
 REFUSED = (

@@ -7,8 +7,8 @@ One call evolves a team, tests it and keeps everything in one directory::
     run = conevo.evolve("rover/complex-1", method="cone", preset="smoke", seed=1)
     print(run.test_result["champion"]["castes"])
 
-The pieces can be used by hand: a ``method`` asks for teams and is told their scores, from a
-``world`` (through ``Rollout``) or from a function of your own.
+The pieces can be used by hand: a ``method`` asks for scores of teams, which come from a ``world``
+(through ``Rollout``) or from a function of your own.
 """
 
 from __future__ import annotations
@@ -74,7 +74,7 @@ _HOMES = {
 
 
 def __getattr__(name: str) -> Any:
-    """Load on first use, so that importing conevo costs nothing."""
+    """Load on first use, so that ``import conevo`` stays fast."""
     if name == "__version__":
         return import_module("conevo.runs.provenance").version("conevo")
     if name not in _HOMES:

@@ -1,4 +1,4 @@
-"""The two ways conevo says no, each one clear line, and the nearest right name for a wrong one."""
+"""The two kinds of errors, each one clear line, and the nearest right name for a wrong one."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class UsageError(ConevoError):
 
 
 class UnknownName(UsageError):
-    """There is nothing of this name."""
+    """A name is unknown."""
 
 
 class EnvironmentFailure(ConevoError):
@@ -42,7 +42,7 @@ class EnvironmentFailure(ConevoError):
 
 
 def shown(value: object, most: int = 60) -> str:
-    """Return a value as messages show it: at most ``most`` characters, whatever it is."""
+    """Return any value as messages show it, in at most ``most`` characters."""
     try:
         text = repr(value)
     except (RecursionError, ValueError):  # nested too deeply, or an integer of very many digits
@@ -51,11 +51,11 @@ def shown(value: object, most: int = 60) -> str:
 
 
 def unknown_name(kind: str, name: str, allowed: Iterable[str], where: str = "") -> UnknownName:
-    """Return the error for an unknown name, naming the nearest known one.
+    """Return the error for an unknown name, which names the nearest known one.
 
     Args:
-        kind: what the name should have been ("method", "key").
-        name: what was given.
+        kind: of thing that the name should be of ("method", "key").
+        name: the unknown name.
         allowed: the names that exist.
         where: where it was found ("in config.toml"), empty if obvious.
     """
@@ -71,11 +71,11 @@ def unknown_name(kind: str, name: str, allowed: Iterable[str], where: str = "") 
 
 @contextmanager
 def placed(key: str, place: str | None) -> Iterator[None]:
-    """Let the error for an unknown name say which setting it is of, if that has a place.
+    """Add the setting to an error for an unknown name, if the setting's place is given.
 
     Args:
         key: the setting, "controller.name".
-        place: where it was read from, "in config.toml".
+        place: where it was read, "in config.toml".
     """
     try:
         yield
@@ -86,7 +86,7 @@ def placed(key: str, place: str | None) -> Iterator[None]:
 
 
 def _by_number(name: str, names: Iterable[str]) -> list[str]:
-    """Return the name with the nearest number, if it is the number alone that is not known."""
+    """Return the name with the nearest number, if only the number is unknown."""
     if not (wanted := NUMBERED.fullmatch(name)):
         return []
     alike = [one for one in map(NUMBERED.fullmatch, names) if one and one[1] == wanted[1]]
@@ -98,7 +98,7 @@ def without_team(path: object, generations: Sequence[object]) -> UsageError:
 
     Args:
         path: its directory.
-        generations: the records of those that it has finished.
+        generations: the records of its finished generations.
     """
     lost = "lost its champion.npz" if generations else "no finished generation yet"
     return UsageError(f"{path} has {lost}, so there is no team")

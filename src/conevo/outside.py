@@ -1,9 +1,9 @@
-"""Python files outside the package, worlds and methods: run once, and known by their texts.
+"""Python files outside the package, worlds and methods: run once, and identified by their texts.
 
-Such a file may import other files of its folder. The text of all of them is known by a digest,
-which a run keeps, so that it is never carried on with another text: what a kernel hash cannot see
-(parameters, how scenarios are drawn, how genotypes are bred) counts as well. The digest is looked
-at before anything in the files is run, so imports are found by reading, not by running.
+Such a file may import other files of its folder. A digest identifies the texts of all of them. A
+run keeps it, so that it is never resumed with other texts. The digest also covers everything that a
+kernel hash does not (parameters, how scenarios are drawn, how genotypes are bred). It is checked
+before anything in the files is run, so imports are found by reading, not by running.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from conevo.reading import read_bytes, refuse_wide
 __all__ = ["entry_of", "files_of", "is_outside", "line_of", "takes"]
 
 MOST_BYTES = 2**20  # of a text
-OWN = {"world": "conevo_world_", "method": "conevo_method_"}  # begin the names of their modules
+OWN = {"world": "conevo_world_", "method": "conevo_method_"}  # prefixes of their modules' names
 _loading = threading.RLock()
 
 Entry = TypeVar("Entry")
@@ -40,8 +40,8 @@ class Source:
     """A file that has been run.
 
     Attributes:
-        module: what it has made.
-        files: paths of it and of the files next to it that it imports, itself first.
+        module: made from the file.
+        files: paths of the file and of those next to it that it imports, itself first.
         digest: of their texts.
     """
 
@@ -51,11 +51,11 @@ class Source:
 
 
 def _load(path: Path, kind: Literal["world", "method"], digest: str = "") -> Source:
-    """Return a file, run once in a process for each text that it and its neighbours have.
+    """Return a file, run once in a process for each version of its and its neighbours' texts.
 
     Args:
         path: the file.
-        kind: what it holds.
+        kind: of its contents.
         digest: that the texts must have; any if empty.
 
     Raises:
@@ -88,14 +88,14 @@ def entry_of(
 
     Args:
         path: the file.
-        kind: what it holds.
+        kind: of its contents.
         entry_class: of its ``ENTRY``.
         classes: fields of the entry that name classes of the file.
-        problem: returns what is wrong with the entry, nothing if it can be used.
+        problem: returns the entry's mistake, nothing if it can be used.
         digest: that the files must have; any if empty.
 
     Raises:
-        UsageError: a file cannot be read or run, holds no entry, or they have another digest.
+        UsageError: a file cannot be read or run, has no entry, or they have another digest.
     """
     source = _load(path, kind, digest)
     entry = getattr(source.module, "ENTRY", None)
@@ -115,7 +115,7 @@ def entry_of(
 
 
 def files_of(path: Path) -> list[Path]:
-    """Return a file and the files next to it that it imports; nothing in them is run.
+    """Return a file and the files next to it that it imports, without running them.
 
     Raises:
         UsageError: one cannot be read.
@@ -124,12 +124,12 @@ def files_of(path: Path) -> list[Path]:
 
 
 def is_outside(name: str) -> bool:
-    """Whether a module of this name is such a file."""
+    """Return whether a module of this name is such a file."""
     return name.startswith(tuple(OWN.values()))
 
 
 def takes(function: Any, n: int, *names: str) -> bool:
-    """Whether a function can be called with ``n`` arguments, and further ones by their names."""
+    """Return whether a function can be called with ``n`` arguments and these keyword arguments."""
     try:
         inspect.signature(function).bind(*[None] * n, **dict.fromkeys(names))
     except TypeError:
@@ -138,7 +138,7 @@ def takes(function: Any, n: int, *names: str) -> bool:
 
 
 def _no_class(name: str, module: ModuleType) -> str:
-    """Return that a file has no such class, with those that it and its neighbours define."""
+    """Return a message that a file has no such class, with those it and its neighbours define."""
     classes = ((key, one) for key, one in vars(module).items() if isinstance(one, type))
     own = [key for key, one in classes if is_outside(one.__module__)]
     return str(unknown_name("class", name, own, "in its ENTRY"))
@@ -162,18 +162,18 @@ def _texts(path: Path, kind: str) -> dict[Path, bytes]:
 
 
 def _imported(text: bytes) -> set[str]:
-    """Return the modules that a text imports by a plain name, wherever in it; none of Python's."""
+    """Return the modules that a text imports by a plain name, anywhere in it; none of Python's."""
     try:
         nodes = list(ast.walk(ast.parse(text)))
     except (SyntaxError, ValueError, RecursionError, MemoryError):
-        return set()  # running it says what is wrong
+        return set()  # running it raises the error
     names = {alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names}
     names |= {n.module for n in nodes if isinstance(n, ast.ImportFrom) and n.module and not n.level}
     return names - sys.stdlib_module_names - {"conevo"}
 
 
 def _digest(texts: Mapping[Path, bytes]) -> str:
-    """Return twelve hex digits of the texts, and of the names that are imported."""
+    """Return twelve hex digits that identify the texts and their names."""
     first, *others = texts
     digest = hashlib.blake2b(texts[first], digest_size=6)
     for file in sorted(others):
@@ -182,9 +182,9 @@ def _digest(texts: Mapping[Path, bytes]) -> str:
 
 
 def _run(path: Path, texts: Mapping[Path, bytes], kind: str, own: str) -> ModuleType:
-    """Return the module named ``own`` that a file makes.
+    """Return the module named ``own``, made by running a file.
 
-    Warp looks for both module and text by their names. Those of neighbours are the file's own, so
+    Warp looks up both module and text by name. The modules of neighbours belong to the file, so
     that two files may each have a neighbour of the same name: their imports are looked up here.
     """
     first = next(iter(texts))
@@ -227,7 +227,7 @@ def _run(path: Path, texts: Mapping[Path, bytes], kind: str, own: str) -> Module
 
 
 def _place(error: BaseException, files: Iterable[Path]) -> tuple[Path, int] | None:
-    """Return the file and line that an error comes from, the innermost of some files."""
+    """Return the file and line that an error comes from, the innermost one in these files."""
     wanted = {str(file): file for file in files}
     if isinstance(error, SyntaxError) and error.filename in wanted and error.lineno:
         return wanted[error.filename], error.lineno
@@ -237,15 +237,16 @@ def _place(error: BaseException, files: Iterable[Path]) -> tuple[Path, int] | No
 
 
 def _words(error: BaseException) -> str:
-    """Return what an error is, in one line."""
+    """Return an error's type and message, in one line."""
     what = error.msg if isinstance(error, SyntaxError) else str(error)
     return " ".join(f"{type(error).__name__}: {what}".split()).removesuffix(":")
 
 
 def line_of(error: BaseException) -> str:
-    """Return "FILE:LINE: in CALL: TYPE: MESSAGE" of an error in such a file, "" of any other.
+    """Return "FILE:LINE: in CALL: TYPE: MESSAGE" for an error in such a file, "" for any other.
 
-    CALL is what conevo called in the file, such as ``scenarios``; the line may be further within.
+    CALL is the function that conevo called, such as ``scenarios``; the line may be in a function
+    that it calls.
     """
     modules = [module for name, module in list(sys.modules.items()) if is_outside(name)]
     files = [Path(str(module.__file__)) for module in modules]

@@ -1,9 +1,9 @@
 """One palette for everything that is drawn: report, live page, replay, film.
 
 The colours are the eight of Okabe and Ito (2008), which readers with any kind of colour vision can
-tell apart, and lighter or darker forms of them for what belongs together: hue is the type of a
-thing, lightness what is done with it. Methods have colours of their own, which also differ in
-lightness; a method has the same one everywhere, whatever else is drawn with it.
+distinguish, with lighter and darker forms for related things: hue is the type of a thing, lightness
+its state. Methods have their own colours, which also differ in lightness. A method has the same
+colour everywhere, whatever else is drawn with it.
 """
 
 from __future__ import annotations
@@ -36,14 +36,14 @@ __all__ = [
 
 ORANGE, SKY, GREEN, YELLOW = "#e69f00", "#56b4e9", "#009e73", "#f0e442"
 BLUE, VERMILION, PURPLE = "#0072b2", "#d55e00", "#cc79a7"
-INK, FAINT, GROUND = "#1c1c22", "#9a9aa5", "#fbfaf7"  # text, what hardly matters, the world's floor
-MOVE = "#4a4a52"  # Choice: what robots do between what they are there for is dark grey
+INK, FAINT, GROUND = "#1c1c22", "#9a9aa5", "#fbfaf7"  # text, minor things, the world's floor
+MOVE = "#4a4a52"  # Choice: actions between a robot's tasks, such as moving, are dark grey
 
 _ORDER = (BLUE, ORANGE, GREEN, PURPLE, SKY, VERMILION, YELLOW, INK)
 
 
 def several(n: int) -> tuple[str, ...]:
-    """Return n colours; from the ninth on darker forms of the first."""
+    """Return n colours; from the ninth on they are darker forms of the first ones."""
     return tuple(shade(_ORDER[k % 8], -0.4 * (k // 8)) for k in range(n))
 
 
@@ -55,10 +55,11 @@ def shade(colour: str, by: float) -> str:
 
 
 class Look(NamedTuple):
-    """How a method is drawn.
+    """Appearance of a method in figures.
 
     Attributes:
-        number: of the look, for what tells methods apart without colour: hatches, dashes, markers.
+        number: of the look, for hatches, dashes and markers, which distinguish methods without
+            colour.
         area: colour of bars, of bands and inside points.
         line: colour of lines, of rims, and of text about it.
     """
@@ -82,7 +83,7 @@ METHODS: dict[str, Look] = {
 }
 """The look of every method of the registry."""
 
-_OTHERS = (  # of methods from elsewhere
+_OTHERS = (  # looks of methods from elsewhere
     ("#d9e4a0", "#8a9a2b"),
     ("#f3c1d5", "#b8487f"),
     ("#a5e0ec", "#1f93a8"),
@@ -93,10 +94,10 @@ _OTHERS = (  # of methods from elsewhere
 
 
 def method_looks(names: Iterable[str]) -> dict[str, Look]:
-    """Return the look of each method: those of the registry always have the same.
+    """Return the look of each method; for those of the registry it is always the same.
 
-    A method from elsewhere has the look that its name leads to, the next free one if another of
-    the names has that already; colours repeat after twelve of them, numbers never.
+    The name of a method from elsewhere determines its look, or the next free one if another method
+    already has it. Colours repeat after twelve such methods, numbers never.
     """
     wanted = sorted(set(names))
     looks = {name: METHODS[name] for name in wanted if name in METHODS}
@@ -113,13 +114,13 @@ def method_looks(names: Iterable[str]) -> dict[str, Look]:
 
 
 def caste_colours(known: Mapping[str, str], names: Iterable[str]) -> dict[str, str]:
-    """Return the colour of every caste: of the world's own in its order, then of others by name.
+    """Return the colour of every caste: the world's own in its order, then others by name.
 
     The non-specialized are faint and come last.
 
     Args:
         known: colours of the world's own castes.
-        names: castes that were seen.
+        names: castes that occur.
     """
     others = sorted(set(names) - known.keys() - {NON_SPECIALIZED})
     free = [c for c in several(len(others) + len(known)) if c not in known.values()]

@@ -1,7 +1,7 @@
-"""Parameters: dataclasses whose values are checked when one is made, whoever makes it.
+"""Parameters: dataclasses that check their values whenever one is made.
 
-A parameter is one field, with its type, its bounds and its default, and a text below it with its
-unit and meaning, as "(side) the largest step."::
+A parameter is one field with its type, its bounds and its default. The text below it states its
+unit and meaning, as in "(side) the largest step."::
 
     @parameters("world")
     class LightParams:
@@ -26,7 +26,7 @@ from conevo.errors import UsageError, shown, unknown_name
 __all__ = ["WrongValue", "checked", "parameters", "refuse_unknown", "wrong_values"]
 
 Part = TypeVar("Part")
-LEAST, MOST = 1e-18, 1e18  # sizes of numbers whose squares the 32 bits of a kernel can hold
+LEAST, MOST = 1e-18, 1e18  # sizes of numbers whose squares fit into the 32 bits of a kernel
 CONFIG = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, validate_default=True)
 
 
@@ -34,7 +34,7 @@ class WrongValue(UsageError):
     """A parameter has a value that it does not allow.
 
     Attributes:
-        key: the parameter's name, empty if several values do not fit together.
+        key: the parameter's name, empty if the error concerns several values together.
     """
 
     def __init__(self, key: str, what: str, problem: str) -> None:
@@ -42,19 +42,19 @@ class WrongValue(UsageError):
         self.key, self._what, self._problem = key, what, problem
 
     def at(self, place: str) -> UsageError:
-        """Return the error with the place that the value is from, "on the command line"."""
+        """Return the error with the place of the value, "on the command line"."""
         return UsageError(f"{self._what} {place}: {self._problem}")
 
 
 @dataclass_transform(frozen_default=True, kw_only_default=True)
 def parameters(section: str) -> Callable[[type[Part]], type[Part]]:
-    """Make a class a frozen dataclass that holds only values which its fields allow.
+    """Make a class a frozen dataclass that allows only the values that its fields allow.
 
-    Types are strict (but a whole number is a number), numbers finite, and 0 or of a size that a
-    kernel can square. ``UsageError`` names the first unknown key or wrong value.
+    Types are strict (but integers are accepted as floats). Numbers are finite, and 0 or of a size
+    that a kernel can square. ``UsageError`` names the first unknown key or wrong value.
 
     Args:
-        section: table of a configuration that the fields are keys of, "world".
+        section: table of a configuration with the fields as keys, "world".
     """
 
     def decorate(part: type[Part]) -> type[Part]:
@@ -78,7 +78,7 @@ def checked(part: type[Any], section: str) -> type[Any]:
 
 
 def _refusing(part: type[Any], section: str) -> type[Any]:
-    """Make a pydantic dataclass refuse in conevo's words."""
+    """Make a pydantic dataclass raise conevo's own errors."""
     validate = part.__init__
 
     def __init__(self: Any, **values: Any) -> None:
@@ -110,11 +110,11 @@ def refuse_unknown(
 
 
 def wrong_values(error: ValidationError, section: str) -> list[WrongValue]:
-    """Return what pydantic found as one error for each value."""
+    """Return pydantic's findings as one error for each value."""
     found = []
     for one in error.errors(include_url=False):
         problem = one["msg"].replace("Input should be", "must be").removeprefix("Value error, ")
-        if not one["loc"]:  # a class' own check
+        if not one["loc"]:  # a check of the class itself
             found.append(WrongValue("", f"[{section}]", problem))
         elif one["type"] == "missing":
             key = str(one["loc"][0])

@@ -1,13 +1,13 @@
-"""Reading files that others may have damaged, replaced or made up: each is whole, or one line.
+"""Reading files that may be damaged, replaced or made up: the whole file, or a one-line error.
 
 Everything that conevo reads from a run, a campaign, a world, a prey file, a recording or a
-configuration is read here. Only regular files are opened (a link to one is followed), so that a
-pipe or a device in place of a file makes nobody wait. Sizes are looked at before memory is taken:
-that of the file, and those that the headers of an archive and its arrays state.
+configuration is read here. Only regular files are opened (a link to one is followed), so that
+conevo never waits for a pipe or a device in place of a file. Sizes are checked before memory is
+allocated: that of the file, and those in the headers of an archive and its arrays.
 
-Errors name the file and what was expected:
+Errors name the file and the expected content:
 
-- ``DamagedFile``: it is there, and is not what it should be.
+- ``DamagedFile``: the file exists, but is not what it should be.
 - ``EnvironmentFailure``: the operating system refuses to read it.
 """
 
@@ -50,13 +50,13 @@ __all__ = [
 ]
 
 MIB = 2**20
-MOST_TEXT = 16 * MIB  # bytes of a JSON or text file; what is made of it takes up to twenty times
-MOST_TOML = 2 * MIB  # its parser does about one MiB in a second
+MOST_TEXT = 16 * MIB  # bytes of a JSON or text file; parsed it may take twenty times as much
+MOST_TOML = 2 * MIB  # its parser reads about one MiB per second
 MOST_LOG = 512 * MIB
 MOST_ARRAYS = 1024 * MIB  # bytes of an archive when it is unpacked
 MEMBERS = 1000  # of an archive
-DEPTH = 32  # lists and tables within each other; conevo's own files have six
-# As many parts of a key in a row; a text that looks like this is no setting of anything, either.
+DEPTH = 32  # nested lists and tables; conevo's own files have six levels
+# A key of that number of parts. The same in a quoted text is not a valid setting, either.
 DOTTED = re.compile(rf"""(?<![\w"'.-])(?:[\w"'-]+[ \t]*\.[ \t]*){{{DEPTH}}}""")
 KINDS = {
     stat.S_IFDIR: "Is a directory",
@@ -68,7 +68,7 @@ KINDS = {
 
 
 class DamagedFile(UsageError):
-    """A file that is there and is not what it should be: damaged, too large or of another kind."""
+    """A file exists but is not what it should be: damaged, too large or of another kind."""
 
 
 # --- bytes and text -------------------------------------------------------------------------------
@@ -80,7 +80,7 @@ def read_bytes(path: Path, limit: int = MOST_ARRAYS, name: str = "") -> bytes:
     Args:
         path: the file, or a link to it.
         limit: bytes that it may have.
-        name: what messages call it, by default its path.
+        name: of the file in messages, by default its path.
 
     Raises:
         DamagedFile: it is not a regular file, or is larger.
@@ -102,7 +102,7 @@ def _opened(path: Path, name: str) -> Iterator[BinaryIO]:
         EnvironmentFailure: it cannot be read.
     """
     try:
-        # Looked at before it is opened: opening alone makes some devices act.
+        # Checked before it is opened: opening alone makes some devices act.
         _refuse_special(os.stat(path), name)
         handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
         with os.fdopen(handle, "rb") as file:
@@ -167,7 +167,7 @@ def read_json(path: Path, model: type | None = None, limit: int = MOST_TEXT) -> 
 
     Args:
         path: the file.
-        model: what the object must be, see ``check``; anything if None.
+        model: type of the object, see ``check``; anything if None.
         limit: bytes that the file may have.
 
     Raises:
@@ -180,16 +180,16 @@ def read_json(path: Path, model: type | None = None, limit: int = MOST_TEXT) -> 
 def read_json_lines(
     path: Path, model: type | None = None, *, is_log: bool = False
 ) -> list[dict[str, Any]]:
-    """Return the objects in a file that holds one per line.
+    """Return the objects in a file with one per line.
 
     Args:
         path: the file.
-        model: what the objects must be, see ``check``; anything if None.
-        is_log: whether lines are appended, so that a kill may leave a torn last one, which does
-            not count.
+        model: type of the objects, see ``check``; anything if None.
+        is_log: whether lines are appended, so that a kill may leave an incomplete last line, which
+            is ignored.
 
     Raises:
-        DamagedFile: a line is not such an object; it is named by its number.
+        DamagedFile: a line is not such an object; the error names its number.
         EnvironmentFailure: it cannot be read.
     """
     content = read_bytes(path, MOST_LOG)
@@ -203,7 +203,7 @@ def read_json_lines(
 
 
 def read_part(path: Path, offset: int, limit: int) -> bytes:
-    """Return what a file has from an offset on, at most ``limit`` bytes.
+    """Return the bytes of a file from an offset on, at most ``limit`` of them.
 
     Raises:
         DamagedFile: it is not a regular file.
@@ -244,13 +244,13 @@ def parse_json(
 ) -> dict[str, Any]:
     """Return the object in a JSON text.
 
-    A number that is not finite, a key that is there twice and deep nesting are refused: other
+    A number that is not finite, a key that appears twice and deep nesting are refused: other
     programs would read something else, or nothing.
 
     Args:
         content: the text, UTF-8.
-        name: what messages call it, a path.
-        model: what the object must be, see ``check``; anything if None.
+        name: of the text in messages, a path.
+        model: type of the object, see ``check``; anything if None.
         where: the place within it, for messages (" in line 3").
 
     Raises:
@@ -283,13 +283,13 @@ def read_toml(path: Path) -> dict[str, Any]:
 
 
 def parse_toml(text: str, name: str) -> dict[str, Any]:
-    """Return the tables of a TOML text; ``name`` is what messages call it.
+    """Return the tables of a TOML text, called ``name`` in messages.
 
     Raises:
         DamagedFile: it is not valid TOML.
     """
     try:
-        if DOTTED.search(text):  # each part costs a table, and a copy of all parts before it
+        if DOTTED.search(text):  # each part costs a table, and a copy of all previous parts
             raise RecursionError
         found = tomllib.loads(text)
         _refuse_deep(found)
@@ -301,13 +301,13 @@ def parse_toml(text: str, name: str) -> dict[str, Any]:
 
 
 def check(value: object, model: type, problem: str) -> None:
-    """Raise DamagedFile if a value is not what a model describes.
+    """Raise DamagedFile if a value does not match a model.
 
     Args:
         value: plain data.
-        model: a TypedDict or another type that pydantic knows. Types are strict, numbers finite;
-            keys that it does not have are left alone, as a later version may write them.
-        problem: how the message begins; the field and what is allowed follow.
+        model: a TypedDict or another type that pydantic knows. Types are strict, numbers finite.
+            Keys that it does not have are ignored, as a later version may write them.
+        problem: start of the message; the field and the allowed values follow.
     """
     from pydantic import ValidationError
 
@@ -387,14 +387,14 @@ def read_arrays(
 ) -> dict[str, npt.NDArray[Any]]:
     """Return the arrays of an npz file by name.
 
-    Nothing is unpacked before the sizes that its headers state are known to be within the limit,
-    and never more than these; no object is ever unpickled.
+    Nothing is unpacked before the sizes in its headers are known to be within the limit, and never
+    more than these sizes. No object is ever unpickled.
 
     Args:
         path: the file.
         limit: bytes that it may have, packed and unpacked.
-        kind: what it should be, for messages.
-        is_packed: whether it may be compressed; else it may not unpack to more than it has.
+        kind: of file that it should be, for messages.
+        is_packed: whether it may be compressed; else it may not unpack to more bytes than it has.
 
     Raises:
         DamagedFile: it is damaged, not an npz file of numbers, not a regular file, or too large.
@@ -411,7 +411,7 @@ def read_arrays(
                     content = file.read(member.file_size + 1)
                 found[member.filename.removesuffix(".npy")] = _array(content)
             return found
-    except Exception as error:  # whatever a damaged file makes its readers say
+    except Exception as error:  # a damaged file may make its readers raise anything
         reason = _one_line(error) or type(error).__name__
         raise DamagedFile(f"{path} is damaged or not {kind} ({reason})") from error
 
@@ -430,7 +430,7 @@ def _refuse_members(members: list[zipfile.ZipInfo], limit: int) -> None:
 
 
 def _array(content: bytes) -> npt.NDArray[Any]:
-    """Return the array in an npy file: of the size that the file has, whatever its header says."""
+    """Return the array in an npy file; refuse a header whose size is not that of the file."""
     import numpy as np
 
     stream = io.BytesIO(content)
@@ -450,7 +450,7 @@ def _array(content: bytes) -> npt.NDArray[Any]:
 
 
 def _one_line(error: BaseException) -> str:
-    """Return what an error says, in one short line."""
+    """Return the message of an error, in one short line."""
     text = " ".join(str(error).split())
     text = re.sub(r"Exceeds the limit .*", "a number of more than 4300 digits", text)
     return text if len(text) <= 200 else f"{text[:200]}..."

@@ -1,11 +1,11 @@
 """Addressed randomness: the only place where (root seed, path) becomes a stream.
 
-Nothing in conevo consumes a shared generator. Every random decision names where it stands
+Nothing in conevo consumes a shared generator. Every random decision names its place
 ("epoch", generation, 3) and gets its own stream, so results do not depend on batch size, thread
 count, order of work or the point at which a run was resumed.
 
-What is drawn for many keys at once has a number for each key and place of its own (``fold_all``,
-``numbers``, ``uniforms``), so that it does not depend on which keys are drawn together.
+Draws for many keys at once give each key and place its own number (``fold_all``, ``numbers``,
+``uniforms``), which does not depend on the other keys.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ def stream(root: int, *path: int | str) -> np.random.Generator:
 def fold_all(keys: npt.NDArray[np.uint64], *path: int | str) -> npt.NDArray[np.uint64]:
     """Return the keys of the place ``path`` below every one of many keys.
 
-    Two of them are the same only if the keys are. They are not those that ``fold`` gives.
+    Two of them are equal only if the given keys are. They differ from those of ``fold``.
     """
     return _finalized(keys ^ np.uint64(fold(0, *path)))
 
@@ -66,7 +66,7 @@ def numbers(keys: npt.NDArray[np.uint64], t: Any, a: Any, b: Any) -> npt.NDArray
 
     Args:
         keys: of one dimension at least.
-        t: first number of the place, not negative and below 2**20, as the next two are.
+        t: first number of the place, from 0 and below 2**20, like the next two.
         a: second number.
         b: third number.
     """
@@ -76,7 +76,7 @@ def numbers(keys: npt.NDArray[np.uint64], t: Any, a: Any, b: Any) -> npt.NDArray
 
 
 def uniforms(keys: npt.NDArray[np.uint64], t: Any, a: Any, b: Any) -> npt.NDArray[np.float32]:
-    """Return a number in [0, 1) for each key and place: that of ``kernels.random.uniform``."""
+    """Return a number in [0, 1) for each key and place, equal to ``kernels.random.uniform``."""
     bits = numbers(keys, t, a, b) >> np.uint64(40)
     result: npt.NDArray[np.float32] = bits.astype(np.float32) * np.float32(2.0**-24)
     return result

@@ -1,4 +1,4 @@
-"""Terms of the thesis, numbers of things and paths in commands, worded as they are everywhere."""
+"""Terms of the thesis, numbers of things and paths in commands, worded the same everywhere."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ NON_SPECIALIZED = "non-specialized"
 """The caste of robots that are specialized to nothing."""
 
 S_SCALE = "0 = always the same action, 1 = switches all the time"
-"""Which way S goes: the thesis calls it the degree of specialization, and 0 is a specialist."""
+"""Direction of S: the thesis calls it the degree of specialization, and 0 is a specialist."""
 
 SHARE_SCALE = "1 = always the same one"
-"""Which way the share of a favourite goes."""
+"""Direction of the share of a favourite."""
 
 S_MEANS = f"degree of specialization S ({S_SCALE})"
 
 
 def counted(number: int, noun: str) -> str:
-    """Return so many things in words: "1 run", "1,200 runs"."""
+    """Return a number of things in words: "1 run", "1,200 runs"."""
     return f"{number:,} {noun}{'' if number == 1 else 's'}"
 
 
 def quoted(path: object) -> str:
-    """Return a path as a shell takes it, for commands that are printed to be copied."""
+    """Return a path quoted for a shell, for commands that are printed to be copied."""
     return shlex.quote(str(path))

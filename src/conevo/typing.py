@@ -14,4 +14,4 @@ Floats: TypeAlias = "npt.NDArray[np.float64]"
 """An array of numbers in double precision."""
 
 Record: TypeAlias = dict[str, Any]
-"""Plain data by name: what a line or a file of JSON holds, a row of a table."""
+"""Plain data by name: a line or a file of JSON, a row of a table."""

@@ -1,1 +1,1 @@
-"""Controllers: from genotypes (numbers) to what a robot does (behaviour)."""
+"""Controllers: from genotypes (numbers) to the behaviour of a robot."""

@@ -1,4 +1,4 @@
-"""A continuous-time recurrent network: hidden neurons with time constants of their own.
+"""A continuous-time recurrent network: each hidden neuron has its own time constant.
 
 Beer 1995, "On the dynamics of small continuous-time recurrent neural networks", eq. 1, with one
 Euler step per iteration::
@@ -45,8 +45,8 @@ class CtrnnShape:
 class CtrnnWeights:
     """Weights of a team's networks.
 
-    Feeds: inputs, then context. bias and rate: the neuron's bias, and the share of the way that it
-    goes in an iteration.
+    Feeds: inputs, then context. bias and rate: the neuron's bias, and the portion of the distance
+    to its new state that it covers in an iteration.
     """
 
     w_in: Annotated[wp.array[float], "robots", "slots", "feeds"]
@@ -58,7 +58,7 @@ class CtrnnWeights:
 
 @named_arrays
 class CtrnnMemory:
-    """Of a team's neurons: activations and states, 0 in empty slots."""
+    """Activations and states of a team's neurons, 0 in empty slots."""
 
     hidden: Annotated[wp.array[float], "robots", "slots"]
     state: Annotated[wp.array[float], "robots", "slots"]
@@ -92,7 +92,7 @@ def load(
 
 @wp.func
 def clear(memory: CtrnnMemory, shape: CtrnnShape, i: int) -> None:
-    """Let robot ``i`` remember nothing: states 0, and no activation yet."""
+    """Reset robot ``i``'s memory: states 0, no activations yet."""
     for k in range(shape.n_slots):
         memory.hidden[i * shape.n_slots + k] = 0.0
         memory.state[i * shape.n_slots + k] = 0.0
@@ -137,7 +137,7 @@ def activate(
     heuristic: wp.array[int],
     q: int,
 ) -> None:
-    """Let neuron ``q`` show its state: only now, since every neuron sees what was before."""
+    """Update the activation of neuron ``q``, after all neurons have read the previous ones."""
     if heuristic[q // shape.n_slots] < 0 and weights.filled[q] != 0:
         memory.hidden[q] = sigmoid(memory.state[q])
 
@@ -156,7 +156,7 @@ class Ctrnn(Slots):
     n_memory: ClassVar[int] = 2
 
     def genome(self, n_inputs: int, n_outputs: int) -> Genome:
-        """Return what a network is built from: hidden neurons."""
+        """Return the parts of a network: hidden neurons."""
         return Genome(self.n_hidden, self.max_hidden, n_inputs + self.n_hidden + 2 + n_outputs)
 
     def mind(self, n_inputs: int, n_outputs: int) -> Mind:

@@ -59,7 +59,7 @@ class GruWeights:
 
 @named_arrays
 class GruMemory:
-    """Of a team's neurons, 0 in empty slots: activations, and three to compute them."""
+    """Activations of a team's neurons, and three arrays to compute them; 0 in empty slots."""
 
     hidden: Annotated[wp.array[float], "robots", "slots"]
     reset: Annotated[wp.array[float], "robots", "slots"]
@@ -92,7 +92,7 @@ def load(
 
 @wp.func
 def clear(memory: GruMemory, shape: GruShape, i: int) -> None:
-    """Let robot ``i`` remember nothing."""
+    """Reset robot ``i``'s memory."""
     for k in range(shape.n_slots):
         memory.hidden[i * shape.n_slots + k] = 0.0
         memory.reset[i * shape.n_slots + k] = 0.0
@@ -115,7 +115,7 @@ def drive(
 
 @wp.func
 def recurrent(shape: GruShape, slot: int, gate: int) -> int:
-    """Return where the recurrent weights of a gate of a neuron begin."""
+    """Return the index of the first recurrent weight of a gate of a neuron."""
     return (slot * 3 + gate) * (shape.n_inputs + shape.n_context + 1) + shape.n_inputs
 
 
@@ -157,7 +157,7 @@ def propose(
     heuristic: wp.array[int],
     q: int,
 ) -> None:
-    """Compute what neuron ``q`` may become, from all reset gates of its robot."""
+    """Compute the candidate activation of neuron ``q``, from all reset gates of its robot."""
     i = q // shape.n_slots
     if heuristic[i] >= 0 or weights.filled[q] == 0:
         return
@@ -182,7 +182,7 @@ def activate(
     heuristic: wp.array[int],
     q: int,
 ) -> None:
-    """Let neuron ``q`` become what it may, as far as its update gate is open."""
+    """Move neuron ``q``'s activation to its candidate, as far as its update gate is open."""
     if heuristic[q // shape.n_slots] < 0 and weights.filled[q] != 0:
         z = memory.update[q]
         memory.hidden[q] = z * memory.hidden[q] + (1.0 - z) * memory.candidate[q]
@@ -200,7 +200,7 @@ class Gru(Slots):
     n_memory: ClassVar[int] = 1
 
     def genome(self, n_inputs: int, n_outputs: int) -> Genome:
-        """Return what a network is built from: hidden neurons."""
+        """Return the parts of a network: hidden neurons."""
         n_genes = 3 * (n_inputs + self.n_hidden + 1) + n_outputs
         return Genome(self.n_hidden, self.max_hidden, n_genes)
 

@@ -32,10 +32,10 @@ class ControllerEntry:
     """One kind of controller.
 
     Attributes:
-        name: how it is asked for.
+        name: its name in commands and files.
         title: its name as published.
-        summary: one line on what it is.
-        source: where it is described.
+        summary: a description in one line.
+        source: the publication that describes it.
         target: "module:Class" below this package, loaded when needed.
     """
 
@@ -58,14 +58,14 @@ CONTROLLERS: dict[str, ControllerEntry] = {
         ControllerEntry(
             "srn",
             "Simple recurrent network",
-            "one hidden layer that sees its own activations of the iteration before",
+            "one hidden layer that sees its own activations of the previous iteration",
             "Elman 1990; Nitschke 2009, sections 3.1, 4.1, 5.2, 6.2.7",
             "srn:Srn",
         ),
         ControllerEntry(
             "ctrnn",
             "Continuous-time recurrent network",
-            "hidden neurons with time constants of their own",
+            "hidden neurons, each with its own time constant",
             "Beer 1995",
             "ctrnn:Ctrnn",
         ),
@@ -84,7 +84,7 @@ def find(name: str) -> ControllerEntry:
     """Return the entry of a name.
 
     Raises:
-        UsageError: there is none.
+        UsageError: no controller has this name.
     """
     if name not in CONTROLLERS:
         raise unknown_name("controller", name, CONTROLLERS)
@@ -92,14 +92,15 @@ def find(name: str) -> ControllerEntry:
 
 
 def suggested(name: str, world: Any) -> dict[str, Any]:
-    """Return a world's settings of its robots' controllers, of those that a controller has.
+    """Return the settings that a world suggests for its controllers, as far as this one has them.
 
     Args:
         name: of the controller.
-        world: a world or its class, whose ``controller`` holds them.
+        world: a world or its class; its ``controller`` contains the settings.
 
     Raises:
-        UsageError: no such controller, or the world has no settings or one of no controller.
+        UsageError: no such controller, or the world's ``controller`` is not a dict of settings or
+            has one that belongs to no controller.
     """
     known = {field.name for field in fields(find(name).settings_class)}
     settings: Mapping[str, Any] = getattr(world, "controller", {})
@@ -121,7 +122,7 @@ def controller(name: str = DEFAULT, world: Any = None, **settings: Any) -> Contr
 
     Args:
         name: one of ``CONTROLLERS``.
-        world: whose settings hold where ``settings`` has none.
+        world: its suggestions apply where ``settings`` has none.
         settings: fields of the controller that differ from their defaults.
 
     Raises:
@@ -132,7 +133,7 @@ def controller(name: str = DEFAULT, world: Any = None, **settings: Any) -> Contr
 
 
 def genome_of(controller: Controller, world: Any) -> Genome:
-    """Return what a world's controllers are built from."""
+    """Return the parts of a world's controllers."""
     return controller.genome(len(world.inputs), len(world.outputs))
 
 

@@ -1,4 +1,4 @@
-"""What controllers made of hidden neurons have in common: numbered slots, and sums over them."""
+"""Common parts of controllers made of hidden neurons: numbered slots, and sums over them."""
 
 from typing import Annotated, Any
 
@@ -20,7 +20,7 @@ def n_neurons(
     outputs: wp.array2d[float],
     heuristic: wp.array[int],
 ) -> int:
-    """Return how many slots for neurons a team has."""
+    """Return the number of slots for neurons in a team."""
     return inputs.shape[0] * shape.n_slots
 
 
@@ -33,7 +33,7 @@ def n_sums(
     outputs: wp.array2d[float],
     heuristic: wp.array[int],
 ) -> int:
-    """Return how many outputs a team has."""
+    """Return the number of outputs of a team."""
     return inputs.shape[0] * shape.n_outputs
 
 
@@ -71,9 +71,9 @@ class Slots:
     """
 
     n_hidden: Annotated[int, Ge(1), Le(16)] = 10
-    """(neurons) hidden neurons at the start, and those that feed back."""
+    """(neurons) hidden neurons at the start; only these feed back."""
     max_hidden: Annotated[int, Ge(1), Le(32)] = 20
-    """(neurons) hidden neurons that it can grow to."""
+    """(neurons) hidden neurons at most."""
 
     def __post_init__(self) -> None:
         if self.max_hidden < self.n_hidden:

@@ -1,16 +1,16 @@
 """A simple recurrent (Elman) network built from neuron genotypes: the thesis' controller.
 
 Nitschke 2009, sections 3.1, 4.1, 5.2 and 6.2.7. One hidden layer of sigmoid units sees the inputs
-and the hidden layer's own activations of the iteration before. A genotype is one hidden neuron: its
-input weights (inputs, then context) followed by its output weights. A connection weight is
+and the hidden layer's own activations of the previous iteration. A genotype is one hidden neuron:
+its input weights (inputs, then context) followed by its output weights. A connection weight is
 ``weight_scale`` times its gene.
 
-Choice: the context keeps the *initial* number of hidden units. Hidden neurons live in numbered
-slots; slot k < n_hidden feeds context input k; an empty slot feeds 0; slots from n_hidden on feed
-no context. So all genotypes of a world have the same length and recombination between populations
-is always defined (the thesis fixes the inputs while the hidden layer changes).
+Choice: the context keeps the *initial* number of hidden units. Hidden neurons are in numbered
+slots. Slot k < n_hidden feeds context input k, an empty slot feeds 0, and slots from n_hidden on
+feed no context. So all genotypes of a world have the same length, and recombination between
+populations is always defined (the thesis fixes the inputs while the hidden layer changes).
 
-The shape is data (``Shape``), so one compiled kernel serves every size of network a world can have.
+The shape is data (``Shape``), so one compiled kernel serves every size of network in a world.
 Hidden slots are computed ``WIDE`` at a time.
 """
 
@@ -53,8 +53,9 @@ class SrnShape:
 class SrnWeights:
     """Weights of a team's networks (or, flat, of a batch of teams).
 
-    A chunk is 16 slots. Feeds: inputs, then context. filled: 1 where a slot holds a neuron. n_used:
-    one above the last filled slot. neurons: the filled slots of all robots, the first n_neurons.
+    A chunk is 16 slots. Feeds: inputs, then context. filled: 1 where a slot contains a neuron.
+    n_used: one above the last filled slot. neurons: the filled slots of all robots, the first
+    n_neurons.
     """
 
     w_in: Annotated[wp.array[wide_vector], "robots", "chunks", "feeds"]
@@ -67,7 +68,7 @@ class SrnWeights:
 
 @named_arrays
 class SrnMemory:
-    """Activations of a team's hidden neurons, 0 in empty slots; and those to come."""
+    """Activations of a team's hidden neurons, 0 in empty slots, and their next activations."""
 
     hidden: Annotated[wp.array[float], "robots", "slots"]
     coming: Annotated[wp.array[float], "robots", "slots"]
@@ -111,7 +112,7 @@ def load(
 
 @wp.func
 def clear(memory: SrnMemory, shape: SrnShape, i: int) -> None:
-    """Let robot ``i`` remember nothing."""
+    """Reset robot ``i``'s memory."""
     slots = shape.n_chunks * WIDE
     for k in range(slots):
         memory.hidden[i * slots + k] = 0.0
@@ -129,9 +130,9 @@ def think(
 ) -> None:
     """Run robot ``i``'s network once: inputs to output sums, hidden activations to next context.
 
-    An output is the weighted sum of its unit: the highest sum is the highest activation, exactly
-    even where several activations are 1 to the last bit. An empty slot neither contributes to an
-    output nor feeds the context.
+    An output is the weighted sum of its unit. The highest sum is the highest activation, even where
+    several activations round to exactly 1. An empty slot neither contributes to an output nor feeds
+    the context.
     """
     hidden = i * shape.n_chunks * WIDE
     used = weights.n_used[i]
@@ -218,7 +219,7 @@ def n_neurons(
     outputs: wp.array2d[float],
     heuristic: wp.array[int],
 ) -> int:
-    """Return how many hidden neurons a team has."""
+    """Return the number of hidden neurons in a team."""
     return weights.n_neurons[0]
 
 
@@ -232,7 +233,7 @@ def think_neuron(
     heuristic: wp.array[int],
     q: int,
 ) -> None:
-    """Compute the activation that neuron ``q`` of the team will have, as ``think`` does."""
+    """Compute the next activation of neuron ``q`` of the team, as ``think`` does."""
     slot = weights.neurons[q]
     chunk = slot // WIDE
     i = chunk // shape.n_chunks
@@ -262,7 +263,7 @@ def n_sums(
     outputs: wp.array2d[float],
     heuristic: wp.array[int],
 ) -> int:
-    """Return how many output units a team has room for."""
+    """Return the number of output units for which a team has room."""
     return inputs.shape[0] * OUT
 
 
@@ -276,9 +277,9 @@ def think_sum(
     heuristic: wp.array[int],
     q: int,
 ) -> None:
-    """Compute output ``q`` of the team, as ``think`` does; let a share of what comes be context.
+    """Compute output ``q`` of the team, as ``think`` does; copy next activations to the context.
 
-    An output reads what is coming and no context, so the two can be done side by side.
+    An output reads the next activations but no context, so both can be done in one phase.
     """
     i = q // OUT
     o = q % OUT
@@ -305,7 +306,7 @@ class Srn(Slots):
     """Settings of a simple recurrent network; see the module."""
 
     recurrent: bool = True
-    """whether it has context inputs; without it is feed-forward."""
+    """whether it has context inputs; without them it is feed-forward."""
     bias: bool = False
     """whether hidden and output units have a bias of 1, which is not evolved."""
     weight_scale: Annotated[float, Gt(0), Le(1000)] = 10.0
@@ -321,7 +322,7 @@ class Srn(Slots):
         return self.n_hidden if self.recurrent else 0
 
     def genome(self, n_inputs: int, n_outputs: int) -> Genome:
-        """Return what a network is built from: hidden neurons."""
+        """Return the parts of a network: hidden neurons."""
         return Genome(self.n_hidden, self.max_hidden, n_inputs + self.n_context + n_outputs)
 
     def mind(self, n_inputs: int, n_outputs: int) -> Mind:

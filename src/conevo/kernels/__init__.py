@@ -1,4 +1,4 @@
 """Building blocks of the simulators: Warp functions of floats, vectors, arrays and structs.
 
-No input or output, no global state, nothing that knows a world or a method.
+They do no input or output, have no global state and know neither worlds nor methods.
 """

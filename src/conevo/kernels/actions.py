@@ -1,4 +1,4 @@
-"""What a robot does: how its actions are chosen by a heuristic, and how they are counted."""
+"""Actions of a robot: how a heuristic chooses them, and how they are counted."""
 
 import warp as wp
 
@@ -15,7 +15,7 @@ def heuristic_action(u: float, own: int, other: int, n_actions: int) -> int:
     Args:
         u: random number in [0, 1).
         own: its own action; NONE if it prefers none, so that all are equally likely.
-        other: what it does otherwise.
+        other: the action that it executes otherwise.
         n_actions: number of all actions.
     """
     if own == NONE:
@@ -27,7 +27,7 @@ def heuristic_action(u: float, own: int, other: int, n_actions: int) -> int:
 def begin_counting(
     action: wp.array[int], switches: wp.array[int], counts: wp.array[int], i: int
 ) -> None:
-    """Let robot ``i`` have executed nothing yet; the arrays are those of ``count_action``."""
+    """Reset robot ``i``'s counts and last action; the arrays are those of ``count_action``."""
     action[i] = NONE
     switches[i] = 0
     columns = counts.shape[0] // action.shape[0]
@@ -44,10 +44,10 @@ def count_action(
     a: int,
     column: int,
 ) -> None:
-    """Make ``a`` the action that robot ``i`` has executed, and count it unless it is NONE.
+    """Record that robot ``i`` executed action ``a``, and count it unless it is NONE.
 
-    A switch is another action than in the iteration just before (Nitschke 2009, eq. 3.4); after an
-    iteration without an action nothing is one.
+    A switch is a different action than in the previous iteration (Nitschke 2009, eq. 3.4). An
+    action that follows an iteration without one is not a switch.
 
     Args:
         action: [R] executed in the previous iteration, NONE if the robot did nothing.
@@ -55,7 +55,7 @@ def count_action(
         counts: [R, C] actions executed for each caste.
         i: the robot.
         a: the action.
-        column: the caste that it counts for.
+        column: the caste for which it counts.
     """
     previous = action[i]
     action[i] = a

@@ -1,7 +1,8 @@
-"""Structs of arrays that name their dimensions: what is allocated and recorded follows from that.
+"""Structs of arrays that name their dimensions; allocation and recording follow from the names.
 
-An array of such a struct holds one part of a batch (a team, say) after another along its first
-dimension, so it has one dimension in the kernel unless its last one stays apart (``wp.array2d``).
+An array of such a struct contains the parts of a batch (teams, say) one after another along its
+first dimension. In the kernel it has one dimension, or two if its last one is kept separate
+(``wp.array2d``).
 """
 
 from collections.abc import Callable, Mapping
@@ -18,8 +19,8 @@ Names = tuple[str, ...]
 def named_arrays(kind: type) -> Any:
     """Make a class a Warp struct; ``x: Annotated[wp.array[float], "robots"]`` names dimensions.
 
-    A decorator in place of ``wp.struct``, for structs with arrays whose dimensions are not those
-    that an array has by default.
+    Use this decorator in place of ``wp.struct`` if an array has other dimensions than the default
+    ones.
     """
     hints = get_type_hints(kind, include_extras=True)
     named = {name: get_args(hint)[1:] for name, hint in hints.items() if _is_named(hint)}
@@ -38,7 +39,7 @@ def dimensions(struct: Any, default: Callable[[str], Names]) -> dict[str, Names]
 
     Args:
         struct: a Warp struct.
-        default: of the name of an array that names none.
+        default: returns the dimensions of an array that names none, given the array's name.
     """
     named = getattr(struct, "dimensions", {})
     arrays = [name for name, var in struct.vars.items() if wp.types.is_array(var.type)]

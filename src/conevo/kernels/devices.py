@@ -1,6 +1,6 @@
-"""Devices: how they are named, and which of them this machine has.
+"""Devices: their names, and which of them this machine has.
 
-Names are known without loading Warp, which is asked for the rest.
+Names are checked without loading Warp; only the list of devices needs it.
 """
 
 import re
@@ -45,11 +45,11 @@ def is_here(name: str) -> bool:
 
 
 def device_here(name: str) -> str:
-    """Return the device that a name means on this machine: for "auto" its first card, or the CPU.
+    """Return the device that a name means on this machine: for "auto" its first GPU, or the CPU.
 
     Raises:
         UsageError: it is not the name of a device.
-        EnvironmentFailure: there is none of this name here.
+        EnvironmentFailure: this machine does not have the device.
     """
     refuse_unknown_device(name)
     if name == AUTO:

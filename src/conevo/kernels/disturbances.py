@@ -1,7 +1,7 @@
 """Noise and failures, for the state of any world: phases around those of a world.
 
-They take part only where they are asked for (``worlds.disturbances.disturbed``). What a world keeps
-of its sensors from one iteration to the next is kept without noise.
+They are added only on request (``worlds.disturbances.disturbed``). Sensor values that a world keeps
+from one iteration to the next are kept without noise.
 """
 
 from typing import Any
@@ -15,15 +15,15 @@ from conevo.kernels.random import uniform
 __all__ = ["confuse", "fails", "keep_clean", "of_types", "read_wrongly", "regain"]
 
 # Counters of random numbers: no world has any between 2**20 - 512 and 2**20 - 256.
-NOISE = wp.constant(2**20 - 512)  # and the number of the input
-OUTPUT = wp.constant(2**20 - 384)  # and the number of the output
+NOISE = wp.constant(2**20 - 512)  # plus the number of the input
+OUTPUT = wp.constant(2**20 - 384)  # plus the number of the output
 REPLACED = wp.constant(2**20 - 320)
 FAILURE = wp.constant(2**20 - 319)
 
 
 @wp.func
 def keep_clean(team: Any, scene: Any, p: Any, i: int, t: int) -> None:
-    """Let robot ``i``'s inputs be what they were before noise, so that a world may keep them."""
+    """Restore robot ``i``'s inputs without noise, so that a world may keep them."""
     n = team.inputs.shape[1]
     if t > 0:
         for k in range(n):
@@ -34,7 +34,7 @@ def keep_clean(team: Any, scene: Any, p: Any, i: int, t: int) -> None:
 def read_wrongly(team: Any, scene: Any, p: Any, i: int, t: int) -> None:
     """Add noise to robot ``i``'s inputs: uniform in [-size, size], within each sensor's range.
 
-    Choice: every sensor is off by another amount in every iteration, the same for every team.
+    Choice: the error of a sensor is drawn again in every iteration and is the same for every team.
     """
     n = team.inputs.shape[1]
     for k in range(n):
@@ -60,20 +60,20 @@ def confuse(team: Any, scene: Any, p: Any, i: int, t: int) -> None:
 
 @wp.func
 def regain(team: Any, scene: Any, p: Any, i: int, t: int) -> None:
-    """Let robot ``i`` be controlled again by what it was."""
+    """Give robot ``i`` its usual control back."""
     team.heuristic[i] = team.kept_heuristic[i]
 
 
 @wp.func
 def fails(seed: wp.uint64, p: Any, i: int, t: int) -> bool:
-    """Return whether robot ``i`` fails in iteration ``t``: in the next it does nothing any more."""
+    """Return whether robot ``i`` fails in iteration ``t``; from the next one on it does nothing."""
     if p.failure_at > 0 and t + 1 != p.failure_at:
         return False
     return uniform(seed, t, FAILURE, i) < p.failure
 
 
 def of_types(function: Any, team: Any, scene: Any, p: Any) -> Any:
-    """Return one of the functions of any world for a world's own structs."""
+    """Return a function that fits any world, with the types of one world's structs."""
     name = function.key.rpartition(".")[2]
     lines = [
         f"def {name}(team: Team, scene: Scene, p: Params, i: int, t: int) -> None:",

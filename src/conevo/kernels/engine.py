@@ -32,19 +32,19 @@ __all__ = [
     "start",
 ]
 
-# Measured: no adjoints and no unrolling pay; fast_math and -O3 do not. No fused
-# multiply-add: CPU and CUDA must agree to the bit.
+# Measured: switching off adjoints and unrolling pays; fast_math and -O3 do not. No fused
+# multiply-add: CPU and CUDA must agree bit for bit.
 options = {"enable_backward": False, "max_unroll": 0, "fuse_fp": False}
 
 
-# Held while kernels are made, identified, compiled and loaded: Warp generates code for one of them
-# at a time, whatever the number of threads that ask for it.
+# Held while kernels are made, identified, compiled and loaded: Warp can generate code for only one
+# of them at a time.
 building = threading.RLock()
 _is_started = False
 
 
 class OutOfMemory(EnvironmentFailure):
-    """A device does not have as much free memory as was asked for."""
+    """A device has less free memory than was requested."""
 
 
 def start() -> None:
@@ -65,7 +65,7 @@ def start() -> None:
 
 
 def build(kernel: Any, device: str, lanes: int) -> None:
-    """Compile and load a kernel unless that has been done.
+    """Compile and load a kernel unless that has already been done.
 
     Args:
         kernel: made with ``options``.
@@ -73,7 +73,7 @@ def build(kernel: Any, device: str, lanes: int) -> None:
         lanes: lanes of a block.
 
     Raises:
-        UsageError: a function of the kernel is not one that Warp can compile.
+        UsageError: Warp cannot compile a function of the kernel.
         EnvironmentFailure: the compiled kernel cannot be written.
     """
     with building, _cache_named():
@@ -87,10 +87,10 @@ def build(kernel: Any, device: str, lanes: int) -> None:
 
 @contextmanager
 def memory_named(device: str) -> Iterator[None]:
-    """Let memory that a device does not have be one error, without Warp's own line on it.
+    """Turn a lack of memory on a device into one error, without Warp's own line about it.
 
     Raises:
-        OutOfMemory: an array that was asked for cannot be had.
+        OutOfMemory: an array does not fit into the free memory.
     """
     try:
         with nullcontext() if device == "cpu" else _without_line(b"out of memory"):
@@ -99,25 +99,25 @@ def memory_named(device: str) -> Iterator[None]:
         if isinstance(error, RuntimeError) and "Failed to allocate" not in str(error):
             raise
         raise OutOfMemory(
-            f"device {device!r}: too little free memory; end what else uses it, or play fewer "
-            f"scenarios at once"
+            f"device {device!r}: too little free memory; end other programs that use it, or play "
+            f"fewer scenarios at once"
         ) from error
 
 
 @contextmanager
 def _cache_named() -> Iterator[None]:
-    """Let a file system that refuses compiled kernels be an error that names their folder."""
+    """Turn a file system's refusal of compiled kernels into an error that names their folder."""
     try:
         yield
     except OSError as error:
         raise EnvironmentFailure(
             f"compiled kernels cannot be kept in {wp.config.kernel_cache_dir}: {error.strerror}; "
-            f"set the variable WARP_CACHE_PATH to a folder that can be written"
+            f"set the variable WARP_CACHE_PATH to a writable folder"
         ) from error
 
 
 def _mistake(error: Exception) -> str:
-    """Return "FILE:LINE: what is wrong" of an error in the text of a Warp function."""
+    """Return "FILE:LINE: MISTAKE" for an error in the text of a Warp function."""
     words = str(error.args[0] if error.args else error)
     places = re.findall(r'Error while parsing function "(\w+)" at (.+):(\d+):\n(.*)\n', words)
     what = " ".join(words.rpartition("\n;")[2].split()).rstrip(".") or type(error).__name__
@@ -129,7 +129,7 @@ def _mistake(error: Exception) -> str:
 
 @contextmanager
 def _without_line(word: bytes) -> Iterator[None]:
-    """Drop the lines with a word that Warp's native code prints, and no other."""
+    """Drop only the lines of Warp's native code that contain a word."""
     try:
         os.fstat(2)
     except OSError:  # started without a standard error: nothing to keep clean
@@ -189,7 +189,7 @@ def launch(
         try:
             for _ in pool.map(run, _pieces(n_worlds, n_threads)):
                 pass
-        finally:  # after Ctrl-C, wait for the slices under way only
+        finally:  # after Ctrl-C, wait only for slices that have started
             pool.shutdown(cancel_futures=True)
 
 
@@ -203,8 +203,8 @@ def _pieces(n: int, n_threads: int) -> Iterator[tuple[int, int]]:
 def kernel_hash(*kernels: Any) -> str:
     """Return 16 hex digits that change with any function, constant or option of the kernels.
 
-    It is Warp's own content hash of the kernels' modules and Warp's version: the same that decides
-    whether a compiled kernel may be used again.
+    It combines Warp's version and Warp's own content hash of the kernels' modules, which also
+    decides whether a compiled kernel may be used again.
     """
     digest = hashlib.blake2b(wp.__version__.encode(), digest_size=8)
     with building:

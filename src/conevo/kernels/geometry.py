@@ -37,7 +37,7 @@ def cover_disc(
 ) -> int:
     """Mark the cells whose centre lies in the disc; return how many were not marked before.
 
-    The rows of the disc may be done in parts.
+    The rows of the disc may be marked in parts.
 
     Args:
         grid: words of one or more coverage grids, ``COVER_WORDS`` each.

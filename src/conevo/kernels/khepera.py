@@ -1,7 +1,7 @@
-"""The Khepera robot inside a kernel: what its sensors see, where its wheels take it.
+"""The Khepera robot inside a kernel: its sensors and its wheels.
 
-Nitschke 2009, section 4.1 and table 4.1. Lengths in cm, angles in rad counter-clockwise, positions
-relative to the robot are in its own frame (x ahead, y to its left).
+Nitschke 2009, section 4.1 and table 4.1. Lengths are in cm, angles in rad counter-clockwise.
+Positions relative to the robot are in its own frame (x ahead, y to its left).
 
 Eight sensors sit on the rim, SI-0 to SI-7 counter-clockwise from the front, at 13, 43, 68, 158
 degrees to either side, looking at 10, 45, 90 and 180 degrees: the real robot's geometry. A sensor
@@ -51,7 +51,7 @@ C2, C4, C6, C8, C10 = (wp.constant((-1.0) ** k / math.factorial(2 * k)) for k in
 
 @wp.func
 def one_of(four: wp.vec4f, k: int) -> float:
-    """Return the number of sensor ``k``, or of the one that it mirrors; not from memory."""
+    """Return the number for sensor ``k``, or for the one that it mirrors, without memory access."""
     m = wp.min(k, 7 - k)
     return wp.where(m < 2, wp.where(m == 0, four[0], four[1]), wp.where(m == 2, four[2], four[3]))
 
@@ -60,14 +60,14 @@ def one_of(four: wp.vec4f, k: int) -> float:
 def disc_gap(k: int, x: float, y: float, radius: float, cone: wp.vec2f, reach: float) -> float:
     """Return how far sensor ``k`` is from a disc in its cone; ``reach`` if none of it is there.
 
-    Without branches, so that one lane does all sensors at once.
+    It has no branches, so that one lane computes all sensors at once.
 
     Args:
         k: number of the sensor.
         x: the disc's centre, ahead of the robot's.
-        y: to the left of it.
+        y: the disc's centre, to the left of the robot's.
         radius: of the disc.
-        cone: cosine and sine of the half angle that a sensor sees.
+        cone: cosine and sine of the half angle of a sensor's cone.
         reach: range of a sensor, from its place on the rim.
     """
     side = wp.where(k < 4, 1.0, -1.0)
@@ -94,9 +94,9 @@ def wall_gap(k: int, h: float, nx: float, ny: float, cone: wp.vec2f, reach: floa
     Args:
         k: number of the sensor.
         h: distance of the robot's centre from the wall.
-        nx: unit vector from the robot to the wall.
-        ny: its other component, to the left.
-        cone: cosine and sine of the half angle that a sensor sees.
+        nx: unit vector from the robot to the wall, component ahead.
+        ny: its component to the left.
+        cone: cosine and sine of the half angle of a sensor's cone.
         reach: range of a sensor.
     """
     side = wp.where(k < 4, 1.0, -1.0)
@@ -112,13 +112,13 @@ def wall_gap(k: int, h: float, nx: float, ny: float, cone: wp.vec2f, reach: floa
 
 @wp.func
 def activation(gap: float, reach: float) -> float:
-    """Return what a sensor gives that is ``gap`` from the nearest thing it sees: 1 in contact."""
+    """Return the activation of a sensor ``gap`` from the nearest thing it sees; 1 in contact."""
     return 1.0 - wp.max(gap, 0.0) / reach
 
 
 @wp.func
 def wrap(angle: float) -> float:
-    """Return an angle between -3 pi and 3 pi as the same one in [-pi, pi)."""
+    """Return an angle between -3 pi and 3 pi, wrapped to [-pi, pi)."""
     a = float(angle)
     if a >= PI:
         a = a - 2.0 * PI
@@ -134,9 +134,9 @@ def drive(
     """Return the pose (x, y, heading) after one iteration: the exact arc of a differential drive.
 
     Args:
-        x: the pose before.
-        y: the pose before.
-        heading: the pose before.
+        x: first coordinate of the pose before the iteration.
+        y: second coordinate of this pose.
+        heading: of this pose.
         ahead: cosine and sine of that heading.
         left: distance that the left wheel rolls, up to 6.
         right: distance that the right wheel rolls.
@@ -156,7 +156,7 @@ def drive(
 
 @wp.func
 def steer(error: float, speed: float) -> wp.vec2f:
-    """Return wheel commands in [-1, 1] that turn by ``error`` and drive ahead with what is left.
+    """Return wheel commands in [-1, 1]: turn by ``error``, drive ahead with the remaining speed.
 
     Args:
         error: angle to turn, in [-pi, pi).
@@ -172,8 +172,8 @@ def steer_to(dx: float, dy: float, ahead: wp.vec2f, speed: float) -> wp.vec2f:
     """Return wheel commands that ``steer`` to a place.
 
     Args:
-        dx: from the robot to the place.
-        dy: from the robot to the place.
+        dx: first component of the vector from the robot to the place.
+        dy: second component.
         ahead: cosine and sine of the robot's heading.
         speed: distance that a wheel rolls at command 1.
     """

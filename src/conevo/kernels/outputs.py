@@ -1,7 +1,7 @@
-"""What worlds read off a robot's outputs: which is the highest, and a share between 0 and 1.
+"""Functions of a robot's outputs: which is the highest, and a share between 0 and 1.
 
-The sigmoid is the rational approximation of tanh, of degree 13 over 6, whose coefficients Eigen
-publishes; once for kernels and once, with the same operations in float32, for numpy.
+The sigmoid is the rational approximation of tanh, of degree 13 over 6, with the coefficients that
+Eigen publishes. It is here twice, with the same operations in float32: for kernels and for numpy.
 """
 
 from typing import Any
@@ -28,7 +28,7 @@ Q6 = wp.constant(1.19825839466702e-06)
 
 @wp.func
 def highest(outputs: wp.array2d[float], i: int, n: int) -> int:
-    """Return the number of robot ``i``'s highest output of the first ``n``, the first of equals."""
+    """Return which of robot ``i``'s first ``n`` outputs is the highest; ties go to the first."""
     best = int(0)
     most = outputs[i, 0]
     k = int(1)
@@ -44,7 +44,7 @@ def highest(outputs: wp.array2d[float], i: int, n: int) -> int:
 def sigmoid(a: float) -> float:
     """Return the logistic function by a rational approximation, error below 1e-6, branch-free.
 
-    The same operations on every target, unlike a library's exp.
+    Its operations are the same on every target, unlike those of a library's exp.
     """
     h = wp.clamp(a * 0.5, -LIMIT, LIMIT)
     q = h * h

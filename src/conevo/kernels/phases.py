@@ -1,8 +1,8 @@
-"""Phases: what a team does one after another in an iteration, each a loop over items.
+"""Phases: the steps of a team's iteration, each a loop over items.
 
-The lanes of a block share the items of a phase and wait for each other after it. One lane does all
-items in their order. Whatever the lanes, the bits are the same if no item reads what another item
-of the same phase writes, and sums over items are integers.
+The lanes of a block share the items of a phase and wait for each other after it. A single lane does
+all items in order. Results do not depend on the number of lanes, bit for bit, if no item reads data
+that another item of the same phase writes, and if sums over items are integers.
 """
 
 import hashlib
@@ -22,9 +22,9 @@ class Phase:
 
     Attributes:
         function: ``function(team, scene, p, q, t)`` does item q in iteration t.
-        items: ``items(team, scene, p)`` tells how many there are, or their number; by default one
-            for each robot. No item writes what it reads.
-        takes: what the function is given after team, scene and p.
+        items: the number of items, or ``items(team, scene, p)``, which returns it; by default one
+            item for each robot. This function must not read data that an item writes.
+        takes: the function's arguments after team, scene and p.
     """
 
     function: Any
@@ -39,7 +39,7 @@ class Phase:
 
 @wp.func_native("WP_TILE_SYNC();")
 def barrier():  # type: ignore[no-untyped-def]
-    """Wait for all lanes of the block (nothing to wait for where a block has one lane)."""
+    """Wait for all lanes of the block; with one lane there is nothing to wait for."""
 
 
 @wp.func_native("return WP_TILE_BLOCK_DIM;")
@@ -72,9 +72,9 @@ def run_of(
     Args:
         name: of the function.
         phases: in their order.
-        arguments: names and types of what every phase is given, as team, scene and p.
-        first: number of the first phase, where the cycles that it takes are added up in ``clock``;
-            None if nobody wants to know.
+        arguments: names and types of the arguments that all phases have, such as team, scene and p.
+        first: number of the first phase, the index in ``clock`` at which its cycles are added up;
+            None for no timing.
     """
     scope = {f"Type_{one}": kind for one, kind in arguments.items()}
     scope |= {"wp": wp, "n_lanes": n_lanes, "barrier": barrier, "cycles": cycles}
@@ -109,11 +109,11 @@ def run_of(
 
 
 def walk_of(name: str, phases: Sequence[Phase], arguments: Mapping[str, Any]) -> Any:
-    """Return a Warp function that runs phases with robots visited in an order that is given.
+    """Return a Warp function that runs phases with robots visited in a given order.
 
     Its arguments are those of the phases' functions, then ``order`` [B, R], ``b`` and ``t``: robots
-    in row b, -1 for none. Items that are not robots are visited last first if the order is not
-    that of the robots' numbers.
+    in row b, -1 for none. Items that are not robots are visited in reverse if the order differs
+    from that of the robots' numbers.
     """
     scope = {f"Type_{one}": kind for one, kind in arguments.items()} | {"wp": wp}
     given = ", ".join(arguments)
@@ -147,14 +147,14 @@ def walk_of(name: str, phases: Sequence[Phase], arguments: Mapping[str, Any]) ->
 def written(
     name: str, lines: Sequence[str], scope: dict[str, Any], title: str, is_native: bool = False
 ) -> Any:
-    """Return the Warp function of a text, which Warp reads again when it compiles it.
+    """Return the Warp function of a source text, which Warp reads again when it compiles it.
 
     Args:
         name: of the function.
         lines: of the text.
-        scope: what its names stand for.
-        title: of the text, as in messages.
-        is_native: whether it is decorated with ``wp.func_native``, which must stand in the text.
+        scope: the objects that its names refer to.
+        title: of the text, for messages.
+        is_native: whether it is decorated with ``wp.func_native``, which must be part of the text.
     """
     source = "\n".join([*lines, ""])
     digest = hashlib.blake2b(source.encode(), digest_size=4).hexdigest()

@@ -45,13 +45,13 @@ def without_lowest(some: wp.uint64) -> wp.uint64:
 
 @wp.func
 def parts(n: int) -> int:
-    """Return into how many parts a set of ``n`` things is cut: one lane takes it as a whole."""
+    """Return the number of parts into which a set of ``n`` things is cut: 1 for a single lane."""
     return wp.where(n_lanes() == 1, 1, n)
 
 
 @wp.func
 def part_of(some: wp.uint64, q: int) -> wp.uint64:
-    """Return part ``q`` of a set: all of it on one lane, else thing ``q`` if it is there."""
+    """Return part ``q`` of a set: all of it for a single lane, else thing ``q`` if it is in it."""
     if n_lanes() == 1:
         return some
     return some & one(q)

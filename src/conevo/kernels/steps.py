@@ -1,4 +1,4 @@
-"""Steps in the plane: where a robot wants to go, and whether another is there already."""
+"""Steps in the plane: where a robot wants to go, and whether another robot is already there."""
 
 import warp as wp
 
@@ -10,14 +10,14 @@ __all__ = ["is_taken", "random_step", "steered_step"]
 
 @wp.func
 def random_step(u: float, length: float) -> wp.vec2f:
-    """Return a step of a length in the direction 2 pi ``u``."""
+    """Return a step of this length in the direction 2 pi ``u``."""
     ahead = cosine_sine(u * 6.2831853)
     return wp.vec2f(length * ahead[0], length * ahead[1])
 
 
 @wp.func
 def steered_step(sum_x: float, sum_y: float, length: float) -> wp.vec2f:
-    """Return the step that two output sums stand for, of a length at most.
+    """Return the step that two output sums stand for, at most ``length`` long.
 
     "Normalized and scaled" (Nitschke 2009, 5.2) so that both at an extreme make the longest step.
     """
@@ -35,13 +35,13 @@ def is_taken(
     y: float,
     separation_2: float,
 ) -> bool:
-    """Return whether one of the first ``n`` robots, ``i`` left out, is too close to a place.
+    """Return whether one of the first ``n`` robots, other than ``i``, is too close to a place.
 
     Args:
         xs: [R] first coordinates.
         ys: [R] second coordinates.
-        n: how many robots to look at: all, or ``i``, those with a lower number.
-        i: the robot that asks.
+        n: number of robots to look at: all, or ``i`` for those with a lower number.
+        i: the robot that wants to go there.
         x: first coordinate of the place.
         y: second coordinate.
         separation_2: the square of the smallest distance allowed.

@@ -1,4 +1,4 @@
-"""How many CPU threads there are, and how many are meant; Warp is not loaded."""
+"""The number of CPU threads: available, and requested. Warp is not loaded."""
 
 import os
 from typing import Any
@@ -16,7 +16,7 @@ def usable_cores() -> int:
 
 
 def threads_of(given: Any) -> int:
-    """Return how many CPU threads are meant: those that are given, or all that are usable.
+    """Return the number of CPU threads to use: the given one, or that of all usable ones.
 
     Raises:
         UsageError: not a number of threads.

@@ -1,9 +1,9 @@
-"""Sine, cosine and arc tangent from + - * / alone: the same bits on every target.
+"""Sine, cosine and arc tangent from + - * / alone: equal bit for bit on every target.
 
-A library rounds them as it likes, so each target's differ in the last place. These are the
+Libraries round them differently, so those of two targets differ in the last place. These are the
 polynomials and the three-part pi / 2 of S. L. Moshier, Cephes mathematical library, single
-precision (``sinf.c``, ``atanf.c``); once for kernels and once, with the same operations in float32,
-for numpy.
+precision (``sinf.c``, ``atanf.c``). They are here twice, with the same operations in float32: for
+kernels and for numpy.
 """
 
 import math
@@ -71,7 +71,7 @@ def cosine_sine_of(
 
 @wp.func
 def arc_tangent(y: float, x: float) -> float:
-    """Return the angle in [-pi, pi] of the vector (x, y); error below 3e-7; 0 without a length."""
+    """Return the angle in [-pi, pi] of the vector (x, y), error below 3e-7; 0 for a zero vector."""
     a = wp.abs(x)
     b = wp.abs(y)
     large = wp.max(a, b)

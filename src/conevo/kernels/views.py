@@ -1,9 +1,9 @@
 """One team's part of a batch: views of arrays, and which of them lie in a block's shared memory.
 
-On a CUDA device the lanes of a block share some memory that is far nearer than the device's own.
-The smallest arrays of a team are put there, as many as fit into a limit: those are the ones that an
-iteration goes through again and again (places, actions, inputs, activations). What a launch begins
-with is fetched from the batch, and what it ends with is stored there.
+On a CUDA device the lanes of a block share some memory that is far faster than the device's own.
+The smallest arrays of a team are put there, as many as fit into a limit. These are the arrays that
+an iteration uses again and again (places, actions, inputs, activations). A launch copies them from
+the batch at its start and back at its end.
 
 Choice: the limit is 24 KiB a block, so that nine blocks are on a multiprocessor of an H100 at once
 and four on that of a smaller card. An array that does not fit stays where it is.
@@ -52,16 +52,16 @@ def near_arrays(
 def view_of(struct: Any, has_shared: bool = False, near: Near = ()) -> Any:
     """Return the function ``view(batch, index, n)`` that gives one of ``n`` parts of a batch.
 
-    A batch is a struct whose arrays hold the parts one after another, along their first dimension;
-    the view has the same fields, with each array cut down to its part. Numbers are shared by all
-    parts.
+    A batch is a struct whose arrays contain the parts one after another, along their first
+    dimension. The view has the same fields, with each array cut down to its part. Numbers are
+    shared by all parts.
 
     The function is written out, field by field, because contiguous arrays made from pointers are
     a quarter faster than slices (measured), and Warp has no loop over fields.
 
     Args:
         struct: its arrays have one or two dimensions.
-        has_shared: arrays of more than one dimension, too, are shared by all parts.
+        has_shared: whether all parts also share the arrays of more than one dimension.
         near: arrays that lie in shared memory on a CUDA device, with the elements of a part.
     """
     lines = ["def view(batch: Struct, index: int, n: int) -> Struct:", "    part = Struct()"]
@@ -94,9 +94,9 @@ def view_of(struct: Any, has_shared: bool = False, near: Near = ()) -> Any:
 
 @cache
 def _place(struct: Any, name: str, size: int) -> Any:
-    """Return the function that gives the place of an array in shared memory, not its own.
+    """Return the function that returns the address of an array in shared memory, not its own.
 
-    On the CPU, where such kernels are only tested, it is memory that one block has at a time.
+    On the CPU, where such kernels are only tested, one block at a time has this memory.
     """
     snippet = f"""
 #if defined(__CUDA_ARCH__)

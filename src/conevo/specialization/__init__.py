@@ -1,4 +1,4 @@
-"""Specialization: how a robot divides its work among actions, and what that makes of the team."""
+"""Specialization: how robots divide their work among actions, and the measures of a team."""
 
 from conevo.specialization.activity import shares
 from conevo.specialization.individual import castes, degree, label

@@ -1,4 +1,4 @@
-"""What a robot did with its life: the shares of its actions."""
+"""Activity of a robot: the shares of its actions over its life."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How much the robots of a team differ: in castes, in degrees, and to what good.
+"""Diversity of a team: how much its robots differ, and whether that goes with performance.
 
 Balch 1997 and 2000 (social and hierarchic social entropy), Bettini, Shankar and Prorok 2023 (system
 neural diversity), Li, Martinoli and Abu-Mostafa 2004 (specialization is the diversity that pays).
@@ -28,7 +28,7 @@ Floats = npt.NDArray[np.floating[Any]]
 
 
 def caste_entropy(labels: Iterable[str]) -> float:
-    """Return the entropy of a team's castes in bits: 0 for one caste, log2(R) if each has its own.
+    """Return the entropy of a team's castes in bits; log2(R) if each robot has its own, 0 for one.
 
     Balch 1997: simple social entropy, of the castes of section 3.2.3 (Nitschke 2009).
     """
@@ -38,11 +38,11 @@ def caste_entropy(labels: Iterable[str]) -> float:
 def differences(counts: npt.ArrayLike) -> Floats:
     """Return how differently two robots divide their lives, [R, R] in [0, 1].
 
-    The portion of its life that one would have to spend otherwise to be like the other: the total
+    The portion of its life that one would have to spend differently to be like the other: the total
     variation of their shares of actions, which is their Wasserstein distance if any two actions are
-    one apart. Choice: robots are compared by what they do in their own lives, not by what their
-    networks would do with the same inputs, as Balch and Bettini et al. do; to do nothing at all is
-    one more action.
+    one apart. Choice: robots are compared by the actions in their own lives. Balch and Bettini et
+    al. compare the actions that their networks would choose with the same inputs. Doing nothing at
+    all is one more action.
 
     Args:
         counts: [R, A] how often each robot executed each action.
@@ -54,11 +54,12 @@ def differences(counts: npt.ArrayLike) -> Floats:
 
 
 def hierarchic_social_entropy(apart: npt.ArrayLike) -> float | None:
-    """Return the entropy of the clusters of a team, integrated over how different they must be.
+    """Return the entropy of a team's clusters, integrated over all levels of difference.
 
-    0 if all robots are alike; at most log2(R) bits, times the largest difference, if any two differ
-    as much as that. Balch 2000. None for less than two robots. Choice: clusters at a level are what
-    differences up to it link (single linkage); Balch's may overlap, and can be too many to list.
+    0 if all robots are alike; at most log2(R) bits times the largest difference, reached if any two
+    robots differ by it. Balch 2000. None for less than two robots. Choice: clusters at a level are
+    robots that differences up to it link (single linkage). Balch's may overlap, and can be too many
+    to list.
 
     Args:
         apart: [R, R] differences.
@@ -85,8 +86,8 @@ def hierarchic_social_entropy(apart: npt.ArrayLike) -> float | None:
 def system_neural_diversity(apart: npt.ArrayLike) -> float | None:
     """Return the mean difference between two robots of a team.
 
-    0 if all are alike, the largest difference if any two differ as much as that, however many there
-    are. Bettini et al. 2023, their aggregate of any matrix of differences. None for less than two
+    0 if all are alike; the largest difference if any two differ by it, for any number of robots.
+    Bettini et al. 2023, their aggregate of any matrix of differences. None for less than two
     robots.
 
     Args:
@@ -101,14 +102,14 @@ def system_neural_diversity(apart: npt.ArrayLike) -> float | None:
 def task_specialization(diversity: npt.ArrayLike, performance: npt.ArrayLike) -> float | None:
     """Return the part of the diversity of several teams that goes with their performance.
 
-    Their mean diversity times its correlation with their performance: at most that diversity, 0
-    where the two have nothing to do with each other, negative where diversity costs. Li et al.
-    2004: specialization is the part of diversity that is required for performance. Choice: this
-    product, with Pearson's correlation over teams. None for less than three teams, and where all
-    are as diverse or perform alike.
+    Their mean diversity times its correlation with their performance: at most the mean diversity, 0
+    if the two are not related, negative if diversity costs performance. Li et al. 2004:
+    specialization is the part of diversity that is required for performance. Choice: this product,
+    with Pearson's correlation over teams. None for less than three teams, or if all teams are
+    equally diverse or perform equally well.
 
     Args:
-        diversity: [N] of each team, by any measure.
+        diversity: [N] of each team, in any measure.
         performance: [N] of each team.
     """
     x, y = np.asarray(diversity, dtype=np.float64), np.asarray(performance, dtype=np.float64)

@@ -1,4 +1,4 @@
-"""Entropies of activity: what robots divide their work among, and how a team divides it.
+"""Entropies of activity: how a robot divides its work, and how a team divides it.
 
 O'Donnell and Jeanne 1990 (the entropy of one individual's activity, Nitschke 2009, section 2.3),
 Gorelick, Bertram, Killeen and Fewell 2004 (division of labour). All in bits.
@@ -17,9 +17,9 @@ Floats = npt.NDArray[np.floating[Any]]
 
 
 def entropy(weights: npt.ArrayLike) -> Floats:
-    """Return Shannon's entropy in bits [...] of what has these weights; 0 if all are 0.
+    """Return Shannon's entropy of weights in bits, [...]; 0 if all are 0.
 
-    From 0 (all in one) to log2 of their number (all equal).
+    From 0 (all weight in one) to log2 of their number (all equal).
 
     Args:
         weights: [..., K] not negative, in any unit.
@@ -35,10 +35,10 @@ def entropy(weights: npt.ArrayLike) -> Floats:
 def activity_entropy(counts: npt.ArrayLike) -> float | None:
     """Return the entropy of a robot's activity in bits, the mean over the robots that did anything.
 
-    0 if each does one thing all its life, log2(A) if each divides its life evenly among all. It
-    does not tell half a life of one thing from switching all the time, as S does.
+    0 if each does one thing all its life, log2(A) if each divides its life evenly among all.
+    Unlike S, it does not distinguish doing one thing for half a life from switching all the time.
     O'Donnell and Jeanne 1990: the Shannon-Wiener H of an individual, low for a specialist. None if
-    nobody did anything. Choice: the team's measure is the mean, every robot counting alike.
+    no robot did anything. Choice: the team's measure is the mean, with equal weights for robots.
 
     Args:
         counts: [R, A] how often each robot executed each action.
@@ -49,11 +49,11 @@ def activity_entropy(counts: npt.ArrayLike) -> float | None:
 
 
 def mutual_information(counts: npt.ArrayLike) -> float | None:
-    """Return what knowing the robot tells about the action it executes, in bits.
+    """Return the mutual information of robots and executed actions, in bits.
 
-    0 if all robots divide their work alike; at most the entropy of the actions and that of the
-    robots. Gorelick et al. 2004: mutual entropy of the matrix of individuals and tasks. None if
-    nobody did anything.
+    0 if all robots divide their work alike; at most the entropy of the actions, and at most that of
+    the robots. Gorelick et al. 2004: mutual entropy of the matrix of individuals and tasks. None if
+    no robot did anything.
 
     Args:
         counts: [R, A] how often each robot executed each action.

@@ -1,8 +1,8 @@
-"""What a robot does most, and with how much of its work: castes that S cannot see.
+"""A robot's favourite activity and its share of the work: castes that S does not detect.
 
-S (eq. 3.4) tells how often a robot switches. A robot that moves and detects in turn has S = 1 even
-if it detects with one setting all its life. What follows counts instead. All take how often a robot
-did what, [..., K]: of all actions, or only of those among which its world says that a robot chooses
+S (eq. 3.4) measures how often a robot switches. A robot that moves and detects in turn has S = 1
+even if it detects with one setting all its life. The measures here count activities instead. All
+take counts [..., K]: of all actions, or only of those among which a robot of its world chooses
 (``worlds.protocol.World``: settings). Solow and Szmerekovsky, O'Donnell and Jeanne 1990, Murciano,
 Millan and Zamora 1997; Nitschke 2009, section 2.3.
 """
@@ -33,10 +33,10 @@ MAJORITY = 0.5
 
 
 def favourite(counts: npt.ArrayLike, names: Sequence[str]) -> str | None:
-    """Return what a robot did most, the first of equals; None if it did none of it.
+    """Return a robot's most frequent activity; ties go to the first; None if all counts are 0.
 
     Args:
-        counts: [K] how often it did each.
+        counts: [K] how often it did each activity.
         names: K names.
     """
     executed = np.asarray(counts)
@@ -44,14 +44,14 @@ def favourite(counts: npt.ArrayLike, names: Sequence[str]) -> str | None:
 
 
 def favourite_share(counts: npt.ArrayLike) -> Floats:
-    """Return the share of what a robot did most in all that it did [...], from 1 / K to 1.
+    """Return the share of a robot's most frequent activity [...], from 1 / K to 1.
 
-    1 = always the same, 1 / K = all equally often; NaN for a robot that did none of it. Of all
-    actions: the share of time in one activity, of which Solow and Szmerekovsky ask 100 % (Nitschke
-    2009, section 2.3).
+    1 = always the same, 1 / K = all equally often; NaN for a robot whose counts are 0. For all
+    actions: the share of time in one activity, which Solow and Szmerekovsky require to be 100 %
+    (Nitschke 2009, section 2.3).
 
     Args:
-        counts: [..., K] how often each was done.
+        counts: [..., K] how often each activity was done.
     """
     share = shares(counts).max(axis=-1)
     found: Floats = np.where(share > 0, share, np.nan)
@@ -61,10 +61,10 @@ def favourite_share(counts: npt.ArrayLike) -> Floats:
 def portion_devoted(counts: npt.ArrayLike) -> float:
     """Return the portion of robots that do more than half of their work in one way.
 
-    From 0 (nobody) to 1 (all). O'Donnell and Jeanne 1990: a specialist "devotes most of its work
-    time (> 50%)" to one resource (Nitschke 2009, section 2.3). Choice: work is what a robot's world
-    has settings for, as theirs was gathering: moving between rocks is none. A robot that did no
-    work is not specialized.
+    From 0 (no robot) to 1 (all). O'Donnell and Jeanne 1990: a specialist "devotes most of its work
+    time (> 50%)" to one resource (Nitschke 2009, section 2.3). Choice: only actions with one of the
+    world's settings are work, as gathering was theirs; moving between rocks is not. A robot that
+    did no work is not specialized.
 
     Args:
         counts: [R, K] how often each robot used each setting.
@@ -76,10 +76,10 @@ def affinity(counts: npt.ArrayLike) -> Floats:
     """Return how much a robot prefers one setting to any other [...], from 0 to 1.
 
     The share of the favourite less that of the next: 1 = always the same, 0 = two or more equally
-    often; NaN for a robot that used none. Murciano et al. 1997: specialized is whose probability of
-    collecting one type of object is close to 1, and of the other types close to 0. Choice: this
-    difference, since section 2.3 (Nitschke 2009) has no formula; and shares of what a robot did, as
-    nothing counts what it passed by.
+    often; NaN for a robot that used none. Murciano et al. 1997: a robot is specialized if its
+    probability of collecting one type of object is close to 1, and of the other types close to 0.
+    Choice: this difference, since section 2.3 (Nitschke 2009) has no formula. The shares are of
+    objects used, since objects that a robot passed by are not counted.
 
     Args:
         counts: [..., K] how often each setting was used.
@@ -91,12 +91,12 @@ def affinity(counts: npt.ArrayLike) -> Floats:
 
 
 def mean_where_defined(values: npt.ArrayLike) -> float | None:
-    """Return a team's mean of its robots' values, every robot counting alike; None without any.
+    """Return the mean of the values of a team's robots, with equal weights; None without any.
 
-    Choice: robots without a value, as of settings that they never used, are left out.
+    Choice: robots without a value, such as those that never used a setting, are left out.
 
     Args:
-        values: [R], NaN where there is none.
+        values: [R], NaN for a robot without a value.
     """
     found = np.asarray(values, dtype=np.float64)
     found = found[np.isfinite(found)]

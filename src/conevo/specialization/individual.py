@@ -1,4 +1,4 @@
-"""How specialized one robot is, to what, and which castes a team has.
+"""How specialized one robot is, and to which action; the castes of a team.
 
 Nitschke 2009, section 3.2, after Gautrais et al. 2002.
 """
@@ -29,8 +29,9 @@ def degree(switches: npt.ArrayLike, counts: npt.ArrayLike) -> npt.NDArray[np.flo
     """Return the degree of specialization S = A / N in [0, 1], [...]; 0 is a perfect specialist.
 
     Nitschke 2009, eq. 3.4: A is how often the robot changed from one action to another, N how often
-    it could have: one less than the actions it executed. More switching raises S. Choice:
-    iterations without an action do not count, and S is 0 if fewer than two were executed.
+    it could have done so: one less than the number of executed actions. More switching raises S.
+    Choice: iterations without an action do not count, and S is 0 if fewer than two actions were
+    executed.
 
     Args:
         switches: [...] A.
@@ -47,8 +48,9 @@ def independent_degree(counts: npt.ArrayLike) -> npt.NDArray[np.floating[Any]]:
     """Return the S that independent draws from a robot's own shares would give, [...].
 
     1 - sum of the squared shares: each of the N possible switches is made if two draws differ. From
-    0 (one action only) to 1 - 1 / A (all equally often). The null of S: in turn or in blocks, a
-    robot's S is above or below it with the same shares. 0 if no action was executed.
+    0 (one action only) to 1 - 1 / A (all equally often). This is the null of S: with the same
+    shares, S is higher for actions in turn and lower for actions in blocks. 0 if no action was
+    executed.
 
     Args:
         counts: [..., A] how often each action was executed.
@@ -64,7 +66,7 @@ def relative_degree(
 ) -> npt.NDArray[np.floating[Any]]:
     """Return S over the S of independent draws, [...].
 
-    0 = always the same action, 1 = as often switched as by independent draws from the same shares,
+    0 = always the same action, 1 = switches as often as independent draws from the same shares do,
     up to 9/4 (a, b, a) = in turn. Choice: 0 where S is 0, also for one action only, where
     independent draws would not switch either.
 
@@ -81,16 +83,16 @@ def relative_degree(
 def label(
     specialization: float, counts: npt.ArrayLike, names: Sequence[str], threshold: float = 0.5
 ) -> str:
-    """Return what a robot is specialized to, or "non-specialized".
+    """Return the caste of a robot, or "non-specialized".
 
-    Nitschke 2009, 3.2.3: specialized if S < 0.5, then to the most executed action (the first of
-    equals). Choice: a robot that executed no action is not specialized.
+    Nitschke 2009, 3.2.3: a robot is specialized if S < 0.5, to the action that it executed most;
+    ties go to the first. Choice: a robot that executed no action is not specialized.
 
     Args:
         specialization: S.
         counts: [A] how often each action was executed.
         names: A names, of the actions or of the castes that do them.
-        threshold: S from which on a robot is not specialized.
+        threshold: a robot is not specialized if its S is this or more.
     """
     executed = np.asarray(counts)
     if executed.sum() == 0 or not specialization < threshold:
@@ -99,10 +101,10 @@ def label(
 
 
 def castes(labels: Iterable[str]) -> dict[str, int]:
-    """Return the number of robots per caste, the largest first, equals by name.
+    """Return the number of robots per caste, the largest first, ties by name.
 
-    A caste is the robots of a team specialized to the same action (Nitschke 2009, 3.2.3); the
-    non-specialized are counted with them, as in the thesis' tables.
+    A caste consists of the robots of a team that are specialized to the same action (Nitschke 2009,
+    3.2.3). The non-specialized are counted, too, as in the thesis' tables.
     """
     found = Counter(labels)
     return dict(sorted(found.items(), key=lambda caste: (-caste[1], caste[0])))

@@ -1,4 +1,4 @@
-"""The index that the degree of specialization S comes from.
+"""The index from which the degree of specialization S was derived.
 
 Gautrais, Theraulaz, Deneubourg and Anderson 2002; Nitschke 2009, sections 2.3 and 3.2.1.
 """
@@ -12,12 +12,12 @@ __all__ = ["switching_index"]
 
 
 def switching_index(specialization: npt.ArrayLike, n_actions: int) -> float | None:
-    """Return how much less often than by chance robots switch, the mean over them.
+    """Return how much less often than by chance robots switch, mean over the robots.
 
-    1 if they never switch, 0 if they switch as often as whoever draws every action at random, and
-    -1 / (A - 1) if they always do. With two tasks it is 1 - 2 S, from -1 to 1, as Gautrais et al.
-    2002 have it; the thesis keeps S only. Choice: with A actions chance is (A - 1) / A, all being
-    equally likely. None for one action.
+    1 if they never switch, 0 if they switch as often as with random actions, and -1 / (A - 1) if
+    they always switch. With two tasks it is 1 - 2 S, from -1 to 1, as in Gautrais et al. 2002; the
+    thesis uses only S. Choice: with A equally likely actions, chance is (A - 1) / A. None for one
+    action.
 
     Args:
         specialization: [R] degree of specialization S, switches over possible switches.

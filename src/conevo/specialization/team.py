@@ -34,7 +34,7 @@ __all__ = ["METRICS", "Activity", "Metric", "measure"]
 
 @dataclass(frozen=True)
 class Activity:
-    """What the robots of a team did.
+    """Activity of the robots of a team.
 
     Attributes:
         counts: [R, A] how often each robot executed each action.
@@ -61,10 +61,10 @@ class Metric:
     """One measure.
 
     Attributes:
-        function: takes it; None where it is not defined.
-        span: from which value to which, R robots, A actions and K settings.
-        what: what it says, and what its extremes mean.
-        source: where it is from.
+        function: computes it; None where it is not defined.
+        span: its range, for R robots, A actions and K settings.
+        what: its meaning, and that of its extremes.
+        source: the publication that defines it.
     """
 
     function: Callable[[Activity], float | None]
@@ -102,15 +102,15 @@ METRICS: dict[str, Metric] = {
     "favourite_setting": Metric(
         lambda team: mean_where_defined(favourite_share(team.work)),
         "1 / K to 1",
-        "share of its favourite in the settings that a robot used, mean; 1: always the same one, "
-        "1 / K: all alike; S does not see it",
+        "share of the favourite in the settings that a robot used, mean; 1: always the same one, "
+        "1 / K: all equally often; not detected by S",
         "after Nitschke 2009, 5.2: one of three settings",
     ),
     "affinity": Metric(
         lambda team: mean_where_defined(affinity(team.work)),
         "0 to 1",
         "share of the favourite setting less that of the next, mean; 1: always the same one",
-        "Murciano et al. 1997, as section 2.3 has it",
+        "Murciano et al. 1997, after section 2.3",
     ),
     "devoted": Metric(
         lambda team: portion_devoted(team.work),
