@@ -10,7 +10,8 @@ import pytest
 from conevo.report.claims.evidence import Evidence, RunOf
 from conevo.report.claims.judgement import judge
 from conevo.report.claims.outcomes import Decision
-from conevo.report.claims.statements import Claim, Part, above, across, alike, within
+from conevo.report.claims.statements import Claim
+from conevo.report.claims.vocabulary import part_of
 from conevo.report.statistics import compare, holm
 
 PLACES = tuple(f"complex-{n}" for n in range(1, 11))
@@ -34,12 +35,12 @@ def evidence(
     return Evidence("rover-v2", "smoke", "", {quantity: values}.__getitem__, runs)
 
 
-def claim(*parts: Part) -> Claim:
-    return Claim("R0", "something", "5.5", parts)
+def claim(*rows: str) -> Claim:
+    return Claim("R0", "something", "5.5", tuple(map(part_of, rows)))
 
 
-CONE_ABOVE = claim(Part(above("value", PLACES[:1], ("cone",), ("mesp",))))
-CONE_ALIKE = claim(Part(alike("value", PLACES[:1], [("cone", "mesp")])))
+CONE_ABOVE = claim("above | value | cone : mesp | complex-1")
+CONE_ALIKE = claim("alike | value | cone : mesp | complex-1")
 HERE = "complex-1"
 
 
@@ -93,7 +94,7 @@ def test_holm_is_over_all_comparisons_of_the_claim() -> None:
     assert 0.005 < p < 0.05
     assert alone.verdict == "reproduced"
     ten = {(place, name): v for place in PLACES for name, v in (("cone", cone), ("mesp", mesp))}
-    together = judge(claim(Part(above("value", PLACES, ("cone",), ("mesp",)))), evidence(ten))
+    together = judge(claim("above | value | cone : mesp | complex-1..10"), evidence(ten))
     assert [cell.p_holm for cell in together.cells] == holm([p] * 10)
     assert together.verdict == "undecided: the tests disagree"
     assert together.tests == "t-test; Mann-Whitney with Holm over 10"
@@ -104,7 +105,7 @@ def test_a_cell_is_decided_by_its_own_test_alone() -> None:
     # A difference that Holm corrects away does not forbid "alike"; the t-test still does.
     cone, mesp = around(104, 0.05, 20), around(100, 0.05, 20)
     ten = {(place, name): v for place in PLACES for name, v in (("cone", cone), ("mesp", mesp))}
-    found = judge(claim(Part(alike("value", PLACES, [("cone", "mesp")]))), evidence(ten))
+    found = judge(claim("alike | value | cone : mesp | complex-1..10"), evidence(ten))
     assert {cell.by_rank for cell in found.cells} == {Decision.HOLDS}
     assert {cell.by_t for cell in found.cells} == {Decision.CONTRADICTED}
 
@@ -125,12 +126,12 @@ def test_nine_of_ten_environments(levels: list[float], expected: str) -> None:
     samples: Samples = {}
     for place, level in zip(PLACES, levels, strict=False):
         samples[place, "mesp"], samples[place, "ccga"] = around(100), around(level)
-    nine = claim(Part(alike("value", PLACES, [("ccga", "mesp")]), need=9))
+    nine = claim("alike | value | ccga : mesp | complex-1..10 | need 9")
     assert judge(nine, evidence(samples)).verdict == expected
 
 
 def test_an_environment_holds_only_with_all_its_pairs() -> None:
-    both = claim(Part(above("value", PLACES[:2], ("cone",), ("mesp", "ccga")), need=1))
+    both = claim("above | value | cone : mesp, ccga | complex-1..2 | need 1")
     samples = {(HERE, name): around(100) for name in ("mesp", "ccga")}
     samples |= {(HERE, "cone"): around(150)}
     assert judge(both, evidence(samples)).verdict == "reproduced"
@@ -146,9 +147,9 @@ def test_all_parts_must_hold() -> None:
         (HERE, "mesp"): around(100),
         (HERE, "ccga"): around(100),
     }
-    better = Part(above("value", (HERE,), ("cone",), ("mesp",)))
-    same = Part(alike("value", (HERE,), [("mesp", "ccga")]))
-    other = Part(alike("value", (HERE,), [("mesp", "cone")]))
+    better = "above | value | cone : mesp | complex-1"
+    same = "alike | value | mesp : ccga | complex-1"
+    other = "alike | value | mesp : cone | complex-1"
     assert judge(claim(better, same), evidence(samples)).verdict == "reproduced"
     assert judge(claim(better, same, other), evidence(samples)).verdict == "not reproduced"
 
@@ -165,7 +166,7 @@ def test_all_parts_must_hold() -> None:
 )
 def test_shares_need_their_whole_interval_inside(seen: int, n: int, expected: str) -> None:
     runs = evidence({(HERE, "cone"): [1.0] * seen + [0.0] * (n - seen)}, "entrapment")
-    found = judge(claim(Part((within("entrapment", "cone", (HERE,), 0.7, 0.9),))), runs)
+    found = judge(claim("within | entrapment | cone | complex-1 | 0.7..0.9"), runs)
     assert found.verdict == expected
     assert found.tests == "Clopper-Pearson interval"
     assert found.effect == f"{HERE}: entrapment, CONE = {seen / n:.2f}, claimed 0.70 to 0.90"
@@ -179,21 +180,21 @@ def test_a_mean_over_environments_is_taken_seed_by_seed() -> None:
         ("complex-1", "cone"): [x + 0.1 for x in levels],
         ("complex-2", "cone"): [x - 0.1 for x in levels[:-1]],  # the last seed failed here
     }
-    statement = within(place, "cone", ("complex-1", "complex-2"), 0.5, 0.9)
-    found = judge(claim(Part((statement,))), evidence(samples, place))
+    pooled = claim(f"within | {place} | cone | {{complex-1..2}} | 0.5..0.9")
+    found = judge(pooled, evidence(samples, place))
     (cell,) = found.cells
     assert cell.gathered.samples == (pytest.approx(levels[:-1]),)
     assert found.n == "7"
     assert found.tests == "Student's t interval"
     samples.pop(("complex-2", "cone"))
-    missing = judge(claim(Part((statement,))), evidence(samples, place))
+    missing = judge(pooled, evidence(samples, place))
     assert missing.verdict == "undecided: 1 of 2 environments"
     assert missing.why == "0 of 1 hold; 1 without all their runs; no runs of CONE in complex-2"
 
 
 def test_pooled_runs_say_nothing_until_all_environments_are_there() -> None:
     samples = {(place, "cone"): [0.0] * 20 for place in PLACES[:9]}
-    pooled = claim(Part((within("entrapment", "cone", PLACES, 0.7, 0.9),)))
+    pooled = claim("within | entrapment | cone | {complex-1..10} | 0.7..0.9")
     assert (
         judge(pooled, evidence(samples, "entrapment")).verdict == "undecided: 9 of 10 environments"
     )
@@ -213,7 +214,7 @@ def test_budgets_are_never_mixed_in_an_environment() -> None:
 def test_environments_may_be_compared_across_budgets() -> None:
     # Complex environments are learned in stages, simple ones are not (6.4.2).
     samples = {("complex-1", "cone"): around(150), ("simple-1", "cone"): around(100)}
-    pair = claim(Part(across("value", ("cone",), [("complex-1", "simple-1")])))
+    pair = claim("above | value | cone | complex-1 ~ simple-1")
     found = judge(pair, evidence(samples, budgets={("complex-1", "cone"): "stage"}))
     assert found.verdict == "reproduced"
     assert found.budget == "smoke; stage"
@@ -223,7 +224,7 @@ def test_environments_may_be_compared_across_budgets() -> None:
 def test_the_effect_is_that_of_the_cell_on_which_the_verdict_hangs() -> None:
     samples: Samples = {(place, "mesp"): around(100) for place in PLACES[:3]}
     samples |= {("complex-1", "cone"): around(200), ("complex-3", "cone"): around(120)}
-    three = claim(Part(above("value", PLACES[:3], ("cone",), ("mesp",))))
+    three = claim("above | value | cone : mesp | complex-1..3")
     held = judge(three, evidence(samples | {("complex-2", "cone"): around(140)}))
     assert held.effect == "complex-3: value, CONE - MESP = +20 (+17%) (weakest of 3)"
     found = compare(around(120), around(100))
@@ -245,12 +246,12 @@ def test_with_too_few_runs_it_is_said() -> None:
 def test_the_weakest_is_told_by_its_interval() -> None:
     samples: Samples = {(place, "mesp"): around(100) for place in PLACES[:2]}
     samples |= {(PLACES[0], "cone"): around(120), (PLACES[1], "cone"): around(130, sd=0.25)}
-    runs = claim(Part(above("value", PLACES[:2], ("cone",), ("mesp",))))
+    runs = claim("above | value | cone : mesp | complex-1..2")
     assert judge(runs, evidence(samples)).effect.startswith("complex-2")  # more, less surely
     shares: Samples = {(place, "cone"): [1.0] * 20 for place in PLACES[:3]}
     shares[PLACES[1], "cone"] = [1.0] * 17 + [0.0] * 3
-    most = Part(tuple(within("one caste", "cone", (place,), 0.5, 1) for place in PLACES[:3]))
-    found = judge(claim(most), evidence(shares, "one caste"))
+    most = claim("has | one caste | cone | complex-1..3")
+    found = judge(most, evidence(shares, "one caste"))
     assert found.verdict == "reproduced"
     assert found.effect == (
         "complex-2: one caste, CONE = 0.85, claimed 0.50 to 1.00 (weakest of 3)"
@@ -260,7 +261,7 @@ def test_the_weakest_is_told_by_its_interval() -> None:
 def test_a_part_that_holds_does_not_decide_for_an_open_one() -> None:
     samples = {(HERE, "cone"): around(150), (HERE, "mesp"): around(100, 0.6)}
     samples[HERE, "ccga"] = around(100, 0.6)
-    better = Part(above("value", (HERE,), ("cone",), ("mesp",)))
-    same = Part(alike("value", (HERE,), [("mesp", "ccga")]))
+    better = "above | value | cone : mesp | complex-1"
+    same = "alike | value | mesp : ccga | complex-1"
     assert judge(claim(better), evidence(samples)).verdict == "reproduced"
     assert judge(claim(better, same), evidence(samples)).verdict == "undecided: n too small"

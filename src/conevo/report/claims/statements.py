@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
-from itertools import product
 from typing import Literal
 
 __all__ = [
@@ -14,11 +12,6 @@ __all__ = [
     "Sample",
     "Statement",
     "Within",
-    "above",
-    "across",
-    "alike",
-    "comparison",
-    "within",
 ]
 
 
@@ -128,56 +121,3 @@ class Claim:
     def world(self) -> str:
         """The world in which it is tested, without its version."""
         return self.other_world or next(WORLDS[letter] for letter in self.id if letter in WORLDS)
-
-
-def comparison(
-    expect: Expected, a: tuple[str, str], b: tuple[str, str], place: str, other: str = ""
-) -> Compare:
-    """Return a comparison of two methods' runs in one environment, or in two.
-
-    Args:
-        expect: what is claimed of the first.
-        a, b: quantity and method of each.
-        place: the environment of both.
-        other: that of the second, if it is another one.
-    """
-    (quantity, method), (of, than) = a, b
-    there = other or place
-    return Compare(expect, Sample(quantity, (method,), (place,)), Sample(of, (than,), (there,)))
-
-
-def above(
-    quantity: str, environments: Iterable[str], methods: Iterable[str], others: Iterable[str]
-) -> tuple[Compare, ...]:
-    """Return: in each environment each of the methods is above each of the others."""
-    return tuple(
-        comparison("above", (quantity, a), (quantity, b), place)
-        for place, a, b in product(environments, methods, others)
-    )
-
-
-def alike(
-    quantity: str, environments: Iterable[str], pairs: Iterable[tuple[str, str]]
-) -> tuple[Compare, ...]:
-    """Return: in each environment the two methods of each pair are alike."""
-    return tuple(
-        comparison("alike", (quantity, a), (quantity, b), place)
-        for place, (a, b) in product(environments, pairs)
-    )
-
-
-def across(
-    quantity: str, methods: Iterable[str], pairs: Iterable[tuple[str, str]]
-) -> tuple[Compare, ...]:
-    """Return: each method reaches more in the first environment of each pair than in the second."""
-    return tuple(
-        comparison("above", (quantity, method), (quantity, method), *places)
-        for places, method in product(pairs, methods)
-    )
-
-
-def within(
-    quantity: str, method: str, environments: Iterable[str], low: float, high: float
-) -> Within:
-    """Return: over the environments together the method's quantity is in [low, high]."""
-    return Within(Sample(quantity, (method,), tuple(environments)), low, high)
