@@ -12,6 +12,14 @@ if os.environ.get("CONEVO_TEST_WARP_MODE"):  # "debug": array accesses out of bo
     warp.config.mode = os.environ["CONEVO_TEST_WARP_MODE"]
 
 
+def pytest_configure():
+    """Let the disk write when it likes: no test turns the machine off, and a run syncs 50 files.
+
+    Processes that tests begin, and kill, do sync.
+    """
+    os.fsync = os.fstat  # refuses what is no open file, as the real one does
+
+
 def pytest_collection_modifyitems(config, items):
     """Leave out tests that take minutes, and in parallel those that need cores of their own.
 

@@ -83,7 +83,10 @@ def test_every_parameter_of_a_world_is_explained(entry):
     assert [one.name for one in declared(entry.params_class) if not one.meaning] == []
 
 
-@pytest.mark.parametrize("page", EXECUTED)
+SLOW = {f"docs/{name}.md": pytest.mark.slow for name in ("quickstart", "python", "replay")}
+
+
+@pytest.mark.parametrize("page", [pytest.param(one, marks=SLOW.get(one, ())) for one in EXECUTED])
 def test_examples_run_and_print_what_the_page_says(page):
     executed = [block for block in run_page.blocks((ROOT / page).read_text()) if block.is_run]
     assert executed

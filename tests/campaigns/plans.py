@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 from conevo.campaigns.campaign import Campaign, create
 from conevo.campaigns.plan_file import read_plan
@@ -10,7 +11,7 @@ from conevo.campaigns.plan_file import read_plan
 TINY = """
 [campaign]
 title = "Tiny"
-seeds = 2
+seeds = {seeds}
 preset = "smoke"
 {head}
 
@@ -29,14 +30,16 @@ method = ["homcne", "cone"]
 """
 
 
-def write_plan(folder: Path, head: str = "", factors: str = "", more: str = "") -> Path:
-    """Write the plan of a campaign of four tiny runs, or more."""
+def write_plan(
+    folder: Path, head: str = "", factors: str = "", more: str = "", seeds: int = 2
+) -> Path:
+    """Write the plan of a campaign of two tiny runs per seed, or more."""
     folder.mkdir(exist_ok=True)
     path = folder / "tiny.toml"
-    path.write_text(TINY.format(head=head, factors=factors, more=more))
+    path.write_text(TINY.format(head=head, factors=factors, more=more, seeds=seeds))
     return path
 
 
-def tiny_campaign(folder: Path, head: str = "studies = []", **parts: str) -> Campaign:
-    """Write out a campaign of four tiny runs; nothing is started."""
+def tiny_campaign(folder: Path, head: str = "studies = []", **parts: Any) -> Campaign:
+    """Write out a campaign of tiny runs, four by default; nothing is started."""
     return create(read_plan(write_plan(folder, head, **parts)), folder / "tiny")

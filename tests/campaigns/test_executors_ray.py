@@ -36,15 +36,16 @@ def parent(process):
 @pytest.fixture
 def long_run(tmp_path):
     """A campaign and its first run, which takes some seconds."""
-    campaign = tiny_campaign(tmp_path, more=LONG)
+    campaign = tiny_campaign(tmp_path, more=LONG, seeds=1)
     return campaign, next(iter(campaign.planned))
 
 
-@pytest.fixture
-def undisturbed(long_run, tmp_path):
-    campaign, label = long_run
-    config = campaign.planned[label].configs()[0]
-    return outcome(conevo.runs.run.start(config, tmp_path / "undisturbed", threads=1).resume())
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory):
+    """Return what the first run comes to if nobody disturbs it."""
+    folder = tmp_path_factory.mktemp("undisturbed")
+    planned = next(iter(tiny_campaign(folder, more=LONG, seeds=1).planned.values()))
+    return outcome(conevo.runs.run.start(planned.configs()[0], folder / "run", threads=1).resume())
 
 
 def outcome(run):

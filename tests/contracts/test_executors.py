@@ -1,7 +1,8 @@
 """What every executor promises, with the coordinator over it; a registry entry enrols it.
 
 Nothing is lost and nothing is run twice, whoever is killed; failures are listed with their reason;
-no more threads are at work than there are cores.
+no more threads are at work than there are cores. The tests share one Ray, but for two: a killed or
+interrupted coordinator takes along the Ray that it has begun.
 """
 
 import importlib.util
@@ -73,6 +74,28 @@ def campaign(tmp_path):
 
 
 @pytest.fixture(scope="module")
+def executor_of():
+    """Return a function that makes an executor by its name and number of cores."""
+    clusters = []
+
+    def make(name, cores):
+        if name != "ray":
+            return make_executor(name, cores)
+        if not clusters:
+            from ray.cluster_utils import Cluster
+
+            node = {"num_cpus": 2, "object_store_memory": 80 * 2**20, "include_dashboard": False}
+            with pytest.MonkeyPatch.context() as patch:
+                patch.setenv("RAY_USAGE_STATS_ENABLED", "0")
+                clusters.append(Cluster(initialize_head=True, head_node_args=node))
+        return make_executor(name, cores, address=clusters[0].address)
+
+    yield make
+    for cluster in clusters:
+        cluster.shutdown()
+
+
+@pytest.fixture(scope="module")
 def undisturbed(tmp_path_factory):
     """Return a function that returns what a planned run comes to if nobody disturbs it."""
     known = {}
@@ -137,11 +160,11 @@ def assert_finished(campaign, undisturbed):
 
 
 @every_executor
-def test_every_run_is_carried_out_once(name, campaign, undisturbed):
+def test_every_run_is_carried_out_once(name, executor_of, campaign, undisturbed):
     made = campaign(QUICK, seeds=3)
     endings = []
     standings = made.carry_on(
-        make_executor(name, 2), watch=lambda _, one: endings.append(one) if one else None
+        executor_of(name, 2), watch=lambda _, one: endings.append(one) if one else None
     )
     assert sorted(one.label for one in endings) == sorted(made.planned)
     assert {(one.state, one.attempts) for one in standings.values()} == {("finished", 1)}
@@ -155,31 +178,33 @@ def test_every_run_is_carried_out_once(name, campaign, undisturbed):
 
 
 @every_executor
-def test_a_finished_campaign_is_left_alone(name, campaign):
+def test_a_finished_campaign_is_left_alone(name, executor_of, campaign):
     made = campaign(QUICK)
     made.carry_on(make_executor("serial", 1))
     before = {path: path.stat().st_mtime_ns for path in made.path.glob("runs/**/*")}
-    made.carry_on(make_executor(name, 2), watch=lambda _, one: pytest.fail(f"ran {one}"))
+    made.carry_on(executor_of(name, 2), watch=lambda _, one: pytest.fail(f"ran {one}"))
     assert {path: path.stat().st_mtime_ns for path in made.path.glob("runs/**/*")} == before
 
 
 @every_executor
-def test_a_run_that_always_fails_is_listed_with_its_reason_and_stops_no_other(name, campaign):
+def test_a_run_that_always_fails_is_listed_with_its_reason_and_stops_no_other(
+    name, executor_of, campaign
+):
     made = campaign(QUICK, seeds=2, methods=("hetcne", "homcne"))
-    standings = made.carry_on(make_executor(name, 2))
+    standings = made.carry_on(executor_of(name, 2))
     for label, planned in made.planned.items():
         failed = planned.method == "hetcne"
         assert standings[label].state == ("failed" if failed else "finished")
         assert ("does not pay for one generation" in standings[label].reason) == failed
     assert made.retry() == [label for label in made.planned if "hetcne" in label]
-    assert {one.state for one in made.carry_on(make_executor(name, 2)).values()} == {
+    assert {one.state for one in made.carry_on(executor_of(name, 2)).values()} == {
         "failed",
         "finished",
     }
 
 
 @every_with_workers
-def test_a_killed_worker_costs_an_attempt_and_no_result(name, campaign, undisturbed):
+def test_a_killed_worker_costs_an_attempt_and_no_result(name, executor_of, campaign, undisturbed):
     made = campaign(LONG)
     (label,) = made.planned
     killed = []
@@ -192,7 +217,7 @@ def test_a_killed_worker_costs_an_attempt_and_no_result(name, campaign, undistur
             killed.append(worker)
             os.kill(worker, signal.SIGKILL)
 
-    standings = made.carry_on(make_executor(name, 1), watch=kill_once)
+    standings = made.carry_on(executor_of(name, 1), watch=kill_once)
     assert killed
     assert (standings[label].state, standings[label].attempts) == ("finished", 2)
     first, second = run_of(made, label).provenance["sessions"]
@@ -201,7 +226,7 @@ def test_a_killed_worker_costs_an_attempt_and_no_result(name, campaign, undistur
 
 
 @every_with_workers
-def test_a_worker_that_is_killed_every_time_fails_with_that_reason(name, campaign):
+def test_a_worker_that_is_killed_every_time_fails_with_that_reason(name, executor_of, campaign):
     made = campaign(ENDLESS, seeds=2)
     lost = next(iter(made.planned))
     other = [label for label in made.planned if label != lost]
@@ -211,17 +236,17 @@ def test_a_worker_that_is_killed_every_time_fails_with_that_reason(name, campaig
             if lost in words or n_generations(campaign, other[0]) == 0:
                 os.kill(worker, signal.SIGKILL)
 
-    standings = made.carry_on(make_executor(name, 1), watch=kill)
+    standings = made.carry_on(executor_of(name, 1), watch=kill)
     for one in standings.values():
         assert (one.state, one.attempts) == ("failed", 3)
         assert one.reason == "killed by signal 9 (attempt 3 of 3)"
 
 
 @every_with_workers
-def test_workers_that_are_stopped_write_their_checkpoint_and_are_gone(name, campaign):
+def test_workers_that_are_stopped_write_their_checkpoint_and_are_gone(name, executor_of, campaign):
     made = campaign(ENDLESS)
     (label,) = made.planned
-    executor = make_executor(name, 1)
+    executor = executor_of(name, 1)
     executor.submit(RunJob(made.path, label, 1))
     until(lambda: n_generations(made, label) > 0)
     executor.stop()
@@ -299,7 +324,7 @@ def test_ctrl_c_lets_all_write_their_checkpoints_and_leave(name, campaign):
 
 
 @every_executor
-def test_no_more_threads_are_at_work_than_cores(name, campaign):
+def test_no_more_threads_are_at_work_than_cores(name, executor_of, campaign):
     made = campaign(LONG | {"run.generations": 4}, seeds=3)
     seen = []
 
@@ -307,7 +332,7 @@ def test_no_more_threads_are_at_work_than_cores(name, campaign):
         threads = [int(words[-1]) for words in workers(campaign.path).values()]
         seen.append(sum(threads))
 
-    executor = make_executor(name, 2)
+    executor = executor_of(name, 2)
     assert executor.cores == 2
     made.carry_on(executor, threads=2 if name == "serial" else 1, watch=count)
     assert max(seen) == (0 if name == "serial" else 2)
@@ -317,10 +342,10 @@ def test_no_more_threads_are_at_work_than_cores(name, campaign):
 
 
 @every_with_workers
-def test_libraries_of_a_worker_begin_no_threads_of_their_own(name, campaign):
+def test_libraries_of_a_worker_begin_no_threads_of_their_own(name, executor_of, campaign):
     made = campaign(ENDLESS)
     (label,) = made.planned
-    executor = make_executor(name, 1)
+    executor = executor_of(name, 1)
     executor.submit(RunJob(made.path, label, 1))
     try:
         until(lambda: n_generations(made, label) > 0)

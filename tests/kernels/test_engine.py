@@ -23,6 +23,8 @@ PACKAGE = Path(conevo.__file__).parent
 PLAY = """
 import json, sys
 import numpy as np
+import warp as wp
+wp.config.optimization_level = 0  # compiles in half the time
 from conevo.worlds.registry import WORLDS, world
 from conevo.worlds.rollout import Rollout
 
