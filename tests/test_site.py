@@ -104,7 +104,7 @@ def test_the_modules_of_the_api_reference_document_their_names():
         ("[a](../CONTRIBUTING.md#rules)", "[a](contributing.md#rules)"),
         ("[a](../README.md)", "[a](overview.md)"),
         ("[a](../examples/light.py)", "[a](examples/light.py.md)"),
-        ("![a](pictures/arena.png)", "![a](pictures/arena.png)"),
+        ("![a](theme/site.css)", "![a](theme/site.css)"),
         ("[a](../src/conevo/runs/run.py)", "[a](api/runs.md#conevo.runs.run)"),
         ("[a](../docs/results)", "[a](results.md)"),
         ("the folder [`tests`](../tests)", "the folder `tests`"),
