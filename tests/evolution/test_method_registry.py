@@ -62,7 +62,7 @@ def test_an_entry_builds_its_method(name):
         (
             "cone-es",
             {"pairs": 52, "rounds": 5},
-            "method.rounds = 5: must divide the pairs evenly, of which there are 52",
+            "method.rounds = 5: must divide the 52 pairs evenly",
         ),
     ],
 )

@@ -1,7 +1,7 @@
 """Evolution: genotypes and fitness, no world.
 
-Every method speaks the same three words. ``ask`` says which teams to evaluate, you evaluate them
-however you like, ``tell`` turns the scores into the next state::
+Every method has the same three functions. ``init`` returns the first state, ``ask`` the teams to
+evaluate, in any way you like, and ``tell`` the next state, given their scores::
 
     from conevo.evolution import Layout, Scores, method
 
@@ -37,7 +37,7 @@ _REGISTRY = ("METHODS", "MethodEntry", "method")
 
 
 def __getattr__(name: str) -> Any:
-    """Load on first use, so that reading the registry's names costs no numpy."""
+    """Load on first use, so that reading the registry's names does not import numpy."""
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     module = "methods.registry" if name in _REGISTRY else "protocol"

@@ -1,8 +1,8 @@
-"""Who plays with whom: teams as rows of a pool of neuron genotypes.
+"""Team assembly: teams as rows of a pool of neuron genotypes.
 
 The pool is ``genes.reshape(-1, G)``, so genotype m of slot u of population p is row
 ``(p * U + u) * M + m``; a second pool may be appended at an ``offset``. An empty slot is -1.
-Methods with one population (P = 1) fill every robot from it.
+Methods with one population (P = 1) take every robot's genotypes from it.
 """
 
 from __future__ import annotations
@@ -32,34 +32,34 @@ __all__ = [
 
 @parameters("method")
 class SchemeConfig:
-    """How the genotypes of several populations are tried in teams, alike for all such methods."""
+    """How genotypes of several populations are tried in teams, the same for all such methods."""
 
     evaluation: Literal["systematic", "shared"] = "systematic"
     """how genotypes are tried: "systematic" tries every genotype once (section 3.3.1), in R x M
-    teams if it is a whole network, in R x U x M if it is a neuron; "shared" draws complete teams in
-    which every genotype takes part ``rounds`` times, rounds x M teams, the scheme ESP itself was
-    published with."""
+    teams if it is a whole network, in R x U x M if it is a neuron; "shared" draws rounds x M
+    complete teams in which every genotype takes part ``rounds`` times, the scheme published with
+    ESP itself."""
     rounds: Annotated[int, Ge(1), Le(10_000)] = 10
-    """K, trials of each genotype under "shared". More makes fitness less noisy. Choice: 10, as
+    """K, trials of each genotype under "shared". More makes fitness less noisy. Choice: 10, as in
     ESP."""
     fresh_rounds: bool = True
-    """whether each round is played in scenarios of its own: for the same evaluations every genotype
-    meets ``rounds`` times as many, and all genotypes meet the same ones. Choice: on, since without
-    it co-evolved teams do not learn the shipped example."""
+    """whether each round has its own scenarios: with the same number of evaluations every genotype
+    meets ``rounds`` times the number of scenarios, and all genotypes meet the same ones. Choice:
+    on, since without it co-evolved teams do not learn the shipped example."""
 
     partners: Literal["by_scheme", "elite", "any"] = "by_scheme"
-    """with whom a genotype on trial plays: genotypes of the elite portion of the generation before
+    """partners of a genotype on trial: genotypes of the previous generation's elite portion
     ("elite", 5.3.3), or "any" of its own generation (3.3.1). Choice: "by_scheme" is "elite" under
-    "systematic", for all methods with several populations alike; under "shared" all members of a
-    team are on trial, so it is "any" there and "elite" is refused."""
+    "systematic", for all methods with several populations; under "shared" all members of a team are
+    on trial, so it is "any" there and "elite" is refused."""
 
     def __post_init__(self) -> None:
-        """Refuse partners that a scheme does not have."""
+        """Refuse partners that do not exist under the scheme."""
         if self.evaluation == "shared" and self.partners == "elite":
             raise WrongValue(
                 "partners",
                 "method.partners = 'elite'",
-                'has no effect with evaluation = "shared", in which all of a team are on trial',
+                'has no effect with evaluation = "shared", where a whole team is on trial',
             )
 
     @property
@@ -69,7 +69,7 @@ class SchemeConfig:
 
     @property
     def n_parts(self) -> int:
-        """How many parts of a generation's teams have scenarios of their own."""
+        """The number of parts of a generation's teams with separate scenarios."""
         return self.rounds if self.evaluation == "shared" and self.fresh_rounds else 1
 
 
@@ -102,7 +102,7 @@ def systematic(
     *,
     networks: bool = False,
 ) -> IntArray:
-    """Return one team per genotype, [N, P, U]: every other place is filled at random.
+    """Return one team per genotype, [N, P, U], with every other place filled at random.
 
     Nitschke 2009, 3.3.1: genotype g with random genotypes of its population's other
     sub-populations, and controllers of random genotypes of the other populations.
@@ -113,7 +113,8 @@ def systematic(
         generator: the source of the random partners.
         n_partners: L, partners per slot in a second pool behind the first, from which the other
             places are filled; 0: from the first.
-        networks: a genotype is a whole network: all slots of a population hold the same one.
+        networks: whether a genotype is a whole network, so that all slots of a population have the
+            same number.
     """
     tried = active[:, :1] if networks else active
     population, slot, genotype = on_trial(tried, n_genotypes)
@@ -129,8 +130,8 @@ def systematic(
 def place_on_trial(root: int, generation: int, n_robots: int) -> int:
     """Return the robot whose credit counts in all teams of a generation.
 
-    Choice: it is drawn for each generation, so that all genotypes of one are compared in the same
-    place, and none is bred for one place where robots have places of their own.
+    Choice: it is drawn for each generation, so that all genotypes of a generation are compared in
+    the same place, and genotypes are not bred for one place where robots start in different places.
     """
     return int(stream(root, "place", generation).integers(n_robots))
 
@@ -145,7 +146,7 @@ def shared(
 ) -> IntArray:
     """Return ``rounds`` x M teams [N, P, U] in which every genotype plays exactly ``rounds`` times.
 
-    Each round is a fresh permutation of every sub-population (with ``networks``: of every
+    Each round is a new permutation of every sub-population (with ``networks``: of every
     population's whole networks), as in ESP (Gomez; Yong and Miikkulainen).
     """
     n_populations, n_slots = active.shape
@@ -158,7 +159,7 @@ def shared(
 def elite_teams(
     active: BoolArray, elite: IntArray, n_genotypes: int, generator: np.random.Generator
 ) -> IntArray:
-    """Return P x L teams [N, P, U] for type C fitness; ``i * L + l`` tries rank l of population i.
+    """Return P x L teams [N, P, U] for type C fitness; ``i * L + l`` is for population i, rank l.
 
     Nitschke 2009, 3.3.2: controller i from the genotypes of equal rank l in its sub-populations,
     the other controllers from random genotypes of the elite portions.
@@ -181,17 +182,17 @@ def elite_teams(
 def best_team(active: BoolArray, elite: IntArray, n_genotypes: int) -> IntArray:
     """Return the fittest team [1, P, U]: the first of the elite in every slot.
 
-    It is each population's controller of greatest utility (type B fitness, Nitschke 2009, eq. 3.8):
-    the sum over slots is greatest where every term is.
+    It has the controller of greatest utility of each population (type B fitness, Nitschke 2009,
+    eq. 3.8): the sum over slots is greatest if every term is.
     """
     return rows(active, elite[None, :, :, 0], n_genotypes)
 
 
 def lesion_teams(team: IntArray, suspects: BoolArray) -> tuple[IntArray, IntArray, IntArray]:
-    """Return the fittest team whole, then once for each neuron that is tried for being missed.
+    """Return the complete fittest team, then its lesions, each without one neuron.
 
-    Nitschke 2009, section 3.6. Choice: the whole team is evaluated beside its lesions, in the same
-    scenarios, or the lesions would be compared with the luck of other ones.
+    Nitschke 2009, section 3.6. Choice: the complete team is evaluated with its lesions, in the same
+    scenarios; otherwise the comparison would depend on the luck of different scenarios.
 
     Args:
         team: [R, U] rows of the fittest team.
@@ -209,7 +210,7 @@ def lesion_teams(team: IntArray, suspects: BoolArray) -> tuple[IntArray, IntArra
 def distinct(n_teams: int, n_members: int, n_from: int, generator: np.random.Generator) -> IntArray:
     """Return ``n_teams`` draws of ``n_members`` different numbers below ``n_from``, [N, members].
 
-    Shuffled decks are dealt out in hands, so all numbers are used about equally often.
+    The numbers are dealt from shuffled decks, so all are used about equally often.
     """
     if n_members == 0:
         return np.empty((n_teams, 0), dtype=np.int32)

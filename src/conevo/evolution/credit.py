@@ -1,4 +1,4 @@
-"""From the scores of teams to the fitness of genotypes."""
+"""Credit: the fitness of genotypes from the scores of teams."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ __all__ = ["mean_of_trials", "of_clones", "of_robot", "overwrite"]
 
 
 def of_robot(fitness: FloatArray, robot: IntArray | int) -> FloatArray:
-    """Return each team's credit [N] of the robot that holds the genotype on trial.
+    """Return each team's credit [N] of the robot that has the genotype on trial.
 
-    Nitschke 2009, eqs 3.7, 5.4 and 6.8: whether that is the robot's own or the team's was settled
-    when the team was scored.
+    Nitschke 2009, eqs 3.7, 5.4 and 6.8. The team's scores already decide whether credit is the
+    robot's own or the team's.
 
     Args:
         fitness: [N, R] credit of each robot.
@@ -24,16 +24,16 @@ def of_robot(fitness: FloatArray, robot: IntArray | int) -> FloatArray:
 
 
 def of_clones(fitness: FloatArray) -> FloatArray:
-    """Return the mean credit [N] of a team of clones: they are one genotype, tried R times."""
+    """Return the mean credit [N] over a team of clones, which try one genotype R times."""
     credit: FloatArray = fitness.mean(axis=1)
     return credit
 
 
 def mean_of_trials(teams: IntArray, fitness: FloatArray, n_rows: int) -> FloatArray:
-    """Return the mean credit [n_rows] of every pool row over the robots that held it.
+    """Return the mean credit [n_rows] of every pool row over the robots that had it.
 
-    NaN for a row that never played. One score that is not finite spoils the mean: its genotypes
-    rank last.
+    NaN for a row that never played. One score that is not finite makes the mean non-finite, so its
+    genotypes rank last.
 
     Args:
         teams: [N, R, U] rows of the pool, -1 = empty slot.
@@ -54,7 +54,7 @@ def overwrite(fitness: FloatArray, elite: IntArray, credit: FloatArray) -> Float
     """Return fitness [P, U, M] with type C in place of type A for the elite genotypes.
 
     Nitschke 2009, 3.3.2: rank l of population i was tried as one controller, so its neurons in all
-    sub-populations get the same.
+    sub-populations get the same fitness.
 
     Args:
         fitness: [P, U, M] type A.

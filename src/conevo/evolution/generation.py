@@ -1,4 +1,4 @@
-"""The life of a generation of populations: begin, count, grade, crown, turn the page.
+"""The steps of a generation of populations: begin, count, grade, crown, advance.
 
 Nitschke 2009, chapter 3. A generation has several phases: "genotypes" (type A fitness), for CONE
 "elites" (type C), "fittest" (each population's fittest controller, together once more) and, when a
@@ -48,25 +48,25 @@ FITTEST = ("fittest", "lesion")  # phases in which the fittest team plays
 
 @parameters("method")
 class StartConfig:
-    """How several populations begin."""
+    """How several populations start."""
 
     common_start: bool = False
-    """whether random populations begin as copies of the first one: similar at first, they drift
-    apart. Those of a run that others are from (``--from``, shaping) are not random. Choice: off;
-    section 3.7 only says that n populations are initialized."""
+    """whether random populations start as copies of the first one; they then drift apart.
+    Populations from another run (``--from``, shaping) are not random. Choice: off; section 3.7 only
+    states that n populations are initialized."""
 
 
 @dataclass(frozen=True)
 class Populations:
-    """What methods with populations of neurons or networks remember; some of them add to it.
+    """State of methods with populations of neurons or networks; some of them add fields.
 
-    Arrays with a U axis have all ``max_hidden`` slots; empty slots hold zeros. Where genotypes are
-    whole networks (HomCNE, HetCNE, CCGA) they have one fitness each: there ``fitness`` and
+    Arrays with a U axis have all ``max_hidden`` slots; empty slots contain zeros. Where genotypes
+    are whole networks (HomCNE, HetCNE, CCGA) they have one fitness each, so ``fitness`` and
     ``elite`` lack the U axis.
 
     Attributes:
         progress: the header.
-        phase: what ``ask`` will ask for.
+        phase: the phase of the next trials.
         genes: [P, U, M, G] float32 genotypes in [-1, 1].
         active: [P, U] the slots (sub-populations) in use.
         fitness: [P, U, M] or [P, M] float64 fitness of this generation (type A; C overwrites it).
@@ -92,12 +92,12 @@ class Populations:
         return self.progress.generation
 
     def problem(self, first: Populations) -> str:
-        """Return the field that cannot be that of a state between generations, if there is one.
+        """Return the first field that is not valid in a state between generations, if any.
 
         Args:
             first: generation 0 of the same run.
         """
-        grows = {"elite": -1, "partners": -2}  # there are none in generation 0
+        grows = {"elite": -1, "partners": -2}  # empty in generation 0
         for field in fields(self):
             found, right = getattr(self, field.name), getattr(first, field.name)
             if isinstance(right, np.ndarray):
@@ -137,7 +137,7 @@ def begin(
         n_genotypes: M, genotypes per slot.
         networks: whether a genotype is a whole network, so that fitness has no U axis.
         common_start: whether all populations are copies of the first.
-        own: fields that the method's state has of its own.
+        own: further fields of the method's state.
     """
     shape = (n_populations, layout.max_hidden, n_genotypes, layout.n_genes)
     active = np.zeros(shape[:2], dtype=np.bool_)
@@ -161,8 +161,8 @@ def pool(state: Populations, partners: FloatArray | None = None) -> FloatArray:
     """Return the neuron genotypes as one list of rows, [P * U * M, G].
 
     Args:
-        state: whose genotypes.
-        partners: [P, U, L, G] further ones, which come after them.
+        state: with the genotypes.
+        partners: [P, U, L, G] further genotypes, which come after these.
     """
     rows: FloatArray = state.genes.reshape(-1, state.genes.shape[-1])
     if partners is None or not partners.size:
@@ -176,7 +176,7 @@ def trials(
     """Return ``teams`` as the state's trials, over its own pool unless another is given.
 
     The fittest teams of all generations meet the same scenarios.
-    Choice: so do their lesions, so that no neuron is removed by the luck of one scenario.
+    Choice: so do their lesions, so that a neuron is not removed because of one lucky scenario.
     """
     return Trials(
         generation=state.generation,
@@ -190,7 +190,7 @@ def trials(
 
 
 def count(state: Kind, asked: Trials, scores: Scores) -> Kind:
-    """Return the state with the evaluation counted, after checking that it answers the question."""
+    """Return the state with the evaluation counted, after checking that it is of these trials."""
     if (asked.purpose, asked.generation) != (state.phase, state.generation):
         raise UsageError(
             f"these scores are for phase {asked.purpose!r} of generation {asked.generation}, "
@@ -201,13 +201,13 @@ def count(state: Kind, asked: Trials, scores: Scores) -> Kind:
 
 
 def grade(state: Kind, fitness: FloatArray, n_elite: int, phase: str) -> Kind:
-    """Return the state with type A fitness given and the elite portion named.
+    """Return the state with its type A fitness and its elite portion.
 
     Args:
         state: in phase "genotypes".
-        fitness: [P, U, M] or [P, M]; NaN where there is no genotype.
+        fitness: [P, U, M] or [P, M]; NaN without a genotype.
         n_elite: L.
-        phase: what comes next.
+        phase: the next one.
     """
     return replace(
         state,
@@ -219,7 +219,7 @@ def grade(state: Kind, fitness: FloatArray, n_elite: int, phase: str) -> Kind:
 
 
 def crown(state: Kind, asked: Trials, scores: Scores, **changes: Any) -> Kind:
-    """Return the state with the fittest team on record: it is evaluated together once more.
+    """Return the state with its fittest team recorded, after its evaluation as a team.
 
     Args:
         state: in phase "fittest".
@@ -257,7 +257,7 @@ def advance(
         state: the generation that ends.
         genes: [P, U, M, G] children.
         active: [P, U] slots in use from now on; all others are emptied.
-        numbers: what else the log says of the generation that ends.
+        numbers: further numbers that the log records of the generation that ends.
         changes: further fields that change (windows, partners).
     """
     progress = replace(
@@ -276,7 +276,7 @@ def advance(
 
 
 def note(state: Kind, **numbers: float) -> Kind:
-    """Return the state with further numbers that the log says of the generation."""
+    """Return the state with further numbers that the log records of the generation."""
     return replace(state, progress=state.progress.with_numbers(**numbers))
 
 

@@ -1,4 +1,4 @@
-"""What populations take with them from one task into the next."""
+"""Populations and teams handed on from one task to the next."""
 
 from __future__ import annotations
 
@@ -22,28 +22,28 @@ AXES = {"slots": 1, "genotypes per slot": 2, "genes per neuron": 3}  # of Popula
 
 
 def hand_on(method: Method, layout: Layout, root: int, state: State) -> State:
-    """Return generation 0 of a new task, its populations those that ``state`` has.
+    """Return generation 0 of a new task, with the populations of ``state``.
 
-    Nitschke 2009, sections 4.3 and 6.4.2: each experiment starts from the last. Genes and slots in
-    use are taken over; of a state between two generations these are the children of the last one.
+    Nitschke 2009, sections 4.3 and 6.4.2: each experiment starts from the last one. Genes and slots
+    in use are taken over. Between two generations these are the children of the last one.
 
-    Choice: fitness of different tasks does not compare, so windows, histories, partners and
-    counters begin anew, and thresholds unless ``thresholds_from`` of CONE's parameters says where
-    they were. Choice: in a team with more robots than before population p begins as
-    a copy of population p mod P; in a smaller one the last populations are left behind. A method
-    that has a function ``begin_with(layout, root, genes, active)`` has no populations: it begins
-    around the fittest team of the last generation, or anew if there is none yet.
+    Choice: fitness of different tasks cannot be compared, so windows, histories, partners and
+    counters start again, and so do thresholds unless CONE's parameter ``thresholds_from`` keeps
+    them. Choice: in a team with more robots than before, population p starts as a copy of
+    population p mod P; in a smaller team the last populations are dropped. A method with a function
+    ``begin_with(layout, root, genes, active)`` has no populations: it starts around the fittest
+    team of the last generation, or from random genotypes if no generation has ended yet.
 
     Args:
         method: the method of the new task.
         layout: the size of the new task.
         root: the seed of every random decision from now on.
-        state: what to begin with; it is not changed.
+        state: with the populations; it is not changed.
 
     Raises:
-        UsageError: slots, genotypes or genes are not as many as before, genotypes are whole
-            networks in one of the two only, one of the two has no populations, or ``state`` does
-            not have the thresholds that are asked for.
+        UsageError: the numbers of slots, genotypes or genes differ, genotypes are whole networks in
+            only one of the two, one of the two has no populations, or ``state`` lacks the
+            thresholds that the parameters require.
     """
     if hasattr(method, "begin_with"):
         ended = state.progress
@@ -77,22 +77,22 @@ def hand_on(method: Method, layout: Layout, root: int, state: State) -> State:
 def breed_from(
     method: Method, layout: Layout, root: int, genes: FloatArray, active: BoolArray
 ) -> State:
-    """Return generation 0 of a task, all its genotypes bred from one team.
+    """Return generation 0 of a task, with all genotypes bred from one team.
 
-    Choice: population p is of copies of the team's controller p mod R, all but the first of them
-    mutated as children are, or with normal noise (``start_noise``), so that there is something to
-    select from and nothing is lost. A method with one population takes the R controllers in turn.
+    Choice: population p consists of copies of the team's controller p mod R. All but the first are
+    mutated like children, or with normal noise (``start_noise``), so that selection has variation
+    and the controller itself is kept. A method with one population takes the R controllers in turn.
 
     Args:
         method: the method of the task.
         layout: the size of the task.
         root: the seed of every random decision.
-        genes: [R, U, G] the team's.
+        genes: [R, U, G] the team's genes.
         active: [R, U] its slots in use.
 
     Raises:
-        UsageError: slots or genes are not as many as in the task, or the method's networks, which
-            keep their size, have another one, or it has no populations, or asks for thresholds.
+        UsageError: the numbers of slots or genes differ from the task's, the method's networks have
+            another, fixed size, or it has no populations, or requires thresholds.
     """
     if hasattr(method, "begin_with"):
         return _around(method, layout, root, genes, active)
@@ -140,14 +140,14 @@ def breed_from(
 
 
 def refuse_idle(config: Any, place: str = "here") -> None:
-    """Refuse parameters of a method that do nothing in a run without a team to breed from.
+    """Refuse parameters of a method that have no effect in a run without a team to breed from.
 
     Args:
         config: the method's parameters.
-        place: where they are, for the message.
+        place: where they are set, for the message.
 
     Raises:
-        UsageError: there is one.
+        UsageError: the method has such a parameter.
     """
     if noise := getattr(config, "start_noise", 0.0):
         raise UsageError(
@@ -157,10 +157,10 @@ def refuse_idle(config: Any, place: str = "here") -> None:
 
 
 def _with_thresholds(fresh: Populations, method: Method, state: State | None) -> Populations:
-    """Return generation 0 with the thresholds of a state, if CONE's parameters ask for these.
+    """Return generation 0 with the thresholds of a state, if CONE's parameters require them.
 
     Raises:
-        UsageError: it has none.
+        UsageError: the state has none.
     """
     if not isinstance(fresh, ConeState) or method.config.thresholds_from == "settings":
         return fresh
@@ -178,10 +178,10 @@ def _with_thresholds(fresh: Populations, method: Method, state: State | None) ->
 
 
 def _around(method: Any, layout: Layout, root: int, genes: FloatArray, active: BoolArray) -> State:
-    """Return generation 0 of a method that begins around a team [R, U, G], not with populations.
+    """Return generation 0 of a method that starts around a team [R, U, G], not with populations.
 
     Raises:
-        UsageError: slots or genes are not as many as in the layout.
+        UsageError: the number of slots or genes differs from the layout's.
     """
     wanted = (layout.max_hidden, layout.n_genes)
     different = [

@@ -27,14 +27,14 @@ def genotype_distance(a: FloatArray, b: FloatArray) -> FloatArray:
 def ranking(fitness: FloatArray) -> IntArray:
     """Return the indices along the last axis from the fittest to the least fit.
 
-    Fitness that is not finite ranks last; equals keep the order of their indices.
+    Fitness that is not finite ranks last; ties keep the order of their indices.
     """
     key = np.where(np.isfinite(fitness), -fitness, np.inf)
     return np.argsort(key, axis=-1, kind="stable").astype(np.int32)
 
 
 def elite_count(portion: float, n_genotypes: int) -> int:
-    """Return L, the size of the elite portion: the nearest whole number, at least two parents."""
+    """Return L, the size of the elite portion: the nearest whole number, at least 2."""
     return min(max(2, int(portion * n_genotypes + 0.5)), n_genotypes)
 
 

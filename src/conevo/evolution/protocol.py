@@ -1,9 +1,9 @@
-"""What a method is: init / ask / tell on a state of its own, of which others see only the header.
+"""Methods: the functions init, ask and tell, and the state between them.
 
-A state is a frozen dataclass of arrays, plain values and further dataclasses of them: that is what
-a checkpoint can keep. Its field ``progress`` is the header, which is all that the loop and the
-store look at. A generation is as many rounds of ask and tell as a method likes; each request says
-in which scenarios its teams are to play and whether the first of them is to be described.
+A state is a frozen dataclass of arrays, plain values and further dataclasses of these, so that a
+checkpoint can keep it. Its field ``progress`` is the header, the only part that the loop and the
+store read. A generation takes any number of requests. Each names the scenarios of its teams, and
+may ask for a portrait of the first one.
 """
 
 from __future__ import annotations
@@ -37,12 +37,12 @@ SCENARIOS = Literal["fresh", "fixed"]
 
 @dataclass(frozen=True)
 class Layout:
-    """The size of the problem: what a method must know of a world.
+    """The size of the problem, all that a method knows about a world.
 
     Attributes:
         n_robots: R, robots in a team, one population each where a method has several.
         n_hidden: hidden neurons of every controller at the start.
-        max_hidden: U, numbered slots for hidden neurons; the most a controller can grow to.
+        max_hidden: U, numbered slots for hidden neurons; the most that a controller can have.
         n_genes: G, genes of one neuron.
     """
 
@@ -52,7 +52,7 @@ class Layout:
     n_genes: int
 
     def __post_init__(self) -> None:
-        """Refuse sizes that make no team."""
+        """Refuse sizes of which a team cannot be made."""
         if min(self.n_robots, self.n_hidden, self.n_genes) < 1 or self.max_hidden < self.n_hidden:
             raise UsageError(
                 f"a layout needs n_robots, n_hidden, n_genes >= 1, max_hidden >= n_hidden: {self}"
@@ -61,17 +61,16 @@ class Layout:
 
 @dataclass(frozen=True)
 class Trials:
-    """What to evaluate.
+    """Teams to evaluate.
 
     Attributes:
         generation: the generation they belong to.
         genes: [K, G] float32 pool of genotypes of neurons, in [-1, 1].
         teams: [N, R, U] int32 rows of ``genes``: the neuron in robot r's slot k, -1 = empty slot.
         scenarios: "fresh" ones of the generation, or those that are "fixed" for the whole run.
-        portrait: whether what the first team does is the generation's description.
-        rounds: the teams come in so many parts of equal length, each of which is to be played in
-            scenarios of its own.
-        purpose: what for, in the method's own words; nobody else looks at it.
+        portrait: whether the first team's behaviour is recorded as the generation's portrait.
+        rounds: number of equal parts of the teams; each part is played in its own scenarios.
+        purpose: of the trials, in the method's own words; only the method reads it.
     """
 
     generation: int
@@ -89,7 +88,7 @@ class Trials:
         return found
 
     def problem(self, progress: Progress) -> str:
-        """Return what makes these no trials of a run, nothing if they are some.
+        """Return the reason why a run cannot evaluate these trials, nothing if it can.
 
         Args:
             progress: the header of the state that asks for them.
@@ -118,15 +117,15 @@ def _kind(array: Any) -> str:
 
 @dataclass(frozen=True)
 class Scores:
-    """What came back.
+    """Results of the evaluation of teams.
 
     Attributes:
         fitness: [N, R] float64 credit of each robot, mean over epochs; may be non-finite.
         specialization: [N, R] float64 degree of specialization S of each robot (Nitschke 2009,
-            eq. 3.4), mean over epochs. Zeros where there is no such thing.
+            eq. 3.4), mean over epochs. Zeros if it is not defined.
         shares: [N, R, A] float64 share of each of A actions in all that a robot executed, mean over
-            epochs; what is missing to 1 is the share of epochs in which it did nothing. None where
-            there is no such thing.
+            epochs. The rest to 1 is the share of epochs in which it did nothing. None if it is not
+            defined.
         plays: team evaluations that each team took.
     """
 
@@ -138,7 +137,7 @@ class Scores:
 
 @dataclass(frozen=True)
 class Progress:
-    """The header of a state: what the loop and the store know of it, whatever the method.
+    """The header of a state: the part that the loop and the store read, for any method.
 
     Attributes:
         root: the seed of every random decision.
@@ -153,7 +152,7 @@ class Progress:
         best_fitness: the best fitness of the generation.
         mean_fitness: the mean fitness of the generation (of the finite ones).
         n_nonfinite: scores of the generation that were not finite; they rank last.
-        numbers: what else the method says of the generation, by name: further columns of the log.
+        numbers: further numbers of the generation by name, which become columns of the log.
     """
 
     root: int
@@ -188,12 +187,12 @@ class Progress:
         """Return the header with an evaluation counted.
 
         Args:
-            asked: what was evaluated.
-            scores: what came back.
-            is_first: whether it is the generation's first; what is known of the last one goes.
+            asked: the trials that were evaluated.
+            scores: their results.
+            is_first: whether it is the generation's first; this drops the last generation's data.
 
         Raises:
-            UsageError: the scores are those of other trials.
+            UsageError: the scores belong to other trials.
         """
         if asked.generation != self.generation:
             raise UsageError(
@@ -247,7 +246,7 @@ class Progress:
         return replace(self, numbers={**self.numbers, **numbers})
 
     def problem(self, first: Progress) -> str:
-        """Return the field that cannot be that of a state of a run, nothing if all can.
+        """Return the first field that is not valid in a state of a run, nothing if all are.
 
         Args:
             first: the header of generation 0 of that run.
@@ -269,11 +268,11 @@ class Progress:
 
 
 class State(Protocol):
-    """What a method remembers: a frozen dataclass, enough to resume bit for bit.
+    """The state of a method: a frozen dataclass with all that a bit-exact resume needs.
 
     Its arrays must not be written to. It may have a function ``problem(first)`` that returns the
-    name of a field which cannot be that of a state between two generations, given generation 0 of
-    the same run; it is asked when a checkpoint is read, after types and dimensions of all fields
+    name of a field that is not valid in a state between two generations, given generation 0 of the
+    same run. It is called when a checkpoint is read, after the types and dimensions of all fields
     have been compared.
     """
 
@@ -283,7 +282,7 @@ class State(Protocol):
 
 
 class Method(Protocol):
-    """A controller design method. All three are pure: they change nothing they are given."""
+    """A controller design method. Its functions are pure: they do not change their arguments."""
 
     @property
     def name(self) -> str:
@@ -301,7 +300,7 @@ class Method(Protocol):
         """Return generation 0 with random genotypes."""
 
     def ask(self, state: Any) -> Trials:
-        """Return the teams to evaluate next, given one of its own states."""
+        """Return the teams to evaluate next, given one of the method's states."""
 
     def tell(self, state: Any, trials: Trials, scores: Scores) -> State:
-        """Return the state after these scores; its generation has grown if one was finished."""
+        """Return the state after these scores, of the next generation if this one is finished."""

@@ -1,13 +1,13 @@
-"""What evolution adapts about itself: similarity thresholds and the size of controllers.
+"""Regulation during evolution: similarity thresholds and the size of controllers.
 
-Nitschke 2009, sections 3.5 and 3.6. Choice: the thesis says "has not progressed over the last V
+Nitschke 2009, sections 3.5 and 3.6. Choice: the thesis writes "has not progressed over the last V
 generations" and "has increased" without a measure. Here one measure, ``trend``, serves all: over
 the V + 1 values from V generations ago until now, the mean of the later half minus the mean of the
 earlier half (the middle one of an odd number left out). Progress and rise are trends above zero,
-fall is a trend below. Means of halves, because fitness is noisy: the two ends alone would decide by
-chance, and the maximum of V values almost always beats a single old one. Windows move with every
-generation and are not looked at before they are full; values that are not finite are left out, and
-a half without any makes the trend NaN, which counts as no progress and as neither rise nor fall.
+fall is a trend below. It takes means of halves because fitness is noisy: the two ends alone would
+decide by chance, and the maximum of V values almost always beats a single old one. Windows move
+with every generation and are not used before they are full. Values that are not finite are left
+out. A half without any makes the trend NaN, which counts as no progress, no rise and no fall.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ __all__ = ["regulate_gst", "regulate_sst", "resized", "stagnating", "trend"]
 
 
 def trend(window: FloatArray) -> FloatArray:
-    """Return how much the values [V + 1, ...] of a window rose, [...]; the newest is last."""
+    """Return how much the values [V + 1, ...] of a window rose, [...]; the last is the newest."""
     half = len(window) // 2
     finite = np.isfinite(window)
     values = np.where(finite, window, 0.0)
@@ -38,8 +38,8 @@ def regulate_sst(
 ) -> float:
     """Return the next specialization similarity threshold, in [0, 1].
 
-    Nitschke 2009, 3.5.1: while the fittest team does not progress, a risen S lowers the threshold
-    (less recombination between populations), a fallen S raises it.
+    Nitschke 2009, 3.5.1: while the fittest team does not progress, a rise of S lowers the threshold
+    (less recombination between populations), a fall of S raises it.
 
     Args:
         sst: the threshold now; NaN stays NaN.
@@ -59,7 +59,7 @@ def regulate_gst(
     """Return the next genotype similarity threshold, in [0, 1].
 
     Nitschke 2009, 3.5.2: while the fittest team does not progress, more recombinations between
-    populations lower the threshold, as many or fewer raise it.
+    populations lower the threshold; the same number or fewer raise it.
 
     Args:
         gst: the threshold now; NaN stays NaN.
@@ -97,18 +97,18 @@ def resized(
 ) -> BoolArray:
     """Return the slots [P, U] in use after the lesions of section 3.6.
 
-    If the least needed neuron leaves at least ``ratio`` of the fitness, its slot is emptied, but
-    never below two; otherwise every neuron is worth keeping and the lowest empty slot, if there is
-    one, gets a new sub-population.
+    If at least ``ratio`` of the fitness is left without the least needed neuron, its slot is
+    emptied, but two neurons always stay. Otherwise every neuron is worth keeping, and the lowest
+    empty slot, if any, gets a new sub-population.
 
-    Choice: for a negative fitness the bound lies as far below it, f - (1 - ratio) |f|.
-    Choice: a controller whose fitness is not finite, or 0, keeps its size: of a controller that
-    earns nothing, no lesion says which neurons it needs (by the letter of the rule such controllers
-    shrink to two neurons).
+    Choice: for a negative fitness the bound is the same distance below it, f - (1 - ratio) |f|.
+    Choice: a controller whose fitness is not finite, or 0, keeps its size: lesions of a controller
+    that earns nothing do not show which neurons it needs. (By the letter of the rule such
+    controllers would shrink to two neurons.)
 
     Args:
         active: [P, U] slots in use.
-        fitness: [P] fitness of each fittest controller, whole.
+        fitness: [P] fitness of each complete fittest controller.
         without: [P, U] its fitness without the neuron of each slot; NaN where not tried.
         suspects: [P] populations to resize.
         ratio: the share of fitness that must be left.

@@ -1,7 +1,8 @@
 """Elite selection: which populations, and which of their sub-populations, recombine.
 
-Nitschke 2009, section 3.4.1 and 3.4.2. Similar behaviour makes two populations candidates, similar
-genotypes let their sub-populations recombine; everything else recombines within itself.
+Nitschke 2009, section 3.4.1 and 3.4.2. Similar behaviour makes two populations candidates. Similar
+genotypes let their sub-populations recombine. All other sub-populations recombine within
+themselves.
 
 Choice: the thesis' loop over all pairs would overwrite a population n - 1 times. Here the most
 similar pairs come first and each population, and each sub-population, is taken at most once; with
@@ -39,7 +40,7 @@ def shares_distance(shares: FloatArray) -> FloatArray:
     It is the total variation of their shares. Doing nothing is one more action.
 
     Args:
-        shares: [P, A] share of each action; what is missing to 1 was spent on nothing.
+        shares: [P, A] share of each action; the rest to 1 was spent on nothing.
     """
     spent = _with_nothing(shares)
     distance: FloatArray = np.abs(spent[:, None] - spent[None]).sum(axis=-1) / 2
@@ -49,15 +50,15 @@ def shares_distance(shares: FloatArray) -> FloatArray:
 def label_distance(
     specialization: FloatArray, shares: FloatArray, threshold: float = 0.5
 ) -> FloatArray:
-    """Return 0 for controllers that do the same and are as specialized, else 1, [P, P].
+    """Return 0 for controllers with the same label, else 1, [P, P].
 
-    That is: they execute the same action most (the first of equals), and both or neither have
-    S < 0.5 (Nitschke 2009, 3.2.3).
+    The label of a controller is the action that it executes most (ties go to the first), and
+    whether its S is below 0.5 (Nitschke 2009, 3.2.3).
 
     Args:
-        specialization: [P] S. Not a number: like nobody.
-        shares: [P, A] share of each action; what is missing to 1 was spent on nothing.
-        threshold: S from which on a controller is not specialized.
+        specialization: [P] S. A controller with NaN differs from all.
+        shares: [P, A] share of each action; the rest to 1 was spent on nothing.
+        threshold: a controller is not specialized if its S is this or more.
     """
     does = _with_nothing(shares).argmax(axis=1)
     is_specialized = specialization < threshold
@@ -67,7 +68,7 @@ def label_distance(
 
 
 def _with_nothing(shares: FloatArray) -> FloatArray:
-    """Return the shares with that of doing nothing as a last action, [P, A + 1]."""
+    """Return the shares with that of doing nothing added as the last action, [P, A + 1]."""
     return np.concatenate([shares, 1 - shares.sum(axis=1, keepdims=True)], axis=1)
 
 
@@ -77,8 +78,7 @@ def pair_populations(
     """Return the pairs [Q, 2] of populations that may recombine: SD < SST, the most similar first.
 
     Args:
-        distance: [P, P] SD between the populations' fittest controllers. Not a number: never
-            paired.
+        distance: [P, P] SD between the populations' fittest controllers; NaN: never paired.
         sst: specialization similarity threshold. Higher pairs more.
         pairing: "nearest": each population once; "all": every pair below the threshold.
     """
@@ -119,8 +119,8 @@ def pair_similar(
 ) -> IntArray:
     """Return the pairs [Q, 2] of units ``p * U + u`` that recombine: distance < GST.
 
-    Every pair of sub-populations of every candidate pair of populations is tested, the most similar
-    are taken first, each sub-population at most once.
+    Every pair of sub-populations of every candidate pair of populations is tested. The most similar
+    are taken first, and each sub-population at most once.
 
     Args:
         elites: [P, U, L, G], the fittest first.
@@ -152,7 +152,7 @@ def pair_similar(
 def pair_slots(active: BoolArray, candidates: IntArray) -> IntArray:
     """Return the pairs [Q, 2] of units ``p * U + u`` of equal slot, for candidate populations.
 
-    Of candidates with a population in common the first takes its slots.
+    If two candidates share a population, the first one gets its slots.
     """
     n_slots = active.shape[1]
     i, j = candidates.reshape(-1, 2).T

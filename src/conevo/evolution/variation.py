@@ -1,7 +1,7 @@
 """Recombination and mutation: from an elite portion to the next generation.
 
-Nitschke 2009, section 3.4. Works on units: a unit is a sub-population of neurons, or a population
-of whole networks. S units, M genotypes each, L of them elite, G genes.
+Nitschke 2009, section 3.4. A unit is a sub-population of neurons, or a population of whole
+networks. Shapes: S units, M genotypes each, L of them elite, G genes.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ __all__ = ["VariationConfig", "across", "breed", "crossover", "mutate", "perturb
 
 @parameters("method")
 class VariationConfig:
-    """Selection and variation, alike for all methods (Nitschke 2009, section 3.4, table 5.5)."""
+    """Selection and variation, the same for all methods (Nitschke 2009, 3.4, table 5.5)."""
 
     elite_portion: Annotated[float, Gt(0), Le(1)] = 0.5
     """fraction of a (sub-)population that may become parents. More keeps more diversity and selects
@@ -27,14 +27,14 @@ class VariationConfig:
     mutation_probability: Annotated[float, Ge(0), Le(1)] = 0.05
     """chance of each gene of a child to be mutated."""
     mutation_scale: Annotated[float, Ge(0), Le(1000)] = 0.1
-    """scale of the Cauchy step in gene units; half of all steps are smaller. Choice: 0.1, the
+    """scale of the Cauchy step in gene units; half of all steps are smaller. Choice: 0.1, since the
     thesis gives none; it is 1 in weight units of [-10, 10]."""
     n_elitist: Annotated[int, Ge(0), Le(1_000_000)] = 0
     """fittest genotypes that survive unchanged, at most the elite portion. 0: children replace all
     genotypes (section 3.4.3)."""
     start_noise: Annotated[float, Ge(0), Le(2)] = 0.0
     """(gene units) standard deviation of the normal noise on each gene of populations that are bred
-    from a champion (``--from-champion``). 0: they are mutated as children are."""
+    from a champion (``--from-champion``). 0: they are mutated like children."""
 
 
 def crossover(
@@ -42,8 +42,8 @@ def crossover(
 ) -> tuple[FloatArray, FloatArray]:
     """Return both children [..., G] of each pair of parents: one-point crossover.
 
-    The point lies between two genes, uniformly: the first child has at least one gene of each
-    parent (a genotype of one gene is passed on whole).
+    The point is uniform between two genes, so that each child has at least one gene of each parent.
+    A genotype of one gene is passed on unchanged.
     """
     n_genes = a.shape[-1]
     point = generator.integers(1, max(n_genes, 2), size=(*a.shape[:-1], 1), dtype=np.int32)
@@ -54,8 +54,8 @@ def crossover(
 def within(elites: FloatArray, n_children: int, generator: np.random.Generator) -> FloatArray:
     """Return children [S, n_children, G] bred inside each unit.
 
-    Nitschke 2009, 3.4.3, "Recombine(P_i)": each elite in turn, from the fittest on and round again
-    until there are enough children, with a random *other* elite. Both children are kept.
+    Nitschke 2009, 3.4.3, "Recombine(P_i)": each elite in turn, from the fittest on, is crossed with
+    a random *other* elite. This repeats until there are enough children. Both children are kept.
 
     Args:
         elites: [S, L, G], the fittest first, L >= 2.
@@ -76,11 +76,11 @@ def within(elites: FloatArray, n_children: int, generator: np.random.Generator) 
 def across(
     elites: FloatArray, pairs: IntArray, n_children: int, generator: np.random.Generator
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the children [Q, n_children, G] of either side of Q pairs of units.
+    """Return the children [Q, n_children, G] for both sides of Q pairs of units.
 
-    Nitschke 2009, 3.4.3, "Recombine(P_i, P_j)": elites of equal rank are crossed, the first child
+    Nitschke 2009, 3.4.3, "Recombine(P_i, P_j)": elites of equal rank are crossed. The first child
     goes to the first unit, the second to the second. Choice: when all ranks have been crossed they
-    are crossed again from the fittest on, at fresh points, until every genotype is replaced.
+    are crossed again from the fittest on, at new points, until every genotype is replaced.
 
     Args:
         elites: [S, L, G], the fittest first.
@@ -98,8 +98,8 @@ def mutate(
 ) -> FloatArray:
     """Return mutated float32 genes: burst mutation with Cauchy steps.
 
-    Nitschke 2009, 3.4.4 and table 5.5: each gene with ``probability`` gets a Cauchy step, limited
-    to the mutation range [-1, 1]; the gene is then limited to [-1, 1].
+    Nitschke 2009, 3.4.4 and table 5.5: with ``probability``, a gene gets a Cauchy step, limited to
+    the mutation range [-1, 1]. The gene is then limited to [-1, 1].
     """
     hit = generator.random(genes.shape, dtype=np.float32) < probability
     step = np.clip(scale * generator.standard_cauchy(int(hit.sum())), -1.0, 1.0)
@@ -114,7 +114,7 @@ def perturb(genes: FloatArray, scale: float, generator: np.random.Generator) -> 
     Args:
         genes: of any shape.
         scale: standard deviation of the noise.
-        generator: the source of it.
+        generator: the source of the noise.
     """
     noise = generator.standard_normal(genes.shape, dtype=np.float32) * np.float32(scale)
     perturbed: FloatArray = np.clip(genes + noise, -1.0, 1.0).astype(np.float32)
@@ -133,10 +133,10 @@ def breed(
     Args:
         genotypes: [S, M, G] this generation.
         elite: [S, L] its elite portion, the fittest first.
-        generator: the source of all of it.
-        config: how to vary.
+        generator: the source of all random numbers.
+        config: parameters of recombination and mutation.
         pairs: [Q, 2] units that recombine with each other, each unit at most once; all others
-            recombine within.
+            recombine within themselves.
     """
     n_units, n_genotypes, _ = genotypes.shape
     elites = genotypes[np.arange(n_units)[:, None], elite]

@@ -1,10 +1,10 @@
 """CCGA, cooperative co-evolutionary genetic algorithm: one population of whole networks per robot.
 
 Nitschke 2009, sections 2.3.3 and 5.3.3, after Potter and De Jong. Populations are genetically
-isolated; a genotype is judged by its own robot's fitness in a team with partners from the others.
+isolated. A genotype's fitness is that of its own robot in a team with partners from the others.
 
-Choice: "elite" partners are those of the generation before, which the state keeps, since children
-have no fitness before they are tried; the first generation takes any genotypes.
+Choice: "elite" partners are those of the previous generation, which the state keeps, since children
+have no fitness before they are tried. The first generation takes any genotypes.
 """
 
 from __future__ import annotations
@@ -48,11 +48,11 @@ class CcgaConfig(VariationConfig, SchemeConfig, StartConfig):
 
 @dataclass(frozen=True)
 class CcgaState(Populations):
-    """What CCGA remembers.
+    """State of CCGA.
 
     Attributes:
-        partners: [P, U, L, G] float32 last generation's elite; L = 0 in the first, and always if
-            partners do not come from it.
+        partners: [P, U, L, G] float32 last generation's elite; L = 0 in the first generation, and
+            always if partners do not come from the elite.
     """
 
     partners: FloatArray

@@ -1,13 +1,13 @@
 """CONE, Collective Neuro-Evolution: Multi-Agent ESP whose populations may share genes.
 
-Nitschke 2009, chapter 3. To MESP it adds type C fitness (elite controllers among elite partners),
-recombination between populations that behave alike and whose sub-populations look alike (the
-specialization and genotype difference metrics, SDM and GDM), and the regulation of how alike.
+Nitschke 2009, chapter 3. It adds to MESP: type C fitness (elite controllers with elite partners),
+recombination between populations with similar behaviour and similar sub-populations (the
+specialization and genotype difference metrics, SDM and GDM), and regulation of both thresholds.
 
 Variants (4.5.7, 5.5.5, 6.5.6): CONE-1 without the GDM, CONE-2 without the SDM, CONE-3 without both.
 Choice: the thesis contradicts itself on CONE-1; here its paired populations recombine slot by slot.
 Choice: in CONE-2 all pairs of populations are candidates at once, so one population may exchange
-with several: the most similar sub-populations of all come first, each is taken once.
+with several. The most similar sub-populations come first, and each is taken once.
 """
 
 from __future__ import annotations
@@ -62,15 +62,15 @@ class ConeConfig(MespConfig):
     threshold_step: Annotated[float, Ge(0), Le(1)] = 0.01
     """change of a threshold (section 3.5: 1 %). Choice: absolute."""
     thresholds_from: Literal["settings", "ancestor"] = "settings"
-    """where SST and GST begin in a run that begins with another one's populations (``--from``, a
-    stage of shaping): at the "settings" ``sst`` and ``gst``, or where they ended in that run, its
-    "ancestor". Choice: the settings; section 3.5 is silent."""
+    """initial SST and GST of a run that starts with another one's populations (``--from``, a stage
+    of shaping): the "settings" ``sst`` and ``gst``, or the last values of that run, its "ancestor".
+    Choice: the settings; section 3.5 is silent."""
     type_c: Literal["own", "team", "off"] = "own"
-    """whose fitness ranks the elite (type C): "own" is that of the robot on trial, as for type A;
+    """fitness that ranks the elite (type C): "own" is that of the robot on trial, as for type A;
     "team" is the mean of all robots; "off" leaves the order of type A and saves the evaluations.
-    Choice: "own", as eq. 5.4 for type A."""
+    Choice: "own", as in eq. 5.4 for type A."""
     type_c_rounds: Annotated[int, Ge(0), Le(10_000)] = 0
-    """teams in which each elite controller is tried for type C; 0 means as many as type A has: one
+    """teams in which each elite controller is tried for type C; 0 means the number of type A: one
     if "systematic", ``rounds`` if "shared". Choice: 0, so that type C never overwrites better
     evidence."""
     pairing: Literal["nearest", "all"] = "nearest"
@@ -78,22 +78,22 @@ class ConeConfig(MespConfig):
     first and each population once; "all" takes every pair, and each sub-population once. Choice:
     "nearest"; the printed loop overwrites a population n - 1 times."""
     sd: Literal["switching", "shares", "label"] = "switching"
-    """how differently two robots behave: "switching" is the difference of their S (eq. 3.5);
-    "shares" the part of its life that one would have to spend otherwise to be like the other;
+    """difference between the behaviours of two robots: "switching" is that of their S (eq. 3.5);
+    "shares" the part of its life that one would have to spend differently to be like the other;
     "label" 0 if they do the same most and are both specialized (S < 0.5) or both not, else 1."""
     exchange_slots: Literal["any", "same"] = "any"
-    """whether sub-populations of "any" two slots may recombine, or of the "same" slot, as the
-    genotypes' tags have it. CONE-1 always takes the same. Choice: "any"; section 3.7 tests each
-    pair of sub-populations."""
+    """whether sub-populations of "any" two slots may recombine, or only of the "same" slot, as the
+    genotypes' tags imply. CONE-1 always takes the same. Choice: "any"; section 3.7 tests each pair
+    of sub-populations."""
     exchange_share: Annotated[float, Ge(0), Le(1)] = 1.0
     """chance of each pair of populations that may exchange genes to do so in a generation."""
     use_gdm: bool = True
-    """ask for similar genotypes (the genotype difference metric)."""
+    """require similar genotypes (the genotype difference metric)."""
     use_sdm: bool = True
-    """ask for similar behaviour (the specialization difference metric)."""
+    """require similar behaviour (the specialization difference metric)."""
 
     def __post_init__(self) -> None:
-        """Refuse what would have no effect."""
+        """Refuse parameters that would have no effect."""
         super().__post_init__()
         if not self.use_sdm:
             self._refuse("pairing", "sd", unless="the specialization difference metric (use_sdm)")
@@ -113,7 +113,7 @@ class ConeConfig(MespConfig):
 
     @property
     def n_elite_rounds(self) -> int:
-        """How often each elite controller is tried for type C fitness."""
+        """The number of teams in which each elite controller is tried for type C fitness."""
         as_type_a = self.rounds if self.evaluation == "shared" else 1
         return self.type_c_rounds or as_type_a
 
@@ -141,13 +141,13 @@ class Cone3Config(Cone1Config):
 
 @dataclass(frozen=True)
 class ConeState(MespState):
-    """What CONE remembers.
+    """State of CONE.
 
     Attributes:
-        past_specialization: [H] float64 mean S of the fittest team, as ``past_fitness``.
+        past_specialization: [H] float64 mean S of the fittest team, like ``past_fitness``.
         past_recombinations: [H] float64 recombinations between populations.
-        distance: [P, P] float64 SD between the last fittest team's controllers, NaN before there is
-            one and without the SDM.
+        distance: [P, P] float64 SD between the last fittest team's controllers; NaN before the
+            first one, and without the SDM.
         sst: specialization similarity threshold, NaN without the SDM.
         gst: genotype similarity threshold, NaN without the GDM.
     """
@@ -208,8 +208,8 @@ class Cone(Mesp[ConeState]):
     def type_c(self, state: ConeState, scores: Scores) -> ConeState:
         """Return the state with the elite ranked by type C fitness.
 
-        Choice: the elite portion stays the elite portion, whatever type C says of it; ranks with
-        equal type C keep their order by type A, alike in all sub-populations.
+        Choice: type C fitness changes the order of the elite portion, but not its members. Ranks
+        with equal type C keep their order by type A, the same in all sub-populations.
         """
         n_populations, _, n_elite = state.elite.shape
         if self.config.type_c == "team":
@@ -225,7 +225,7 @@ class Cone(Mesp[ConeState]):
         return replace(state, phase="fittest", fitness=fitness, elite=elite)
 
     def crowned(self, state: ConeState, trials: Trials, scores: Scores) -> ConeState:
-        """Return the state with the fittest team on record, and how its controllers differ."""
+        """Return the state with its fittest team and the SD between its controllers recorded."""
         state = super().crowned(state, trials, scores)
         return replace(state, distance=self.differ(scores)) if self.config.use_sdm else state
 
@@ -233,13 +233,13 @@ class Cone(Mesp[ConeState]):
         """Return SD [P, P] between the controllers of the first team of some scores.
 
         Raises:
-            UsageError: it needs what the scores do not say.
+            UsageError: it needs shares of actions, and the scores have none.
         """
         specialization, sd = scores.specialization[0], self.config.sd
         if sd == "switching":
             return specialization_distance(specialization)
         if scores.shares is None:
-            raise UsageError(f"method.sd = {sd!r} needs scores.shares, what each robot did")
+            raise UsageError(f"method.sd = {sd!r} needs scores.shares, the activity of each robot")
         if sd == "shares":
             return shares_distance(scores.shares[0])
         return label_distance(specialization, scores.shares[0])
@@ -294,7 +294,7 @@ class Cone(Mesp[ConeState]):
         return note(replace(state, sst=sst, gst=gst), sst=state.sst, gst=state.gst)
 
     def remember(self, state: ConeState) -> ConeState:
-        """Return the state with the generation that has ended in the windows of its thresholds."""
+        """Return the state with the ended generation added to the windows of its thresholds."""
         ended = state.progress
         specialization = np.mean(ended.fittest_specialization)
         return replace(

@@ -1,24 +1,25 @@
 """CONE-ES: an evolution strategy of one shared controller and of each robot's deviation from it.
 
-Ours, not the thesis'. It keeps CONE's idea (Nitschke 2009, chapter 3: robots that behave and look
-alike share genes, and how much is regulated by what it brings) in a form in which fitness says
-enough to steer by. Robot r has the genes ``mean + deviations[r]``. Pairs of teams are tried, one
-perturbed, the other perturbed the opposite way; as Salimans, Ho, Chen, Sidor and Sutskever 2017 do,
+This method is conevo's own, not the thesis'. It keeps CONE's idea (Nitschke 2009, chapter 3: robots
+with similar behaviour and genotypes share genes, and the gain regulates how much) in a form in
+which fitness gives a clear direction. Robot r has the genes ``mean + deviations[r]``. Pairs of
+teams are tried with opposite perturbations. As in Salimans, Ho, Chen, Sidor and Sutskever 2017,
 fitness counts by rank among the teams of a round.
 
-- Shared part: every robot of a team has the same perturbation, and the team's fitness says which
-  way the mean steps.
-- Individual part: in a ``share`` of the pairs every robot has a perturbation of its own on top, and
-  its own fitness says which way it would go. That is mostly luck. What is not luck comes again: the
-  products of directions of different generations, [R, R], are not biased by it. Their eigenvectors
-  are what robots have in common, castes among them, and those whose eigenvalue is above all that
-  luck makes are kept: a robot steps as the ones like it do, in proportion to the signal.
-- The share grows where there is such a signal and shrinks where there is none (as GST does, 3.5.2).
-- The team is the judge: each generation the mean's clones play in the scenarios of the fittest
-  team. While deviations do not pay, they decay, and the clones are the generation's fittest team.
+- Shared part: all robots of a team have the same perturbation, and the team's fitness gives the
+  direction of the mean's step.
+- Individual part: in a ``share`` of the pairs every robot also has its own perturbation, and its
+  own fitness gives a direction. A single direction is mostly luck, but luck does not repeat, so it
+  does not bias the products of directions of different generations, [R, R]. Their eigenvectors
+  describe groups of similar robots, such as castes. Eigenvectors with larger eigenvalues than luck
+  alone can cause are kept: a robot steps like the robots similar to it, in proportion to this
+  signal.
+- The share grows in generations with such a signal and shrinks in those without (as GST does,
+  3.5.2).
+- The team decides: each generation the mean's clones play in the scenarios of the fittest team.
+  While deviations do not pay, they decay, and the clones are the generation's fittest team.
 
-With ``individual = 0`` (the variant HomES) nothing is individual: a plain evolution strategy over
-teams of clones.
+With ``individual = 0`` (the variant HomES) it is a plain evolution strategy over teams of clones.
 """
 
 from __future__ import annotations
@@ -46,51 +47,51 @@ __all__ = ["ConeEs", "ConeEsConfig", "ConeEsState", "HomEsConfig"]
 
 FIRST = 4  # generations of directions before they are compared
 GROWTH, DECLINE = 1.1, 0.98  # of the share, in a generation with a signal and without
-TRUST = 0.8  # memory of what deviations are worth to the team
+TRUST = 0.8  # memory of the deviations' worth to the team
 
 
 @parameters("method")
 class ConeEsConfig:
     """Parameters of CONE-ES.
 
-    Choice: all values are by a few trials in the multi-rover world, none by a search.
+    Choice: all values come from a few trials in the multi-rover world, not from a search.
     """
 
     pairs: Annotated[int, Ge(2), Le(1_000_000)] = 50
     """mirrored pairs of teams in a generation."""
     rounds: Annotated[int, Ge(1), Le(10_000)] = 5
-    """rounds among which the pairs are divided evenly; each has scenarios of its own, and teams are
-    ranked in it."""
+    """rounds among which the pairs are divided evenly; each has its own scenarios, and teams are
+    ranked within it."""
     spread: Annotated[float, Gt(0), Le(1)] = 0.1
     """standard deviation of a perturbation in gene units."""
     step: Annotated[float, Gt(0), Le(1)] = 0.02
     """root mean square of the mean's step in a generation, in gene units."""
     memory: Annotated[float, Ge(0), Le(0.999)] = 0.8
-    """share of the direction before that the next step keeps."""
+    """share of the previous direction that the next step keeps."""
     individual: Annotated[float, Ge(0), Le(1)] = 0.75
-    """share of the pairs in which robots have perturbations of their own, at the start; it is
-    regulated. 0 switches all that is individual off."""
+    """share of the pairs in which robots have their own perturbations, at the start; it is
+    regulated. 0 switches the individual part off."""
     individual_least: Annotated[float, Gt(0), Le(1)] = 0.5
-    """the least that this share shrinks to."""
+    """lower limit of this share."""
     individual_step: Annotated[float, Ge(0), Le(1)] = 0.02
     """root mean square of the deviations' step, in gene units, if all of it were signal."""
     individual_memory: Annotated[float, Ge(0.5), Le(0.999)] = 0.9
-    """share of the robots' directions before that the next generation keeps."""
+    """share of the robots' previous directions that the next generation keeps."""
     signal: Annotated[float, Ge(0), Le(1)] = 0.1
-    """portion of signal, in what robots have most in common, above which the share grows."""
+    """portion of signal, in the robots' strongest common component, above which the share grows."""
     decay: Annotated[float, Ge(0), Le(1)] = 0.1
-    """portion of the deviations that goes in a generation in which they do not pay."""
+    """portion of the deviations that is lost in a generation in which they do not pay."""
 
     def __post_init__(self) -> None:
-        """Refuse rounds that pairs cannot be divided among."""
+        """Refuse a number of rounds that does not divide the pairs evenly."""
         if self.pairs % self.rounds:
-            problem = f"must divide the pairs evenly, of which there are {self.pairs}"
+            problem = f"must divide the {self.pairs} pairs evenly"
             raise WrongValue("rounds", f"method.rounds = {self.rounds}", problem)
 
 
 @parameters("method")
 class HomEsConfig(ConeEsConfig):
-    """Parameters of HomES: CONE-ES without anything individual."""
+    """Parameters of HomES: CONE-ES without the individual part."""
 
     individual: Annotated[float, Ge(0), Le(0)] = 0.0
     """always 0."""
@@ -98,7 +99,7 @@ class HomEsConfig(ConeEsConfig):
 
 @dataclass(frozen=True)
 class ConeEsState:
-    """What CONE-ES remembers.
+    """State of CONE-ES.
 
     Attributes:
         progress: the header.
@@ -106,15 +107,16 @@ class ConeEsState:
             round), "pairs", "fittest".
         active: [U] the slots in use.
         mean: [U, G] float32 the shared genes, zero in empty slots.
-        deviations: [R, U, G] float32 what robots add to them; their mean over robots is 0.
+        deviations: [R, U, G] float32 differences of the robots' genes from the mean; their mean
+            over robots is 0.
         direction: [U, G] float64 of the mean's steps, averaged over generations.
-        directions: [R, U, G] float64 of each robot, by its own fitness, likewise.
+        directions: [R, U, G] float64 of each robot, by its own fitness, averaged likewise.
         likeness: [R, R] float64 products of directions of different generations, averaged.
         luck: mean square of a generation's directions, averaged.
-        age: generations that are in these averages.
-        share: of the pairs in which robots have perturbations of their own.
-        worth: of the deviations to the team: what it has more than clones of the mean, as a portion
-            of both, averaged over generations.
+        age: number of generations in these averages.
+        share: of the pairs in which robots have their own perturbations.
+        worth: of the deviations to the team: its gain over clones of the mean, as a portion of
+            both, averaged over generations.
         best: [2 * pairs / rounds] int32 the best controllers of generation 0, the fittest first.
     """
 
@@ -133,7 +135,7 @@ class ConeEsState:
     best: IntArray
 
     def problem(self, first: ConeEsState) -> str:
-        """Return the field that cannot be that of a state between generations, if there is one."""
+        """Return the first field that is not valid in a state between generations, if any."""
         for name in ("active", "mean", "deviations", "direction", "directions", "likeness"):
             found, right = getattr(self, name), getattr(first, name)
             if found.shape != right.shape or not np.isfinite(found).all():
@@ -166,7 +168,7 @@ class ConeEs:
     def init(self, layout: Layout, root: int) -> ConeEsState:
         """Return generation 0, in which random controllers are tried as clones.
 
-        Choice: as many as a generation has teams; the best are tried again in every round, and the
+        Choice: one for each team of a generation. The best are tried again in every round, and the
         fittest of them is the first mean.
         """
         robots, slots, genes = layout.n_robots, layout.max_hidden, layout.n_genes
@@ -191,14 +193,14 @@ class ConeEs:
     ) -> ConeEsState:
         """Return generation 0 around a team: its mean controller, and each robot's deviation.
 
-        Choice: a slot that only some robots use holds zeros in the others. HomES begins with the
+        Choice: a slot that only some robots use contains zeros in the others. HomES starts with the
         mean alone.
 
         Args:
             layout: the size of the problem.
             root: the seed of every random decision.
-            genes: [R', U, G] the team's; robot r takes after its robot r mod R'.
-            active: [R', U] its slots in use; the mean's are those that any of them uses.
+            genes: [R', U, G] the team's genes; robot r starts as its robot r mod R'.
+            active: [R', U] its slots in use; the mean uses those that any robot uses.
         """
         fresh = self.init(layout, root)
         used = np.asarray(active.any(axis=0))
@@ -214,7 +216,7 @@ class ConeEs:
         )
 
     def ask(self, state: ConeEsState) -> Trials:
-        """Return clones in generation 0, the best twice, later pairs; and the fittest team."""
+        """Return clones in generation 0, the best of them again; later pairs; the fittest team."""
         if state.phase == "fittest":
             return self._trials(state, np.stack(self._finalists(state)))
         if state.phase == "first":
@@ -249,7 +251,7 @@ class ConeEs:
         return self._step(state, credit)
 
     def _step(self, state: ConeEsState, credit: FloatArray) -> ConeEsState:
-        """Return the state with mean and deviations one step further, by credit [N, R]."""
+        """Return the state with mean and deviations moved by one step, given credit [N, R]."""
         config, n_robots = self.config, len(state.deviations)
         shared, own = self._perturbations(state)
         gain = self._gains(credit.mean(axis=1, keepdims=True))[:, 0]
@@ -331,7 +333,7 @@ class ConeEs:
         return np.broadcast_to(controllers[:, None], shape)
 
     def _perturbations(self, state: ConeEsState) -> tuple[FloatArray, FloatArray]:
-        """Return those of a generation: shared [pairs, U, G], and own ones [n, R, U, G]."""
+        """Return a generation's perturbations: shared [pairs, U, G], and own ones [n, R, U, G]."""
         generator = stream(state.progress.root, "pairs", state.progress.generation)
         used = state.active[:, None]
         shared = generator.standard_normal((self.config.pairs, *state.mean.shape), dtype=np.float32)
@@ -340,13 +342,13 @@ class ConeEs:
         return shared * used, own * used
 
     def _is_own(self, state: ConeEsState) -> BoolArray:
-        """Return the pairs [pairs] in which robots have perturbations of their own, by round."""
+        """Return the pairs [pairs] in which robots have their own perturbations, by round."""
         per_round = self.config.pairs // self.config.rounds
         n_own = max(int(state.share * per_round + 0.5), int(state.share > 0))
         return np.tile(np.arange(per_round) < n_own, self.config.rounds)
 
     def _gains(self, fitness: FloatArray) -> FloatArray:
-        """Return what the first of each pair has over the second, [pairs, C], in ranks of a round.
+        """Return the gain of the first of each pair over the second, [pairs, C], in ranks.
 
         Args:
             fitness: [2 * pairs, C].
@@ -374,7 +376,7 @@ class ConeEs:
 
 
 def _ranks(fitness: FloatArray) -> FloatArray:
-    """Return the ranks [N, C] of each column, from -1/2 (the least) to 1/2; equals share one."""
+    """Return the ranks [N, C] of each column, from -1/2 (the least) to 1/2; ties share one."""
     order = np.where(np.isfinite(fitness), fitness, -np.inf)
     below = (order[None] < order[:, None]).sum(axis=1)
     equal = (order[None] == order[:, None]).sum(axis=1)
@@ -389,17 +391,17 @@ def _size(directions: FloatArray, active: BoolArray) -> float:
 
 
 def _signal(state: ConeEsState, memory: float) -> tuple[FloatArray, float]:
-    """Return what of the robots' directions [R, U, G] is signal, and the largest portion of it.
+    """Return the signal in the robots' directions [R, U, G], and its largest portion.
 
     A Wiener filter over robots. Without any signal the eigenvalues of ``likeness`` lie between two
-    edges, which Marchenko and Pastur 1967 give for products of R rows of so many genes; weighted as
-    here, they are narrower by the root of 2. What is above the upper edge is believed, and counts
-    as much as it exceeds it.
+    edges, which Marchenko and Pastur 1967 derive for products of R rows of this number of genes;
+    weighted as here, they are narrower by the root of 2. An eigenvalue above the upper edge is
+    taken as signal, in proportion to its excess.
     """
     directions = state.directions
     if state.age <= FIRST:
         return np.zeros_like(directions), 0.0
-    faded = memory**state.age  # averages are of few generations at first, and noisier
+    faded = memory**state.age  # at first averages are over few generations, and noisier
     values, vectors = np.linalg.eigh(state.likeness / (1 - memory ** (state.age - 1)))
     luck = state.luck / (1 - faded)
     noise = luck * (1 - memory) / (1 + memory) * (1 + faded) / (1 - faded)

@@ -1,4 +1,4 @@
-"""What is known of a method without loading it."""
+"""Registry entries: the facts about a method that are known without loading it."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ __all__ = ["MethodEntry"]
 
 @dataclass(frozen=True)
 class MethodEntry:
-    """What the registry knows of a method without loading it.
+    """One method in the registry.
 
-    ``module`` holds the classes named ``config_name`` (parameters) and ``method_name`` (built from
-    parameters, name and title). An entry in a file outside the package leaves it out;
+    ``module`` contains the classes named ``config_name`` (parameters) and ``method_name`` (built
+    from parameters, name and title). An entry in a file outside the package leaves it out;
     ``methods.outside`` fills it in, with the file's path, ``files`` (this one first, then the files
     next to it that it imports) and the digest of their texts.
 
     Attributes:
-        name: how it is asked for.
+        name: its name in commands and files.
         title: its name as published.
-        summary: one line on what it does.
-        source: where it is described.
+        summary: a description in one line.
+        source: the publication that describes it.
     """
 
     name: str
@@ -41,17 +41,17 @@ class MethodEntry:
 
     @property
     def address(self) -> str:
-        """What ``resolve`` finds this method by: its name, or "FILE.py:NAME"."""
+        """The address that ``resolve`` accepts: its name, or "FILE.py:NAME"."""
         return f"{self.file}:{self.name}" if self.file else self.name
 
     @property
     def family(self) -> str:
-        """The method whose variant this is, "cone" for all that its module has; or its own name."""
+        """The family of the method: "cone" for CONE and its variants, else usually its own name."""
         return self.module.rpartition(".")[2].replace("_", "-") if self.module else self.name
 
     @property
     def config_class(self) -> type[Any]:
-        """The dataclass of its parameters; it refuses what they do not allow."""
+        """The dataclass of its parameters; it refuses values outside their bounds."""
         from conevo.parameters import checked
 
         return checked(getattr(importlib.import_module(self.module), self.config_name), "method")

@@ -5,11 +5,11 @@ n - 1 different genotypes and credited with its own robot's fitness. One team ev
 genotype and generation.
 
 Choice: children replace all genotypes and have no fitness before they are tried, so "elite" means
-the elite portion of the generation before, which the state keeps; the first generation takes any
+the elite portion of the previous generation, which the state keeps. The first generation takes any
 other genotypes. An elite portion of fewer than n - 1 is filled up with the next in rank. With
 ``n_elitist`` a survivor may meet its own copy.
-Choice: the fittest team is the n fittest genotypes, robot r holding rank r (section 2.3.1: "M of
-the fittest genotypes ... decoded into a group of M different ANNs").
+Choice: the fittest team consists of the n fittest genotypes, rank r in robot r (section 2.3.1: "M
+of the fittest genotypes ... decoded into a group of M different ANNs").
 """
 
 from __future__ import annotations
@@ -51,17 +51,17 @@ class HetCneConfig(VariationConfig):
     """M, whole networks in the population, at least as many as robots; each costs one team
     evaluation. Choice: 10000, as for HomCNE."""
     partners: Literal["elite", "any"] = "elite"
-    """with whom a genotype on trial plays: different genotypes of the elite portion of the
-    generation before ("elite", 5.3.3), or "any" others of its own generation."""
+    """partners of a genotype on trial: different genotypes of the previous generation's elite
+    portion ("elite", 5.3.3), or "any" others of its own generation."""
 
 
 @dataclass(frozen=True)
 class HetCneState(Populations):
-    """What HetCNE remembers.
+    """State of HetCNE.
 
     Attributes:
-        partners: [1, U, L, G] float32 last generation's elite; L = 0 in the first, and always if
-            partners do not come from it.
+        partners: [1, U, L, G] float32 last generation's elite; L = 0 in the first generation, and
+            always if partners do not come from the elite.
     """
 
     partners: FloatArray
@@ -93,7 +93,7 @@ class HetCne:
         )
 
     def ask(self, state: HetCneState) -> Trials:
-        """Return every genotype among different partners, then the team of the fittest."""
+        """Return a team for every genotype, with different partners, then the fittest team."""
         m, n_robots = self.config.genotypes, state.progress.fittest_fitness.size
         if state.phase == "fittest":
             fittest = state.elite[:, :n_robots, None]

@@ -41,9 +41,9 @@ class HomCneConfig(VariationConfig):
     500 of the methods with many populations (table 5.5's own number is lost), so that all methods
     spend the same team evaluations per generation."""
     clone_credit: Literal["mean", "one"] = "mean"
-    """whose credit is a genotype's fitness: the "mean" of all its clones, or that of "one", the
-    same robot for all genotypes of a generation, drawn anew for each. Choice: the mean; 5.3.3 says
-    only that a genotype is replicated, and one clone is less evidence."""
+    """the credit that is a genotype's fitness: the "mean" of all its clones, or that of "one",
+    drawn in each generation and the same robot for all its genotypes. Choice: the mean; 5.3.3
+    states only that a genotype is replicated, and one clone is less evidence."""
 
 
 @dataclass(frozen=True)

@@ -62,24 +62,24 @@ class MespConfig(VariationConfig, SchemeConfig, StartConfig):
     for pursuit)."""
     lesion_ratio: Annotated[float, Gt(0), Le(1)] = 0.9
     """share of its fitness that a controller must keep without its least needed neuron for that
-    neuron to go. Lower removes more. Choice: 0.9, the thesis gives none."""
+    neuron to be removed. Lower removes more. Choice: 0.9, since the thesis gives none."""
     migration_every: Annotated[int, Ge(0), Le(1_000_000)] = 0
-    """generations after which the population with the best mean type A fitness replaces the one
-    with the worst, whole; 0 means never. Choice: never, the thesis has nothing of the kind."""
+    """generations after which the population with the best mean type A fitness replaces the whole
+    population with the worst; 0 means never. Choice: never, since the thesis does not do this."""
 
 
 @dataclass(frozen=True)
 class MespState(Populations):
-    """What Multi-Agent ESP remembers.
+    """State of Multi-Agent ESP.
 
     Attributes:
         past_fitness: [H, R] float64 credits of the fittest team in the last H generations, the
-            newest last, NaN before the first. H is what the window needs.
+            newest last, NaN before the first. H is the length of the window.
         watched_since: [P] int64 generation at which the controller-size window started.
-        partners: [P, U, L, G] float32 last generation's elite; L = 0 in the first, and always if
-            partners do not come from it.
-        population_fitness: [P] float64 mean type A fitness of this generation's genotypes, of the
-            finite ones; NaN without any, and before the first generation is graded.
+        partners: [P, U, L, G] float32 last generation's elite; L = 0 in the first generation, and
+            always if partners do not come from the elite.
+        population_fitness: [P] float64 mean of the finite type A fitness of this generation's
+            genotypes; NaN without any, and before the first generation is graded.
     """
 
     past_fitness: FloatArray
@@ -134,10 +134,10 @@ class Mesp(Generic[Kind]):
         return self.finish(state, self.resize(state, scores), self.suspects(state))
 
     def beginning(self, layout: Layout) -> dict[str, Any]:
-        """Return the sizes of populations and the windows that they begin with.
+        """Return the sizes of populations and their initial windows.
 
         Raises:
-            UsageError: one population cannot replace another.
+            UsageError: populations shall replace each other, and the team has only one.
         """
         if self.config.migration_every and layout.n_robots == 1:
             raise UsageError(
@@ -157,7 +157,7 @@ class Mesp(Generic[Kind]):
         }
 
     def crowned(self, state: Kind, trials: Trials, scores: Scores) -> Kind:
-        """Return the state with the fittest team on record."""
+        """Return the state with its fittest team recorded."""
         past = push(state.past_fitness, scores.fitness[0])
         return crown(state, trials, scores, past_fitness=past)
 
@@ -196,7 +196,7 @@ class Mesp(Generic[Kind]):
         return np.empty((0, 2), dtype=np.int64)
 
     def finish(self, state: Kind, active: BoolArray, judged: BoolArray | None = None) -> Kind:
-        """Return the next generation, its controllers using the slots ``active`` [P, U].
+        """Return the next generation, whose controllers use the slots ``active`` [P, U].
 
         Args:
             state: the generation that ends.
@@ -228,10 +228,10 @@ class Mesp(Generic[Kind]):
         return advance(state, children, active, numbers, watched_since=since, partners=partners)
 
     def sources(self, state: Kind) -> IntArray:
-        """Return for each place [P] the population that goes on there: its own, or the fittest.
+        """Return for each place [P] the population that continues there: its own, or the fittest.
 
-        Choice: what is copied are the children, with the slots they use and the partners from their
-        parents; the window of the newcomer's size restarts.
+        Choice: the children are copied, with the slots they use and the partners from their
+        parents. The controller-size window of the replaced population restarts.
         """
         source = np.arange(len(state.active))
         fitness = np.where(np.isfinite(state.population_fitness), state.population_fitness, -np.inf)
@@ -242,14 +242,14 @@ class Mesp(Generic[Kind]):
         return source
 
     def partners(self, state: Kind, children: FloatArray, added: BoolArray) -> FloatArray:
-        """Return with whom the next generation plays, [P, U, L, G]: the elite of this one.
+        """Return the partners of the next generation, [P, U, L, G]: the elite of this one.
 
-        Choice: a sub-population that is added has none yet, and its first L genotypes take the
-        place; they are random, as all in it are.
+        Choice: an added sub-population has no elite yet, so its first L genotypes take its place;
+        they are random, as all of its genotypes are.
 
         Args:
             state: the generation that ends.
-            children: [P, U, M, G] the next one.
+            children: [P, U, M, G] the next generation.
             added: [P, U] slots that this generation did not use.
         """
         if not self.config.has_elite_partners:
@@ -260,7 +260,7 @@ class Mesp(Generic[Kind]):
 
 
 def _mean_of_finite(fitness: FloatArray) -> FloatArray:
-    """Return the mean over slots and genotypes of the finite values of [P, U, M], NaN of none."""
+    """Return the mean of the finite values of [P, U, M] over slots and genotypes; NaN if none."""
     finite = np.isfinite(fitness)
     mean = np.full(len(fitness), np.nan)
     total, n = np.where(finite, fitness, 0.0).sum(axis=(1, 2)), finite.sum(axis=(1, 2))

@@ -1,4 +1,4 @@
-"""An object of a method's class in place of the method's name, with the parameters that it has."""
+"""An object of a method's class in place of the method's name, with its parameters."""
 
 from __future__ import annotations
 
@@ -22,14 +22,15 @@ __all__ = ["as_settings"]
 def as_settings(
     method: str | Method | None, more: Mapping[str, Any]
 ) -> tuple[str | None, Mapping[str, Any]]:
-    """Return what ``resolve`` finds a method by, and its parameters with other settings.
+    """Return a method's address for ``resolve``, and its parameters together with other settings.
 
     Args:
-        method: an object with init, ask, tell and a config; a name or None is returned as it is.
-        more: "run.generations" -> 5.
+        method: an object with the functions of a ``Method`` and a config; a name or None is
+            returned as it is.
+        more: other settings, "run.generations" -> 5.
 
     Raises:
-        UsageError: its class is not one of the package, and not in a file that can be copied; or a
+        UsageError: its class is neither in the package nor in a file that can be copied, or a
             parameter is given twice.
     """
     if method is None or isinstance(method, str):

@@ -1,6 +1,6 @@
 """Methods outside the package: one Python file each, with its registry entry as ``ENTRY``.
 
-Such a method is named "FILE.py:NAME"; ``conevo.outside`` says what such a file may do.
+Such a method is named "FILE.py:NAME"; ``conevo.outside`` describes the rules for such a file.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ def load(path: Path, digest: str = "") -> MethodEntry:
 
 
 def _problem(entry: MethodEntry, module: ModuleType) -> str:
-    """Return what is wrong with an entry, nothing if it can be used."""
+    """Return the mistake in an entry, nothing if it can be used."""
     if not re.fullmatch(r"[a-z0-9]+(-[a-z0-9]+)*", str(entry.name)):
         return f"its name {entry.name!r} must be lower case, digits and hyphens, as in team-es"
     if not is_dataclass(getattr(module, entry.config_name)):

@@ -116,16 +116,16 @@ def name_in(address: str) -> str:
     return address.rpartition(":")[2] if ".py:" in address else address
 
 
-_TITLES: dict[str, str] = {}  # of methods in files, as the files and runs say that are read
+_TITLES: dict[str, str] = {}  # of methods in files, from the files and runs that have been read
 
 
 def title_of(name: str) -> str:
-    """Return a method's name as published; its name if nothing that was read has its title."""
+    """Return a method's name as published; its plain name if its title has not been read."""
     return METHODS[name].title if name in METHODS else _TITLES.get(name, name)
 
 
 def remember_title(name: str, title: str) -> None:
-    """Take note of the title of a method in a file."""
+    """Remember the title of a method in a file."""
     _TITLES[name] = title
 
 
@@ -137,7 +137,7 @@ def resolve(name: str, digest: str = "") -> MethodEntry:
         digest: of that file, checked if it is given.
 
     Raises:
-        UsageError: no such method; a file that holds no method or has changed.
+        UsageError: no such method; a file without a method, or one that has changed.
     """
     file, _, own = name.rpartition(":")
     if name.endswith(".py"):
