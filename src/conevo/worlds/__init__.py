@@ -1,1 +1,1 @@
-"""Worlds: the tasks that teams are evolved for, and the one loop that runs them."""
+"""Worlds: the tasks for which teams are evolved, and the one loop that runs them."""

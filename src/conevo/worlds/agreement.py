@@ -1,6 +1,6 @@
-"""Whether a device gives the bits of the CPU: two teams play some iterations on both.
+"""Whether a device agrees with the CPU bit for bit: two teams play some iterations on both.
 
-A driver, a compiler or a card may be at fault; a run whose results depend on it would not be
+A driver, a compiler or a card may be at fault, and a run whose results depend on it would not be
 reproducible.
 """
 
@@ -21,13 +21,13 @@ _agreed: set[tuple[str, str]] = set()  # devices and fingerprints, in this proce
 
 
 def refuse_other_bits(played: Rollout, device: str) -> None:
-    """Refuse a device that gives other results than the CPU; asked once of a world and controller.
+    """Refuse a device with other results than the CPU; tried once for a world and controller.
 
     A team of random networks and one with a heuristic controller in every second robot play the
     same scenario on both.
 
     Args:
-        played: plays on the device.
+        played: the rollout on the device.
         device: its name.
 
     Raises:
@@ -55,7 +55,7 @@ def refuse_other_bits(played: Rollout, device: str) -> None:
 
 
 def difference(of_cpu: Outcome, of_device: Outcome) -> str:
-    """Return where two outcomes differ first, in any bit; nothing if they are the same."""
+    """Return the first difference between two outcomes, in any bit; nothing if they are equal."""
     for name, here in _arrays(of_cpu).items():
         there = _arrays(of_device)[name]
         differs = _bits(here) != _bits(there)
@@ -82,7 +82,7 @@ def _arrays(outcome: Outcome) -> dict[str, npt.NDArray[Any]]:
 
 
 def _bits(values: npt.NDArray[Any]) -> npt.NDArray[np.unsignedinteger[Any]]:
-    """Return values as whole numbers; what is not a number has one form, whatever made it."""
+    """Return the bits of values as whole numbers; every NaN has the same ones."""
     if values.dtype.kind == "f":
         values = np.where(np.isnan(values), np.asarray(np.nan, values.dtype), values)
     return np.ascontiguousarray(values).view(f"u{values.dtype.itemsize}")

@@ -1,8 +1,8 @@
-"""Check a world in a process of its own, and explain what ends that process.
+"""Check a world in a child process, and explain why that process ended.
 
-An index outside an array ends a process without a word. So the checks run in a child, which writes
-a line for each finding; if it dies, a second child runs a copy of the world's file that marks its
-lines, and the last mark shows where.
+An index outside an array ends a process without a message. So the checks run in a child, which
+writes a line for each finding. If it dies, a second child runs a copy of the world's file that
+marks its lines, and the last mark shows where.
 """
 
 import hashlib
@@ -32,11 +32,11 @@ from conevo.worlds.simulators import has_own_simulator
 
 __all__ = ["check", "refuse_wild_indices"]
 
-Result = tuple[int | None, str]  # a child's exit status, None if it has done all; its last words
+Result = tuple[int | None, str]  # a child's exit status, None if it completed; its last error line
 
 MOST_SECONDS = 120  # between two findings: kernels are compiled
 STEP_SECONDS = 20  # after one that is "running": a few scenarios are drawn, or one phase is run
-AGAIN_SECONDS = 5  # of a world that took too long, to see where
+AGAIN_SECONDS = 5  # for the second child of a world that took too long, to see where
 END, FAILURE = "end", "failure"  # in place of findings: all has been checked; the machine failed
 CAUSES = {
     signal.SIGILL: "an index lies outside its array",  # how Warp's assertions end
@@ -50,14 +50,14 @@ CAUSES = {
 
 
 def check(path: str) -> Iterator[Finding]:
-    """Yield what is found in a world: one finding for each thing looked at.
+    """Yield the findings of all checks of a world.
 
     Args:
         path: "FILE.py:ENVIRONMENT" or "rover/complex-1"; the first environment if it has none.
 
     Raises:
-        UsageError: there is no such world, or its file cannot be run.
-        EnvironmentFailure: the machine failed, as where compiled kernels cannot be kept.
+        UsageError: the world does not exist, or its file cannot be run.
+        EnvironmentFailure: the machine failed, for example to keep compiled kernels.
     """
     entry, environment = resolve(path, is_whole=False)
     status, words = yield from _in_child(entry.address(environment), {}, STEP_SECONDS)
@@ -73,8 +73,8 @@ def refuse_wild_indices(entry: WorldEntry, environment: str, params: Any) -> Non
     """Refuse a world in a file in which an index lies outside its array, before it is evolved.
 
     Such an index goes unnoticed in evolution: it spoils results, or ends the process without a
-    word. A few short epochs are run as ``check`` runs them, once for every text of the file and all
-    parameters; what was found sound is remembered with the compiled kernels.
+    message. A few short epochs are run as in ``check``, once for each version of the file and its
+    parameters. A success is remembered next to the compiled kernels.
 
     Args:
         entry: of the world.
@@ -82,7 +82,7 @@ def refuse_wild_indices(entry: WorldEntry, environment: str, params: Any) -> Non
         params: of the world.
 
     Raises:
-        UsageError: there is such an index.
+        UsageError: the world has such an index.
         EnvironmentFailure: the machine failed.
     """
     if not entry.files or has_own_simulator(entry.world_class):
@@ -101,14 +101,14 @@ def refuse_wild_indices(entry: WorldEntry, environment: str, params: Any) -> Non
             mark.touch()
     elif (
         status and -status in CAUSES and -status != signal.SIGKILL
-    ):  # else nothing is known: evolve, and see
+    ):  # else nothing is known, and evolution may start
         place = _place(entry, environment, given) or f"{entry.file}: "
         cause = CAUSES[signal.Signals(-status)]
         raise UsageError(f"{place}{cause}; see also: conevo check {quoted(address)}")
 
 
 def _whole(steps: Generator[Finding, None, Result]) -> tuple[list[Finding], Result]:
-    """Return what a child has found, and how it ended."""
+    """Return a child's findings, and how it ended."""
     found = []
     while True:
         try:
@@ -124,12 +124,12 @@ def _in_child(
 
     Args:
         path: of the world.
-        variables: of the environment, besides those of this process.
-        seconds: how long it may run without a sign of life.
-        given: parameters with which only indices are checked, as JSON; "": everything is.
+        variables: of the environment, in addition to those of this process.
+        seconds: the longest time without output.
+        given: parameters for a check of indices only, as JSON; "": everything is checked.
 
     Returns:
-        Its exit status, None if it has checked all, and the last line of its errors.
+        Its exit status, None if it has checked everything, and the last line of its errors.
     """
     got, put = os.pipe()
     command = [sys.executable, "-m", __name__, path, str(put), given]
@@ -161,7 +161,7 @@ def _in_child(
 
 
 def _heard(child: subprocess.Popen[bytes], lines: IO[str], seconds: float) -> Iterator[list[Any]]:
-    """Yield what a child writes until it ends; end it if it writes nothing for too long."""
+    """Yield the lines of a child until it ends; end it if it writes nothing for too long."""
     limit: float = MOST_SECONDS
     while True:
         timer = threading.Timer(limit, child.kill)
@@ -179,7 +179,7 @@ def _heard(child: subprocess.Popen[bytes], lines: IO[str], seconds: float) -> It
 
 
 def _place(entry: WorldEntry, environment: str, given: str = "") -> str:
-    """Return "FILE:LINE: " of the line that ends the process, nothing if it is not in a file."""
+    """Return "FILE:LINE: " of the line that ends the process, nothing if it is not in the file."""
     if not entry.files:
         return ""
     texts = [Path(file).read_text("utf-8") for file in entry.files]

@@ -1,7 +1,7 @@
-"""What a world promises, tried out: one finding for each thing looked at.
+"""Checks of the rules that a world must follow: one finding for each topic.
 
-``findings`` yields them in turn. A fault of the world's memory may end the process, so
-``worlds.checking`` does this in a process of its own.
+``findings`` yields them in turn. A memory fault of the world may end the process, so
+``worlds.checking`` runs it in a child process.
 """
 
 from collections.abc import Iterator, Mapping
@@ -33,8 +33,8 @@ __all__ = ["Finding", "findings", "mixed_teams", "random_teams"]
 ITERATIONS = 100  # of the epochs that are run step by step
 NETWORKS = 4  # teams of random networks among those
 RANDOM_TEAMS = 100
-TEAM_STEPS = 200_000  # that all random teams together may take
-FEW = 0.02  # share of random teams with any fitness below which that is noted
+TEAM_STEPS = 200_000  # limit for all random teams together
+FEW = 0.02  # a smaller share of random teams with any fitness is noted
 KEYS = [fold(1, "check", k) for k in range(3)]
 
 Teams = tuple[npt.NDArray[np.float32], npt.NDArray[np.int32], npt.NDArray[np.int32]]
@@ -42,9 +42,9 @@ Teams = tuple[npt.NDArray[np.float32], npt.NDArray[np.int32], npt.NDArray[np.int
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that was looked at: "ok", a "note" to think about, or a "problem".
+    """Result of one check: "ok", a "note" to think about, or a "problem".
 
-    One that is "running" says nothing of the world: what begins now takes seconds, in a good one.
+    A finding "running" is not a result: it announces a check that takes seconds in a good world.
     """
 
     status: Literal["ok", "note", "problem", "running"]
@@ -53,14 +53,14 @@ class Finding:
 
 
 def findings(path: str, given: Mapping[str, Any] | None = None) -> Iterator[Finding]:
-    """Yield what is found in a world; it ends where the rest depends on what is wrong.
+    """Yield the findings for a world, up to a problem on which the other checks depend.
 
     Args:
         path: "FILE.py:ENVIRONMENT" or "rover/complex-1".
-        given: parameters of a world with which only indices are checked; None: everything is.
+        given: parameters of a world for a check of indices only; None: everything is checked.
 
     Raises:
-        EnvironmentFailure: the machine failed, and nothing is known of the world.
+        EnvironmentFailure: the machine failed, and the world could not be checked.
     """
     try:
         entry, environment = resolve(path)
@@ -98,7 +98,7 @@ def _topic(topic: str, problems: Iterator[str], fine: str) -> Iterator[Finding]:
 
 
 def _declared(entry: WorldEntry, environment: str) -> Iterator[Finding]:
-    """Check what the world's file states."""
+    """Check the declarations in the world's file."""
     names = [Path(file).name for file in entry.files] or [entry.module]
     imports = f", which imports {', '.join(names[1:])}" if names[1:] else ""
     yield Finding("ok", "file", names[0] + imports)
@@ -208,7 +208,7 @@ def _of_scenarios(a_world: World) -> Iterator[str]:
 
 
 def _of_environments(entry: WorldEntry) -> Iterator[Finding]:
-    """Note environments that nothing tells apart: neither parameters nor a scenario."""
+    """Note environments that have the same parameters and the same scenario."""
     known: dict[tuple[object, ...], str] = {}
     for name in entry.environments:
         a_world = entry.build(name, entry.params(name))
@@ -231,7 +231,7 @@ def _of_environments(entry: WorldEntry) -> Iterator[Finding]:
 def random_teams(a_world: World, n: int) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.int32]]:
     """Return a pool of random genotypes and ``n`` teams of controllers made of it [N, R, U].
 
-    They are of the controller that the world suggests.
+    The controller is the one that the world suggests.
     """
     genome = genome_of(controller(world=a_world), a_world)
     return random_teams_of(genome, a_world.n_robots, n)
@@ -243,7 +243,7 @@ def _shorter(entry: WorldEntry, environment: str, given: Mapping[str, Any] = {})
 
 
 def _stepped(a_world: World) -> Iterator[Finding]:
-    """Run some epochs step by step, in a process that ends where an array has no such index."""
+    """Run some epochs step by step; an index outside its array ends the process."""
     trial = Trial(a_world, *mixed_teams(a_world), a_world.scenarios(KEYS[:2]))
     about = f"{trial.n_worlds} epochs of {a_world.params.iterations} iterations"
     for _ in trial.run():
@@ -299,7 +299,7 @@ def _of_record(a_world: World, mixed: Teams) -> Iterator[str]:
     if seen["fitness"][-1].tobytes() != out.fitness[0, 0].tobytes():
         yield "fitness differs from that of evaluate: does outcome change more than performance?"
     if seen["performance"][-1].tobytes() != ended.tobytes():
-        yield "performance differs from that of evaluate: outcome must begin anew each time"
+        yield "performance differs from that of evaluate: outcome must start from 0 each time"
 
 
 def _of_random_teams(a_world: World) -> Iterator[Finding]:
@@ -323,6 +323,6 @@ def _of_random_teams(a_world: World) -> Iterator[Finding]:
         text = f"all {n} have the same fitness: there is nothing to select on"
         yield Finding("problem", "random teams", text)
     elif some < FEW * n:
-        yield Finding("note", "random teams", f"{text}: evolution may find nothing to begin with")
+        yield Finding("note", "random teams", f"{text}: evolution may find nothing to start with")
     else:
         yield Finding("ok", "random teams", text)

@@ -1,4 +1,4 @@
-"""What the engine needs of a world, looked at before its kernel is made: a line for each fault."""
+"""Requirements of the engine, checked before a world's kernel is made: a line for each fault."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -25,13 +25,13 @@ __all__ = [
 
 @wp.struct
 class _Nothing:
-    """What a Warp struct looks like."""
+    """An example of a Warp struct, for its type."""
 
     number: int
 
 
 # The stages of an epoch, each with the numbers that its function gets after team, scene and p. A
-# world may have phases over items of its own in place of a function.
+# world may have phases over other items in place of a function.
 STAGES = {
     "reset": ("i",),
     "sense": ("i", "t"),
@@ -42,7 +42,7 @@ STAGES = {
     "outcome": ("t_end",),
 }
 OPTIONAL = ("settle",)
-NUMBERS = {"i": "q", "t": "t", "t_end": "t"}  # what a phase knows them by
+NUMBERS = {"i": "q", "t": "t", "t_end": "t"}  # their names in a phase
 STATE = {
     "action": int,
     "heuristic": int,
@@ -53,8 +53,8 @@ STATE = {
 }
 STRUCT = type(_Nothing)
 WIDE = ("inputs", "outputs")
-# The dimensions of arrays that every world has; all others have one element for each robot unless
-# they name what they have.
+# The dimensions of arrays that every world has. All others have one element for each robot unless
+# they name their dimensions.
 DIMENSIONS = {
     "inputs": ("robots", "inputs"),
     "outputs": ("robots", "outputs"),
@@ -104,7 +104,7 @@ def _known_sizes(world: World) -> dict[str, int]:
 
 
 def faults(world: World, simulation: Simulation) -> Iterator[str]:
-    """Yield what is wrong with a world's names, controller, phases and structs."""
+    """Yield the faults of a world's names, controller, phases and structs."""
     yield from faults_of_names(world)
     yield from _of_phases(simulation)
     if _is_struct(simulation.state):
@@ -125,7 +125,7 @@ def _is_struct(kind: Any) -> bool:
 
 
 def faults_of_names(world: World) -> Iterator[str]:
-    """Yield what is wrong with the names of inputs, outputs, actions, castes and heuristics."""
+    """Yield the faults in the names of inputs, outputs, actions, castes and heuristics."""
     for what in ("inputs", "outputs", "actions", "castes", "heuristics"):
         names: Any = getattr(world, what)
         if not (isinstance(names, tuple) and names and all(isinstance(n, str) for n in names)):
@@ -234,7 +234,7 @@ def _of_dimensions(world: World, simulation: Simulation) -> Iterator[str]:
         if name in known:
             yield f"Simulation.sizes must not have {name!r}, which is {known[name]} in this world"
         elif name not in used:
-            yield f"Simulation.sizes has {name!r}, which is no dimension of an array of {key}"
+            yield f"Simulation.sizes has {name!r}, which is not a dimension of an array of {key}"
         elif size < 1:
             yield f"Simulation.sizes[{name!r}] must be 1 or more, not {size!r}"
     for array, names in named.items():
@@ -255,7 +255,7 @@ def _is_array_of(kind: Any, dtype: Any, ndim: int = 1) -> bool:
 def _of_scene(scene: Any) -> Iterator[str]:
     for name, var in scene.vars.items():
         if not wp.types.is_array(var.type):
-            yield f"{scene.key}.{name} must be an array: it is one of every scenario"
+            yield f"{scene.key}.{name} must be an array: it has a part for each scenario"
         elif not wp.types.type_is_scalar(var.type.dtype):
             yield f"{scene.key}.{name} must be an array of numbers"
     if "seed" in scene.vars and not _is_array_of(scene.vars["seed"].type, wp.uint64):
@@ -263,14 +263,15 @@ def _of_scene(scene: Any) -> Iterator[str]:
 
 
 def scenario_faults(scene: Any, scenarios: Any, n: int, example: Any = None) -> Iterator[str]:
-    """Yield what is wrong with ``n`` scenarios: their arrays must be those of the scene.
+    """Yield the faults of ``n`` scenarios: their arrays must be those of the scene.
 
-    And of the shapes of an ``example`` of the same world, if there is one: a kernel trusts them.
+    They must also have the shapes of an ``example`` of the same world, if given: a kernel relies on
+    them.
     """
     kind = type(scenarios).__name__
     for name, var in scene.vars.items():
         values, alike = getattr(scenarios, name, None), getattr(example, name, None)
-        each = 0 if var.type.ndim > 1 else 1  # where the shape of one scenario begins
+        each = 0 if var.type.ndim > 1 else 1  # where the shape of one scenario starts
         if not isinstance(values, np.ndarray):
             yield f"{kind} needs an array {name}, as {scene.key} has one"
             continue

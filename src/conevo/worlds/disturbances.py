@@ -1,8 +1,8 @@
-"""Noise of sensors and actions, and robots that fail: settings that worlds share, all off at first.
+"""Noise of sensors and actions, and failing robots: shared settings of worlds, off by default.
 
 A world inherits the settings, has ``kept_inputs`` and ``kept_heuristic`` in its state and the
-settings in its constants, and says what a failure does; ``disturbed`` adds the phases. Where a
-setting is off, there is no phase of it, and what it would keep is a single number.
+settings in its constants, and defines the effect of a failure; ``disturbed`` adds the phases. A
+setting that is off adds no phase, and its array has a single element.
 """
 
 from __future__ import annotations
@@ -22,22 +22,22 @@ Share = Annotated[float, Ge(0), Le(1)]
 
 @parameters("world")
 class Disturbances:
-    """What may go wrong; none of it is in the thesis."""
+    """Noise and failures; they are not in the thesis."""
 
     sensor_noise: Share = 0.0
-    """(reading) a controller reads each sensor off by up to this, either way, within the sensor's
-    range."""
+    """(reading) the largest error, in both directions, of each sensor value that a controller
+    reads; values stay within the sensor's range."""
     action_noise: Share = 0.0
-    """(probability) in each iteration, that a robot's outputs are random ones."""
+    """(probability) that a robot's outputs are replaced by random ones, in each iteration."""
     failure: Share = 0.0
-    """(probability) that a robot fails for good: in each iteration, or at that of ``failure_at``
-    alone."""
+    """(probability) that a robot fails for good: in each iteration, or only in that of
+    ``failure_at``."""
     failure_at: Annotated[int, Ge(0), Le(1_000_000)] = 0
-    """(iterations) from which on robots that fail do nothing, all from the same one; 0 if it may be
+    """(iterations) the iteration from which all failing robots do nothing; 0 if they may fail in
     any."""
 
     def kept(self, n_robots: int, n_inputs: int) -> dict[str, int]:
-        """Return the sizes of what a team keeps for the disturbances that are on."""
+        """Return the sizes of a team's arrays for the disturbances that are on."""
         is_kept = self.action_noise > 0 or self.failure > 0
         return {
             "kept_inputs": n_robots * n_inputs if self.sensor_noise > 0 else 1,
@@ -52,15 +52,14 @@ def disturbed(
     fail: Any,
     stand: Any = None,
 ) -> dict[str, Any]:
-    """Return a world's phases with those of the disturbances that are on.
+    """Return a world's phases together with those of the disturbances that are on.
 
     Args:
         functions: of the world.
         structs: of its state, its scenarios and its constants.
         p: its parameters.
-        fail: function for a robot, after all have committed: lets it fail if it does.
-        stand: function for a robot before it acts, where one that has failed would act all the
-            same.
+        fail: function for a robot, after all have committed, which decides whether it fails.
+        stand: function for a robot before it acts, if a failed one would still act.
     """
 
     def phase(function: Any) -> Phase:

@@ -1,4 +1,4 @@
-"""What is to be drawn of an epoch of any world, by what is known of it."""
+"""Drawing of an epoch of any world, from the facts about it."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ __all__ = ["drawing"]
 
 
 def drawing(about: About, channels: Mapping[str, Channel]) -> Playback:
-    """Return what is to be drawn of an epoch, not checked, and without a title and facts.
+    """Return the playback of an epoch, not checked, and without a title and facts.
 
     Raises:
-        UsageError: it lacks what its world needs, or what it says cannot be.
-        DAMAGE: anything of these, at numbers and names that cannot be.
+        UsageError: the epoch lacks data that its world needs, or has impossible values.
+        DAMAGE: any of these exceptions, for impossible numbers and names.
     """
     parts = Parts(about, channels)
     drawn = Drawn.of(about.get("drawn", {}), one_line(about["world"]))

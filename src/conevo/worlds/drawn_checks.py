@@ -1,4 +1,4 @@
-"""Whether an epoch of a world can be drawn, tried out: a line for each fault."""
+"""Checks whether an epoch of a world can be drawn: a line for each fault."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def of_drawing(
     modes: npt.NDArray[np.int32],
     key: int,
 ) -> Iterator[str]:
-    """Yield what is wrong with what a world says is drawn of an epoch.
+    """Yield the faults in a world's declaration of its drawing.
 
     Args:
         played: simulator of the world.
@@ -55,7 +55,7 @@ def of_drawing(
 
 
 def drawn_in_words(world: World) -> str:
-    """Return what is drawn of a world, as in "robots, ball, goal"."""
+    """Return the names of the drawn things, as in "robots, ball, goal"."""
     drawn: Any = getattr(world, "drawn", None)
     if drawn is None:
         return "robots"

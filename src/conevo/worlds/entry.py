@@ -1,4 +1,4 @@
-"""What is known of a world without loading it."""
+"""Registry entries: the facts about a world that are known without loading it."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ __all__ = ["WorldEntry"]
 
 @dataclass(frozen=True)
 class WorldEntry:
-    """What the registry knows of a world without loading it.
+    """One world in the registry.
 
-    ``module`` holds the classes named ``params_name`` (parameters) and ``world_name`` (built from
-    an environment name and parameters). ``defaults`` are those of an environment where they are not
-    those of the class: environment -> parameter -> value. ``drawn`` is the module whose
-    ``playback`` tells what is to be drawn of an epoch, without Warp, and ``CASTES`` the colours of
-    its castes; without it, what the world's class says in its own ``drawn`` is
-    (``playback.drawn``). ``studied`` is the module that tells what robots are seen to do besides
-    their actions (``study.WorldStudy``), its import without Warp. ``product`` is the module that
-    makes a file of a finished shaping in all of its ``TASKS``. An entry in a file outside the
-    package leaves ``module`` out; ``worlds.outside`` fills it in, with the file's path, ``files``
-    (this one first, then the files next to it that it imports) and the digest of their texts.
+    ``module`` contains the classes named ``params_name`` (parameters) and ``world_name`` (built
+    from an environment name and parameters). ``defaults`` are those of an environment that differ
+    from those of the class: environment -> parameter -> value. ``drawn`` is a module, imported
+    without Warp, whose function ``playback`` draws an epoch, and whose ``CASTES`` are the colours
+    of castes. Without it, the ``drawn`` of the world's class is used (``playback.drawn``).
+    ``studied`` is a module, imported without Warp, that observes behaviours of robots beyond their
+    actions (``study.WorldStudy``). ``product`` is the module that makes a file of a finished
+    shaping in all of its ``TASKS``. An entry in a file outside the package leaves ``module`` out;
+    ``worlds.outside`` fills it in, with the file's path, ``files`` (this one first, then the files
+    next to it that it imports) and the digest of their texts.
     """
 
     name: str
@@ -55,13 +55,13 @@ class WorldEntry:
 
     @property
     def params_class(self) -> type[Any]:
-        """The dataclass of the world's parameters; it refuses what they do not allow."""
+        """The dataclass of the world's parameters; it refuses values outside their bounds."""
         from conevo.parameters import checked
 
         return checked(getattr(import_module(self.module), self.params_name), "world")
 
     def params(self, environment: str, **given: Any) -> Any:
-        """Return the parameters of an environment: those given, and its defaults.
+        """Return the parameters of an environment: the given ones, and its defaults.
 
         Raises:
             UsageError: an unknown parameter, or a value that is not allowed.
@@ -74,7 +74,7 @@ class WorldEntry:
         return getattr(import_module(self.module), self.world_name)
 
     def address(self, environment: str) -> str:
-        """What ``resolve`` finds an environment of this world by."""
+        """The address of an environment of this world, for ``resolve``."""
         return f"{self.file}:{environment}" if self.file else f"{self.name}/{environment}"
 
     def build(self, environment: str, params: Any) -> World:
@@ -85,12 +85,12 @@ class WorldEntry:
                 inputs or outputs.
         """
         part = self.params_class
-        if not isinstance(params, part):  # of a plain dataclass, which has checked nothing
+        if not isinstance(params, part):  # a plain dataclass, which has not checked its values
             given = {one.name: getattr(params, one.name) for one in fields(params) if one.init}
             params = part(**given)
         built: World = self.world_class(environment, params)
         for name in ("inputs", "outputs"):
             if not hasattr(built, name):
                 raise UsageError(f"world {built.name} needs {name}, a tuple of names, one of each")
-        _ = measures_of(built)  # refuses what are no measures
+        _ = measures_of(built)  # refuses invalid measures
         return built

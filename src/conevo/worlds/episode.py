@@ -21,9 +21,9 @@ THREADS = 768
 
 @wp.struct
 class Job:
-    """What a launch is to do: which teams play, in how many scenarios, which iterations.
+    """The work of a launch: which teams play, in how many scenarios, which iterations.
 
-    first_team: number of the batch's first team among all, which tells the round that a team is of.
+    first_team: number of the batch's first team among all teams, which determines the rounds.
     """
 
     heuristic: wp.array2d[int]
@@ -53,7 +53,7 @@ def episode_kernel(
         mind: of the controller.
         timed: whether the cycles of each phase are added up in the job's ``clock``.
         near: arrays of the state, and of the memory, that lie in shared memory on a CUDA device.
-        lanes: of a block on a CUDA device, which bound the registers of a thread; 0 on the CPU.
+        lanes: of a block on a CUDA device, which limit the registers of a thread; 0 on the CPU.
     """
     structs = (simulation.state, simulation.scene, simulation.params_type)
     brain = (mind.weights, mind.memory, mind.shape_type, mind.clear, mind.think, mind.shared)
@@ -157,7 +157,7 @@ def _episode_kernel(
 
 
 def given_to_think(Weights: Any, Memory: Any, Shape: Any) -> dict[str, Any]:
-    """Return the names and types of what the phases of a controller are given."""
+    """Return the names and types of the arguments of a controller's phases."""
     values = wp.array2d[float]
     brain = {"weights": Weights, "memory": Memory, "shape": Shape}
     return brain | {"inputs": values, "outputs": values, "heuristic": wp.array[int]}

@@ -1,9 +1,9 @@
 """Which line of a world's file was running when its process died.
 
 A copy of the file notes the number of each line of its Warp functions before running it, in a small
-file that the process shares with the one that started it. A function that returns notes the line
-that called it once more, which goes on with what the call gave; the end of a ``while`` loop that of
-its condition.
+file that the process shares with the one that started it. A function that returns notes its
+caller's line again, since that line continues with the result. The end of a ``while`` loop notes
+the line of its condition again.
 """
 
 import ast
@@ -17,7 +17,7 @@ import warp as wp
 __all__ = ["MARKS", "last_mark", "mark", "marked", "read_mark", "statement_at"]
 
 MARKS = "CONEVO_MARKS"  # the variable that names the shared file
-LINES = 1_000_000  # more than a file has: a mark is the number of the file, times this, plus a line
+LINES = 1_000_000  # more than a file has: a mark is the number of the file times this plus a line
 BYTES = 4
 
 
@@ -54,7 +54,7 @@ def _is_first(line: ast.stmt) -> bool:
 
 
 def _marked(lines: list[ast.stmt], file: int, loop: ast.stmt | None = None) -> list[ast.stmt]:
-    """Return lines with their marks; ``file`` is added to each, ``loop`` is the one around them."""
+    """Return lines with their marks; ``file`` is added to each, ``loop`` is the enclosing loop."""
     found: list[ast.stmt] = []
     for line in lines:
         is_text = isinstance(line, ast.Expr) and isinstance(line.value, ast.Constant)
@@ -75,7 +75,7 @@ def _marked(lines: list[ast.stmt], file: int, loop: ast.stmt | None = None) -> l
 
 
 def _returning(line: ast.Return) -> list[ast.stmt]:
-    """Return the lines before a return: they compute its value, and note the caller again."""
+    """Return the lines before a return, which compute its value and note the caller again."""
     whole = line.value
     values = whole.elts if isinstance(whole, ast.Tuple) else [whole] if whole else []
     found: list[ast.stmt] = []
@@ -90,7 +90,7 @@ def _returning(line: ast.Return) -> list[ast.stmt]:
 
 
 def statement_at(text: str, line: int) -> str:
-    """Return the statement that begins at a line, in one line; of a compound one its first part."""
+    """Return the statement that starts at a line, in one line; only the head of a compound one."""
     for node in ast.walk(ast.parse(text)):
         if isinstance(node, ast.stmt) and node.lineno == line:
             body = getattr(node, "body", None)
@@ -120,4 +120,4 @@ def mark(number: int):  # type: ignore[no-untyped-def]
 
 @wp.func_native(f"return *reinterpret_cast<volatile int*>({_address}ull);")
 def last_mark() -> int:  # type: ignore[empty-body]
-    """Return what was noted last."""
+    """Return the last mark."""

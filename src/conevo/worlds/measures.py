@@ -1,4 +1,4 @@
-"""Measures of task performance: what a world reports, in which unit, and whether more is better."""
+"""Measures of task performance, each with its unit and whether more is better."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ __all__ = ["Measure", "measures_of"]
 class Measure:
     """A measure of task performance, as a world declares it.
 
-    Fitness, on which methods select, is not one: of fitness more is always better.
+    Fitness, on which methods select, is not a measure: more fitness is always better.
 
     Attributes:
         name: as in records and tables, "first_capture".
         unit: of its values, "iterations"; empty if it has none.
-        larger_is_better: False of what a team is to keep small, as a distance, a time or a count of
-            mishaps.
-        low, high: least and largest value that there can be, if the world knows them: intervals in
-            reports end there. Of the main measure ``optimum`` serves as the high.
+        larger_is_better: False for a measure that a team should keep small, such as a distance, a
+            time or a number of mishaps.
+        low, high: smallest and largest possible value, if the world knows them: intervals in
+            reports end there. For the main measure ``optimum`` serves as the high.
 
     Raises:
         UsageError: a name or unit that is not text, a direction that is not True or False, ends
-            that are not finite numbers or change places.
+            that are not finite numbers or not in order.
     """
 
     name: str
@@ -88,11 +88,11 @@ class Measure:
         return max(values) if self.larger_is_better else min(values)
 
     def is_better(self, value: float, than: float) -> bool:
-        """Whether a value is better than another."""
+        """Return whether a value is better than another."""
         return value > than if self.larger_is_better else value < than
 
     def reaches(self, value: float, target: float) -> bool:
-        """Whether a value is as good as a target."""
+        """Return whether a value is as good as a target."""
         return value >= target if self.larger_is_better else value <= target
 
     def record(self) -> dict[str, Any]:
@@ -103,10 +103,10 @@ class Measure:
 def measures_of(world: World) -> tuple[Measure, ...]:
     """Return the measures of a world, the main one first.
 
-    Of a measure that the world only names, larger is better, and it has no unit.
+    A measure that the world only names has no unit, and is better when larger.
 
     Raises:
-        UsageError: it declares something else, or two of one name.
+        UsageError: it declares something else, or two measures of one name.
     """
     declared: Any = world.performance
     if not (isinstance(declared, tuple) and declared):

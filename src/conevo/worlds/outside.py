@@ -1,6 +1,6 @@
 """Worlds outside the package: one Python file each, with its registry entry as ``ENTRY``.
 
-Such a world is named "FILE.py:ENVIRONMENT"; ``conevo.outside`` says what such a file may do.
+Such a world is named "FILE.py:ENVIRONMENT"; ``conevo.outside`` describes the rules for such a file.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ def load(path: Path, digest: str = "") -> WorldEntry:
 
 
 def _problem(entry: WorldEntry, module: ModuleType) -> str:
-    """Return what is wrong with an entry, nothing if it can be used."""
+    """Return the mistake in an entry, nothing if it can be used."""
     if not re.fullmatch(r"[a-z0-9-]+-v\d+", str(entry.name)):
         return f"its name {entry.name!r} must be lower case and end with a version, as in light-v1"
     names: Any = entry.environments
@@ -50,7 +50,7 @@ def _problem(entry: WorldEntry, module: ModuleType) -> str:
 
 
 def _wrong_defaults(entry: WorldEntry, params: Any) -> str:
-    """Return what is wrong with the defaults of an entry's environments, nothing if nothing is."""
+    """Return the mistake in the defaults of an entry's environments, nothing if they are right."""
     own: Any = entry.defaults
     tables = [own, *own.values()] if isinstance(own, Mapping) else [own]
     if not all(isinstance(one, Mapping) for one in tables):

@@ -1,4 +1,4 @@
-"""What a world with a simulator of its own promises, tried out: a line for each broken promise."""
+"""Checks of the rules for a world with its own simulator: a line for each violation."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ Teams = tuple[npt.NDArray[np.float32], npt.NDArray[np.int32], npt.NDArray[np.int
 
 
 def of_declarations(a_world: World) -> Iterator[str]:
-    """Yield what is wrong with a world's names."""
+    """Yield the faults in a world's names."""
     yield from faults_of_names(a_world)
 
 
 def of_scenarios(a_world: World, keys: list[int]) -> Iterator[str]:
-    """Yield what is wrong with how scenarios are drawn."""
+    """Yield the faults in how scenarios are drawn."""
     some, again, last = (a_world.scenarios(one) for one in (keys, keys, keys[-1:]))
     if len(some) != len(keys):
         yield f"scenarios({len(keys)} keys) has length {len(some)}"
@@ -40,7 +40,7 @@ def of_scenarios(a_world: World, keys: list[int]) -> Iterator[str]:
 
 
 def of_play(a_world: World, teams: Teams, keys: list[int]) -> Iterator[str]:
-    """Yield what is wrong with ``evaluate``: shapes, numbers, and what results depend on."""
+    """Yield the faults of ``evaluate``: shapes, numbers, and results that depend on other calls."""
     made = simulator(a_world, controller(world=a_world))
     genes, rows, modes = teams
     n = len(rows)
@@ -71,7 +71,7 @@ def of_play(a_world: World, teams: Teams, keys: list[int]) -> Iterator[str]:
 
 
 def of_record(a_world: World, teams: Teams, keys: list[int]) -> Iterator[str]:
-    """Yield what is wrong with ``record``: it must show what ``evaluate`` counts."""
+    """Yield the faults of ``record``: it must agree with the counts of ``evaluate``."""
     made: Simulator = simulator(a_world, controller(world=a_world))
     genes, rows, modes = teams
     scenario = a_world.scenarios(keys[:1])

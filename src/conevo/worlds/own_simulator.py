@@ -1,4 +1,4 @@
-"""A world's own simulator, whose results are looked at before anybody uses them."""
+"""A world's own simulator, whose results are checked before they are used."""
 
 from __future__ import annotations
 
@@ -49,10 +49,10 @@ def build_own(world: World, controller: Controller, n_threads: int) -> OwnSimula
 
 
 class OwnSimulator:
-    """What plays a world that brings its own simulator; see ``worlds.protocol.Simulator``.
+    """The checked simulator of a world that brings its own; see ``worlds.protocol.Simulator``.
 
     Args:
-        made: what the world has made.
+        made: the simulator that the world has made.
         world: the world.
         controller: of its robots.
         n_threads: CPU threads.
@@ -78,7 +78,7 @@ class OwnSimulator:
         """Play every team in every scenario of its round.
 
         Raises:
-            UsageError: what the world's simulator returns is not an outcome of them.
+            UsageError: the world's simulator does not return an outcome of these teams.
         """
         found = self._made.evaluate(genes, teams, scenarios, heuristic, rounds)
         shape = (len(teams), len(scenarios) // rounds)
@@ -97,7 +97,7 @@ class OwnSimulator:
         """Play one team in one scenario and return what happened in every iteration.
 
         Raises:
-            UsageError: what the world's simulator returns is not a record of that.
+            UsageError: the world's simulator does not return a record of this epoch.
         """
         found = self._made.record(genes, team, scenarios, heuristic)
         for fault in self._faults_of_record(found, team.shape[1]):
@@ -111,7 +111,7 @@ class OwnSimulator:
         scenarios: Any,
         heuristic: npt.NDArray[np.int32] | None = None,
     ) -> tuple[dict[str, npt.NDArray[Any]], Outcome]:
-        """Return what ``record`` and ``evaluate`` do; a world's own simulator has only these."""
+        """Return the results of ``record`` and ``evaluate``, the simulator's only functions."""
         seen = self.record(genes, team, scenarios, heuristic)
         modes = None if heuristic is None else heuristic[None]
         return seen, self.evaluate(genes, team[None], scenarios, modes)
@@ -156,7 +156,7 @@ class OwnSimulator:
 
 
 def _faults(name: str, values: Any, shape: tuple[int, ...], kind: str = "f") -> Iterator[str]:
-    """Yield what is wrong with an array that must have this shape, and numbers of this kind."""
+    """Yield the faults of an array that must have this shape, and numbers of this kind."""
     if not isinstance(values, np.ndarray):
         yield f"{name} must be an array {list(shape)}, not {type(values).__name__}"
     elif values.shape != shape:

@@ -1,7 +1,7 @@
-"""Random places in the unit square, apart from each other and from what is in the way.
+"""Random places in the unit square, apart from each other and from obstacles.
 
-Of many scenarios at once: every candidate has a number of its own, so that what is drawn for a key
-does not depend on the keys that are drawn with it.
+Places are drawn for many scenarios at once. Every candidate has its own random number, so the
+places for a key do not depend on the other keys.
 """
 
 from __future__ import annotations
@@ -40,9 +40,9 @@ def first_that_fits(
 
     Args:
         keys: [P] of the scenarios.
-        places: [P] which of its scenario's places each is.
-        tried: [P] candidates of each place to leave out; counted on to the one that is returned.
-        n_numbers: N, numbers that a candidate has.
+        places: [P] number of each place within its scenario.
+        tried: [P] number of candidates of each place to leave out; raised to the returned one.
+        n_numbers: N, random numbers of a candidate.
         fits: whether each of C candidates [Q, C, N] for the places with some indices [Q] fits.
 
     Raises:
@@ -69,8 +69,8 @@ def first_that_fits(
 def sectors(xy: Floats, n: int) -> Ints:
     """Return the sector, 0 to n - 1, in which each of places [..., 2] of the unit square lies.
 
-    Sectors begin at the corner below on the left and go round the middle counter-clockwise. All
-    have the same area, and so have their parts of any frame around the middle.
+    Sectors start at the lower left corner and go round the middle counter-clockwise. All have the
+    same area, and so have their parts of any frame around the middle.
 
     Choice: regions around a middle are sectors of equal area, not of equal angle.
     """
@@ -93,27 +93,28 @@ def draw_places(
 ) -> Floats:
     """Return places [E, n, 2] float32, in sides of the square.
 
-    One after another: each is the first of its candidates that is free and as far as it must be
-    from all before it.
+    They are drawn one after another: each is the first of its candidates that is free and far
+    enough from all previous places.
 
     Args:
         keys: [E] of the scenarios.
-        n: how many in each.
-        separation: least distance of two of them.
+        n: number of places in each scenario.
+        separation: smallest distance between two of them.
         is_free: whether candidates [Q, C, 2], C for each of places with some indices [Q] in the
             scenarios with some indices [Q], may be taken; all may by default.
-        is_there: [E, n] whether there is such a place, at 0 otherwise; all are by default.
+        is_there: [E, n] whether the scenario has this place, which is at 0 otherwise; by default it
+            has all.
 
     Raises:
-        NoRoom: there is no room for so many, so far apart.
+        NoRoom: there is no room for this number of places at this distance.
     """
     there = np.ones((len(keys), n), dtype=np.bool_) if is_there is None else is_there
     places = np.zeros((len(keys), n, 2), dtype=np.float32)
     tried = np.zeros((len(keys), n), dtype=np.intp)
-    before = np.tri(n, k=-1, dtype=np.bool_)  # [place, those before it]
+    before = np.tri(n, k=-1, dtype=np.bool_)  # [place, previous places]
 
     def is_close(e: Ints, k: Any, xy: Floats) -> Bools:
-        """Return whether candidates [Q, C, 2] for places ``k`` are too close to one before."""
+        """Return whether candidates [Q, C, 2] for places ``k`` are too close to a previous one."""
         gaps = ((xy[:, :, None] - places[e, None]) ** 2).sum(axis=3)
         return ((gaps < separation**2) & (there[e, None] & before[k])).any(axis=2)
 

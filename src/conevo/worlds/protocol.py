@@ -1,4 +1,4 @@
-"""What a world is: a task, its parameters, its controllers, and the functions that simulate it."""
+"""Worlds: a task, its parameters, its controllers, and the functions that simulate it."""
 
 from __future__ import annotations
 
@@ -26,17 +26,18 @@ __all__ = [
 
 
 def names_of(groups: Sequence[str], n: int) -> tuple[str, ...]:
-    """Return names of sensors, ``n`` of each group: "light 0", "light 1", ..."""
+    """Return names of sensors, ``n`` for each group: "light 0", "light 1", ..."""
     return tuple(f"{group} {k}" for group in groups for k in range(n))
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What happened to a batch of teams.
+    """Results of a batch of teams.
 
     fitness [N, E, R]: each robot's private fitness. counts [N, E, R, C]: how many actions each
-    robot executed for each of the world's castes. switches [N, E, R]: how often it executed another
-    action than just before. performance: task performance measures, each [N, E].
+    robot executed for each of the world's castes. switches [N, E, R]: how often it executed a
+    different action than in the previous iteration. performance: task performance measures, each
+    [N, E].
     """
 
     fitness: npt.NDArray[np.float32]
@@ -50,8 +51,8 @@ class Scenarios:
     """E scenarios of a world, each drawn from a key.
 
     A world adds an array for each further field of its scene: [E, ...], or of any shape if all
-    scenarios share it. seed [E] uint64: of what is random while a scenario is played. unseen:
-    arrays that only kernels need, which recordings leave out.
+    scenarios share it. seed [E] uint64: of random events while a scenario is played. unseen: arrays
+    that only kernels need, which recordings leave out.
     """
 
     seed: npt.NDArray[np.uint64]
@@ -64,25 +65,25 @@ class Scenarios:
 
 @dataclass(frozen=True)
 class Simulation:
-    """The Warp side of a world: what ``worlds.rollout`` needs to run it.
+    """The Warp side of a world, all that ``worlds.rollout`` needs to run it.
 
-    state: struct type of a team's state; ``inputs`` [R, S] and ``outputs`` [R, O] are what the
-        robots' controllers read and write. An array has one element for each robot unless it names
-        its dimensions (``kernels.arrays``); in a kernel it is flat. sizes: of these dimensions; the
-        world's names tell those of "robots", "inputs", "outputs", "castes" and "measures", and
-        "team" is 1.
+    state: struct type of a team's state. The robots' controllers read ``inputs`` [R, S] and write
+        ``outputs`` [R, O]. An array has one element for each robot unless it names its dimensions
+        (``kernels.arrays``); in a kernel it is flat. sizes: of these dimensions. Those of "robots",
+        "inputs", "outputs", "castes" and "measures" follow from the world's names, and "team" is 1.
     scene: struct type of a scenario; its arrays are those of the scenarios object, by name: flat
         over the scenarios, or of two and more dimensions if all scenarios share them.
     params_type, params: struct type of the parameters, and the parameters.
-    functions: the phases of an epoch: reset, sense, act, commit, resolve, outcome; and, of a world
-        with something that robots share, settle, once for the team between commit and resolve.
-        Within a phase, robots visited in any order must give the same bits. In place of a function
-        for one robot there may be phases over items of the world's own (``kernels.phases.Phase``).
+    functions: the phases of an epoch: reset, sense, act, commit, resolve, outcome. A world in which
+        robots share something also has settle, once for the team between commit and resolve.
+        Within a phase, robots visited in any order must give the same results bit for bit. In
+        place of a function for one robot, a world may have phases over other items
+        (``kernels.phases.Phase``).
     recorded: state arrays that ``Rollout.record`` keeps, iteration by iteration.
     recorded_at_end: state arrays that it keeps at the end.
     lanes: threads of a block on a CUDA device, a multiple of 32; results do not depend on it.
-    scratch: state arrays whose content may depend on the order of items, as lists that lanes fill
-        do; no result may depend on it.
+    scratch: state arrays whose content may depend on the order of items, such as lists that lanes
+        fill; results must not depend on this content.
     """
 
     state: Any
@@ -100,8 +101,8 @@ class Simulation:
 def kernel_params(struct: Any, *sources: Any, **given: Any) -> Any:
     """Return the parameters of a world as its kernels take them.
 
-    Every field of the struct is filled by name, from what is ``given`` or else from a field or
-    property of the first source that has it. Where none has ``NAME_2``, it is the square of
+    Every field of the struct is filled by name, from the ``given`` values or else from a field or
+    property of the first source that has it. If no source has ``NAME_2``, it is the square of
     ``NAME``. A truth value becomes 0 or 1, a tuple a vector.
 
     Args:
@@ -137,14 +138,14 @@ def _value_of(name: str, sources: Sequence[Any], given: Mapping[str, Any]) -> An
 
 
 class Simulator(Protocol):
-    """What plays teams in a world. ``worlds.rollout.Rollout`` is that of worlds written in Warp.
+    """Plays teams in a world. ``worlds.rollout.Rollout`` is that of worlds written in Warp.
 
-    Results depend on the arguments alone: not on threads, batches or what was played before.
+    Results depend on the arguments alone: not on threads, batches or earlier calls.
     """
 
     @property
     def world(self) -> World:
-        """The world and environment that is played."""
+        """The world and environment."""
 
     @property
     def controller(self) -> Controller:
@@ -152,7 +153,7 @@ class Simulator(Protocol):
 
     @property
     def fingerprint(self) -> str:
-        """A text that changes with anything that decides a result: a run continues with its own."""
+        """A text that changes with anything that affects a result; a resume requires the same."""
 
     @property
     def n_threads(self) -> int:
@@ -174,7 +175,7 @@ class Simulator(Protocol):
             scenarios: E scenarios of the world for each round, one round after another; they may be
                 played again later, so nothing is written into them.
             heuristic: [N, R], index of a heuristic controller of the world, -1 for the robot's own.
-            rounds: the teams come in so many parts of equal length, each with its own scenarios.
+            rounds: number of equal parts of the teams, each with its own scenarios.
 
         Raises:
             ValueError: shapes or rows that do not fit the world.
@@ -190,10 +191,10 @@ class Simulator(Protocol):
         """Play one team [R, U] in one scenario and return what happened in every iteration.
 
         Returns:
-            What is recorded of the world, each [T, its dimensions]; ``x``, ``y``, ``action`` and
-            ``fitness``, all [T, R], are among it; ``inputs`` [T, R, S], ``outputs`` [T, R, O],
-            ``hidden`` [T, R, U]; ``performance`` [T, measures]. The last row equals what
-            ``evaluate`` gives.
+            The recorded arrays of the world, each [T, its dimensions], among them ``x``, ``y``,
+            ``action`` and ``fitness``, all [T, R]; ``inputs`` [T, R, S], ``outputs`` [T, R, O],
+            ``hidden`` [T, R, U]; ``performance`` [T, measures]. The last row equals the outcome of
+            ``evaluate``.
         """
 
     def record_with_outcome(
@@ -203,7 +204,7 @@ class Simulator(Protocol):
         scenarios: Any,
         heuristic: npt.NDArray[np.int32] | None = None,
     ) -> tuple[dict[str, npt.NDArray[Any]], Outcome]:
-        """Return what ``record`` and what ``evaluate`` give of one team in one scenario.
+        """Return the results of ``record`` and of ``evaluate`` for one team in one scenario.
 
         A simulator that a world brings need not have it: ``worlds.own_simulator`` adds it.
         """
@@ -217,31 +218,32 @@ class World(Protocol):
 
     Attributes:
         name: with its version, "rover-v2".
-        inputs: S names, of what each robot senses.
-        outputs: O names, of what its controller gives: any real numbers.
-        controller: settings of the controller that the source gives such robots; those that another
-            controller has, too, hold for it as well. Without any, the controller's defaults hold.
-        actions: A names; the state array ``action`` holds indices into them.
+        inputs: S names, of each robot's sensors.
+        outputs: O names, of its controller's outputs, which are any real numbers.
+        controller: settings of the controller that the source gives such robots. They also apply to
+            other controllers that have them. Other settings have the controller's defaults.
+        actions: A names; the state array ``action`` contains indices into them.
         castes: C names, one per column of ``Outcome.counts``: the caste of a robot that spends most
-            of its life on it. Most worlds count actions, so castes are actions; a world that tells
-            apart what for an action was executed has more. Every executed action counts in exactly
-            one column.
+            of its life on it. Most worlds count actions, so castes are actions; a world that
+            distinguishes the purposes of an action has more. Every executed action counts in
+            exactly one column.
         performance: the task performance measures, the main one first. A measure is a ``Measure``,
             with its unit, whether larger is better and its range, or just a name: then larger is
             better.
         heuristics: names of the heuristic controllers, at least one.
 
-    A world may have a property ``optimum``: the largest possible value of its main task performance
-    measure, of which reports then give the share. It has none if smaller is better.
+    A world may have a property ``optimum``, the largest possible value of its main task performance
+    measure. Reports then show the share of it. It has none if smaller is better.
 
     Its class may have ``settings``, the castes among which a robot chooses when it works, in the
-    order of ``castes``: with which setting a rover detects. The rest, as moving, is what it does in
-    between. Without it all castes are settings.
+    order of ``castes``, such as the settings with which a rover detects. The others, such as
+    moving, come in between. Without it all castes are settings.
 
-    Its class may have ``drawn``, what replay and film draw next to its robots (``playback.drawn``).
+    Its class may have ``drawn``, the things that replay and film draw next to its robots
+    (``playback.drawn``).
 
     A world that is not written in Warp has, in place of ``simulation``, a method
-    ``simulator(controller, n_threads)`` that returns a ``Simulator`` of its own.
+    ``simulator(controller, n_threads)`` that returns its own ``Simulator``.
     """
 
     name: ClassVar[str]
@@ -266,7 +268,7 @@ class World(Protocol):
 
     @property
     def params(self) -> Any:
-        """Its parameters, a dataclass; ``iterations``, those of one epoch, is among them."""
+        """Its parameters, a dataclass; one of them is ``iterations``, the length of an epoch."""
 
     def scenarios(self, keys: Sequence[int]) -> Scenarios:
         """Return one scenario per key: the same key always gives the same scenario."""

@@ -1,4 +1,4 @@
-"""A recorded epoch of any world: its numbers, and what is known of them without a run."""
+"""A recorded epoch of any world: its numbers, and the facts about them that need no run."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def recorded(
     scenario: int,
     modes: npt.NDArray[np.int32],
 ) -> tuple[dict[str, Any], dict[str, Channel], Outcome]:
-    """Play a team in one scenario, and keep it.
+    """Play a team in one scenario, and record it.
 
     Args:
         simulator: of the world.
@@ -35,11 +35,11 @@ def recorded(
         modes: [R] index of a heuristic controller, -1 for the robot's own.
 
     Returns:
-        What a playback's ``About`` says of the world and the team, but for castes and what is of a
+        The facts about world and team for a playback's ``About``, without castes and those about a
         run; the channels; and the outcome.
 
     Raises:
-        UsageError: numbers that are not finite, or ``drawn`` is not what it must be.
+        UsageError: numbers that are not finite, or a ``drawn`` that is not a ``Drawn``.
     """
     world = simulator.world
     scenes = world.scenarios([scenario])
@@ -94,7 +94,7 @@ def recorded(
 
 
 def params_of(world: World) -> dict[str, Any]:
-    """Return the parameters of a world; a file by its digest, not by where it lies."""
+    """Return the parameters of a world; a file is represented by its digest, not by its path."""
     found = asdict(world.params)
     for name in found:
         if found.get(f"{name}_digest"):
@@ -103,7 +103,7 @@ def params_of(world: World) -> dict[str, Any]:
 
 
 def _worth(measure: Measure) -> str:
-    """Return what follows a value of a measure: its unit, and that smaller is better if it is."""
+    """Return the words after a value of a measure: its unit, and whether smaller is better."""
     return f"{measure.unit}{'' if measure.larger_is_better else ' (smaller is better)'}".strip()
 
 

@@ -1,4 +1,4 @@
-"""The worlds there are: drives the command line, the docs tables and the contract tests."""
+"""The worlds by name, for the command line, the docs tables and the contract tests."""
 
 from __future__ import annotations
 
@@ -85,8 +85,7 @@ WORLDS: dict[str, WorldEntry] = {
     )
 }
 
-# Versions that are no longer played, though still drawn and reported, and the release that plays
-# them.
+# Versions that are still drawn and reported but no longer played, and the release that plays them.
 EARLIER = dict.fromkeys(("rover-v1", "pursuit-v1", "prey-v1", "gacc-v1"), "0.1.0")
 
 
@@ -100,8 +99,8 @@ def resolve(path: str, digest: str = "", is_whole: bool = True) -> tuple[WorldEn
         is_whole: whether the path must have an environment; the world's first one if it need not.
 
     Raises:
-        UsageError: no such world or environment, or no environment given; a file that holds no
-            world or has changed.
+        UsageError: no such world or environment, or no environment given; a file without a world,
+            or one that has changed.
     """
     file, _, environment = path.rpartition(":")
     if path.endswith(".py"):
@@ -142,7 +141,7 @@ def _named(name: str) -> WorldEntry:
 
 
 def refuse_earlier(task: str, run: Path | None = None) -> None:
-    """Raise UsageError if a task, of a run if it is given, is of a version no longer played."""
+    """Raise UsageError if a task, of a run if given, belongs to a version no longer played."""
     name = task.partition("/")[0]
     if name in EARLIER and (newest := entry_of(name)):
         raise UsageError(
@@ -152,16 +151,16 @@ def refuse_earlier(task: str, run: Path | None = None) -> None:
 
 
 def entry_of(world: str) -> WorldEntry | None:
-    """Return the entry of a world of the package by its name; earlier versions have the newest's.
+    """Return the entry of a world of the package by its name, the newest one for any version.
 
-    For what is drawn and reported of a world, which versions have in common.
+    It serves drawings and reports, which are the same for all versions.
     """
     short = world.rpartition("-v")[0] if world in EARLIER else world
     return WORLDS.get(world) or next((e for e in WORLDS.values() if e.short_name == short), None)
 
 
 def colours_of(world: str) -> dict[str, str]:
-    """Return the colours of a world's castes by its name; none of a world elsewhere."""
+    """Return the colours of a world's castes by its name; none for a world in a file."""
     entry = entry_of(world)
     if entry is None:
         return {}
@@ -172,10 +171,11 @@ def colours_of(world: str) -> dict[str, str]:
 
 
 def product_of(tasks: Sequence[str]) -> Any:
-    """Return the module that makes a file of a shaping in these tasks, None if there is none.
+    """Return the module that makes a file of a shaping in these tasks, None without one.
 
-    Its ``FILE`` is the file's name, ``refuse`` raises UsageError at configurations it cannot use,
-    ``save`` writes the file from the finished stages, and ``USE`` is a command with it, and why.
+    ``FILE`` is the file's name. ``refuse`` raises UsageError for configurations that it cannot use,
+    ``save`` writes the file from the finished stages, and ``USE`` is a command that uses it, with
+    its purpose.
     """
     entry = WORLDS.get(tasks[0].partition("/")[0]) if tasks else None
     module = import_module(entry.product) if entry is not None and entry.product else None
@@ -183,7 +183,7 @@ def product_of(tasks: Sequence[str]) -> Any:
 
 
 def inherited(world_class: type) -> str:
-    """Return the name of the world of the package whose class a world's own inherits, or ""."""
+    """Return the name of the package's world from which a world's class inherits, or ""."""
     classes = {(one.__module__, one.__qualname__) for one in world_class.__mro__[1:]}
     for entry in WORLDS.values():
         if (entry.module, entry.world_name) in classes:
@@ -195,7 +195,7 @@ def study_of(entry: WorldEntry) -> WorldStudy | None:
     """Return the study of a world, its own or that of the one it inherits, None if none.
 
     Raises:
-        UsageError: the module that its entry names is not a study.
+        UsageError: the module named in its entry is not a study.
     """
     like = "" if entry.studied else inherited(entry.world_class)
     module = WORLDS[like].studied if like else entry.studied
@@ -203,7 +203,7 @@ def study_of(entry: WorldEntry) -> WorldStudy | None:
 
 
 def studies() -> dict[str, WorldStudy]:
-    """Return the studies that there are by the names of their worlds."""
+    """Return all studies by the names of their worlds."""
     studied = {entry.name: entry.studied for entry in WORLDS.values() if entry.studied}
     return {name: load_study(name, module) for name, module in studied.items()}
 
@@ -211,7 +211,7 @@ def studies() -> dict[str, WorldStudy]:
 def world(path: str, **params: Any) -> World:
     """Return the world at a path, with parameters other than the defaults of its environment.
 
-    The path is one that ``resolve`` knows: "rover/complex-1", or "FILE.py:ENVIRONMENT".
+    The path is one for ``resolve``: "rover/complex-1", or "FILE.py:ENVIRONMENT".
 
     Raises:
         UsageError: unknown world, environment or parameter, or a value that is not allowed.

@@ -1,6 +1,6 @@
-"""The single episode loop: ``evaluate`` runs batches of teams, ``record`` watches one of them.
+"""The single episode loop: ``evaluate`` runs batches of teams, ``record`` records one of them.
 
-Teams are rows of a genotype pool: a kernel builds each team's controllers itself, once for all its
+Teams are rows of a genotype pool. A kernel builds each team's controllers, once for all its
 scenarios, so a generation of ten thousand teams needs no unpacked weights. Batches larger than the
 workspace run in parts.
 """
@@ -40,9 +40,10 @@ CUDA_CHUNK = 8192
 
 @dataclass
 class _Workspace:
-    """Arrays of a batch, used again and again.
+    """Arrays of a batch, reused for each.
 
-    At most ``n_worlds`` worlds with a state and a memory each, and ``n_teams`` teams' weights.
+    They have room for ``n_worlds`` worlds with a state and a memory each, and for ``n_teams``
+    teams' weights.
     """
 
     n_worlds: int
@@ -59,15 +60,16 @@ class Rollout:
         world: the world and environment to run.
         controller: of the robots; by default the one that the world suggests.
         n_threads: CPU threads; all usable ones by default. Results do not depend on it.
-        device: "cpu", a CUDA device as Warp names it, or "auto": a CUDA device if there is one.
-        lanes: of a block; on a CUDA device those that the world suggests by default, on the CPU one
-            (more are for tests of the CUDA form, and need Warp's CPU blocks).
-        timed: whether ``cycles`` tells what each phase takes, for benchmarks.
+        device: "cpu", a CUDA device as Warp names it, or "auto": a CUDA device if the machine has
+            one.
+        lanes: of a block; by default those that the world suggests on a CUDA device, and one on the
+            CPU (more are for tests of the CUDA form, and need Warp's CPU blocks).
+        timed: whether ``cycles`` measures each phase, for benchmarks.
         shared_bytes: shared memory that a block on a CUDA device may take.
 
     Raises:
-        UsageError: the world lacks what the engine needs of it, the controller does not fit it, or
-            no device is named so.
+        UsageError: the world does not meet the engine's requirements, the controller does not fit
+            it, or the device's name is unknown.
         EnvironmentFailure: the device does not exist.
     """
 
@@ -114,12 +116,12 @@ class Rollout:
         stages = stages_of(self._simulation).items()
         self._phases = ["think", *(f"{at} {one.name}" for at, those in stages for one in those)]
         self._clock = wp.zeros(len(self._phases) if timed else 0, dtype=wp.int64, device=device)
-        self._one_scenario: Scenarios | None = None  # of this world: what others must look like
+        self._one_scenario: Scenarios | None = None  # of this world: an example for others
         self._is_built = False
         self._workspace: _Workspace | None = None
 
     def cuda_form(self, lanes: int, timed: bool = False, shared_bytes: int = SHARED_BYTES) -> Any:
-        """Return the kernel as a CUDA device runs it; arguments as for the rollout."""
+        """Return the kernel in the form for a CUDA device; arguments as for the rollout."""
         state, memory = self._simulation.state, self._mind.memory
         shape_of = {state: self._shapes, memory: self._mind_shapes[memory]}
         chosen = near_arrays(shape_of, shared_bytes)
@@ -128,7 +130,7 @@ class Rollout:
             return episode_kernel(self._simulation, self._mind, timed, near, lanes)
 
     def build(self) -> Self:
-        """Compile and load the kernels, which the first launch does otherwise; return this rollout.
+        """Compile and load the kernels now, not at the first launch; return this rollout.
 
         Raises:
             UsageError: the world's functions cannot be compiled; names file and line.
@@ -151,8 +153,8 @@ class Rollout:
 
     @property
     def fingerprint(self) -> str:
-        """Sixteen hex digits that change with anything the kernels are made of."""
-        with engine.building:  # the form of the CPU, whatever the device and what is timed
+        """Sixteen hex digits that change with any part of the kernels."""
+        with engine.building:  # always the untimed form for the CPU
             episode = episode_kernel(self._simulation, self._mind)
         return engine.kernel_hash(episode, self._loading)
 
@@ -165,20 +167,20 @@ class Rollout:
         rounds: int = 1,
         iterations: int | None = None,
     ) -> Outcome:
-        """Run every team in every scenario of its round and return what happened.
+        """Run every team in every scenario of its round and return the outcome.
 
         Args:
             genes: pool of genotypes [K, G], float32.
             teams: pool rows of the parts [N, R, U] (team, robot, slot), -1 for an empty slot.
             scenarios: E scenarios of this world for each round, one round after another.
             heuristic: [N, R], index of a heuristic controller of the world, -1 for the robot's own.
-            rounds: the teams come in so many parts of equal length, each with its own scenarios.
-            iterations: the first ones that are played, all by default.
+            rounds: number of equal parts of the teams, each with its own scenarios.
+            iterations: number of iterations to play, all by default.
 
         Raises:
             ValueError: shapes or rows that do not fit this world.
             UsageError: scenarios whose arrays are not those of the world's scene.
-            EnvironmentFailure: there is no memory for as much as one team.
+            EnvironmentFailure: the memory is too small even for one team.
         """
         self._refuse_faulty(scenarios)
         genes, teams, heuristic = self._checked(genes, teams, heuristic)
@@ -212,7 +214,8 @@ class Rollout:
     ) -> dict[str, npt.NDArray[Any]]:
         """Run one team in one scenario and return its state after every iteration.
 
-        The same kernel as ``evaluate``, launched one iteration at a time, so the same bits.
+        It launches the kernel of ``evaluate`` one iteration at a time, so the results are equal
+        bit for bit.
 
         Args:
             genes: pool of genotypes [K, G].
@@ -221,8 +224,8 @@ class Rollout:
             heuristic: [R] or None.
 
         Returns:
-            The world's recorded arrays, each [T, its dimensions], and those it records at the end
-            as they are; ``inputs`` [T, R, S], ``outputs`` [T, R, O] and ``hidden`` [T, R, U], the
+            The world's recorded arrays, each [T, its dimensions], and those that it records only at
+            the end; ``inputs`` [T, R, S], ``outputs`` [T, R, O] and ``hidden`` [T, R, U], the
             activation of the part in each slot; ``performance`` [T, measures], each as if the epoch
             ended there.
         """
@@ -235,7 +238,7 @@ class Rollout:
         scenarios: Scenarios,
         heuristic: npt.NDArray[np.int32] | None = None,
     ) -> tuple[dict[str, npt.NDArray[Any]], Outcome]:
-        """Return what ``record`` does, and the outcome of the same epoch, played once."""
+        """Return the results of ``record``, and the outcome of the same epoch, played once."""
         self._refuse_faulty(scenarios)
         if len(scenarios) != 1:
             raise ValueError(f"record takes one scenario, got {len(scenarios)}")
@@ -311,7 +314,7 @@ class Rollout:
 
     def _array(self, values: npt.NDArray[Any]) -> Any:
         dtype = wp.dtype_from_numpy(values.dtype)
-        values = np.ascontiguousarray(values)  # views are made from pointers: strides would be lost
+        values = np.ascontiguousarray(values)  # views are made from pointers, without strides
         with engine.memory_named(self.device):
             return wp.array(values, dtype=dtype, device=self.device, copy=self.device != "cpu")
 
@@ -327,9 +330,9 @@ class Rollout:
         return job
 
     def _room(self, n_teams: int, e: int) -> tuple[_Workspace, int]:
-        """Return a workspace for some teams in ``e`` scenarios, and for how many it is.
+        """Return a workspace for some teams in ``e`` scenarios, and their number.
 
-        Where the device has too little memory they are halved, now and from then on.
+        If the device has too little memory the number is halved, now and from then on.
         """
         wanted = n = min(n_teams, max(1, self._chunk // e))
         while True:
@@ -352,12 +355,12 @@ class Rollout:
         return batch, n
 
     def _batch(self, n_worlds: int, n_teams: int) -> _Workspace:
-        """Return a workspace of at least so many worlds and teams."""
+        """Return a workspace for at least these numbers of worlds and teams."""
         had = self._workspace
         if had is None or had.n_worlds < n_worlds or had.n_teams < n_teams:
             if had is not None:
                 n_worlds, n_teams = max(n_worlds, had.n_worlds), max(n_teams, had.n_teams)
-            had = self._workspace = None  # frees what was there before more is taken
+            had = self._workspace = None  # frees its memory before more is allocated
             mind, wanted = self._mind, self._mind_shapes
             with engine.memory_named(self.device):
                 self._workspace = _Workspace(
@@ -395,7 +398,7 @@ class Rollout:
         return {name: self._read(batch, name, n_teams * e) for name in names}
 
     def _outcome(self, arrays: dict[str, npt.NDArray[Any]], n: int, e: int) -> Outcome:
-        """Return what ``_collect`` has read of n teams in e scenarios as their outcome."""
+        """Return the arrays of ``_collect`` for n teams in e scenarios as their outcome."""
         r, measures = self.world.n_robots, measures_of(self.world)
         performance = arrays["performance"].reshape(n, e, -1)
         return Outcome(
@@ -407,10 +410,10 @@ class Rollout:
 
 
 def _first(array: Any, n: int, shape: tuple[int, ...]) -> npt.NDArray[Any]:
-    """Return a copy of what the first ``n`` parts of a batch hold, each of a shape."""
+    """Return a copy of the first ``n`` parts of a batch, each of a shape."""
     values: npt.NDArray[Any]
     if array.device.is_cpu:
         values = array.numpy().reshape(-1, *shape)[:n].copy()
-    else:  # cut there, so that no more than that is fetched
+    else:  # cut on the device, so that only these parts are fetched
         values = array[: n * prod(shape) // prod(array.shape[1:])].numpy().reshape(n, *shape)
     return values

@@ -1,4 +1,4 @@
-"""Which simulator plays a world: its own, or the rollout of worlds written in Warp."""
+"""The simulator of a world: its own, or the rollout of worlds written in Warp."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ def has_own_simulator(world: Any) -> bool:
 
 
 def device_for(world: World, name: str) -> str:
-    """Return the device that a name means for a world, "auto" one that plays it.
+    """Return the device that a name means for a world; for "auto" one that can play it.
 
     Raises:
         UsageError: it is not the name of a device.
-        EnvironmentFailure: there is no such device, or the world has its own simulator.
+        EnvironmentFailure: the machine has no such device, or the world has its own simulator.
     """
     if not has_own_simulator(world):
         return device_here(name)
@@ -38,15 +38,15 @@ def device_for(world: World, name: str) -> str:
 def simulator(
     world: World, controller: Controller, n_threads: int | None = None, device: str = CPU
 ) -> Simulator:
-    """Return what plays a world with such controllers, ready to play.
+    """Return the simulator of a world with such controllers, ready to play.
 
-    A device has shown by then that it gives the bits of the CPU.
+    A device is first checked: it must agree with the CPU bit for bit.
 
     Raises:
         UsageError: the world's functions cannot be compiled, its own simulator lacks something, or
             the controller does not fit the world.
-        EnvironmentFailure: there is no such device, it gives other results than the CPU, or there
-            is no place for compiled kernels.
+        EnvironmentFailure: the machine has no such device, the device gives other results than the
+            CPU, or compiled kernels cannot be kept.
     """
     from conevo.kernels.threads import threads_of
 

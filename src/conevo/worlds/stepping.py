@@ -1,8 +1,8 @@
 """A world's phases one by one, robots visited in any order: for checks, not for evolution.
 
 The kernel of ``worlds.rollout`` visits robots in the order of their numbers. This one runs a single
-phase of one iteration and visits them in an order that is given for each world, with arrays checked
-for their bounds. Between phases everything in the state can be seen and changed.
+phase of one iteration and visits them in an order given for each world, with bounds of arrays
+checked. Between phases the whole state can be read and changed.
 """
 
 from collections.abc import Iterator
@@ -143,7 +143,7 @@ class Stepper(Rollout):
         """Run one of ``STEPS``.
 
         Args:
-            name: which.
+            name: of the step.
             order: [B, R] robots in the order in which they are visited, -1 for none.
             t: the iteration.
         """
@@ -157,7 +157,7 @@ class Stepper(Rollout):
     def arrays(self) -> Arrays:
         """Return the state, each array [B, its dimensions].
 
-        What is written there, the next step sees.
+        The next step reads the values written there.
         """
         n, state = self.n_worlds, self._epochs.state
         shape_of = self._shapes.items()

@@ -1,8 +1,8 @@
-"""What a world brings to be studied: what its robots are seen to do, besides their actions.
+"""Studies: the observed behaviours of a world's robots, beyond their actions.
 
-The entry of a world names a module that has what ``WorldStudy`` lists; ``registry.study_of`` finds
-it. It tells behaviours from recorded epochs. S, castes, lesions, clones and tables are made of them
-for any world (``studies.observation``).
+The entry of a world names a module with the members of ``WorldStudy``; ``registry.study_of`` finds
+it. It identifies behaviours in recorded epochs. From these, ``studies.observation`` computes S,
+castes, lesions, clones and tables for any world.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ class StudyWords:
     """The words of a study in reports and messages.
 
     Attributes:
-        robots: what the robots are.
-        events: what collective behaviours are counted by.
-        done: what a team does in an event, "so": in one of these behaviours.
-        undone: what a team without an event did.
+        robots: the word for the robots.
+        events: the word for the events in which collective behaviours are counted.
+        done: the verb for a team in an event, where "so" means in one of these behaviours.
+        undone: the words for a team without an event.
     """
 
     robots: str = "robots"
@@ -51,7 +51,7 @@ class AccountPart(NamedTuple):
 
 
 class Account(NamedTuple):
-    """What was found, to be printed: measures of the team by their names, then the rest."""
+    """Findings to be printed: measures of the team by their names, then the rest."""
 
     measures: Mapping[str, float]
     parts: Sequence[AccountPart]
@@ -63,7 +63,7 @@ class Composed(NamedTuple):
     Attributes:
         name: of the collective behaviour.
         roles: behaviour of each of its robots.
-        scenarios: that it plays.
+        scenarios: for the team.
     """
 
     name: str
@@ -72,31 +72,31 @@ class Composed(NamedTuple):
 
 
 class Seen(Protocol):
-    """What a team was seen to do in some recorded epochs."""
+    """Observed behaviour of a team in some recorded epochs."""
 
     @property
     def executed(self) -> Sequence[npt.NDArray[np.int64]]:
-        """What each robot did, window after window: index of a behaviour, -1 for none of them."""
+        """Behaviour of each robot in each window: its index, -1 for none of them."""
 
     @property
     def collectives(self) -> tuple[str, dict[str, int]]:
-        """The most frequent collective behaviour, and how often each of them was seen."""
+        """The most frequent collective behaviour, and how often each of them was observed."""
 
     def together(self, keys: Sequence[int]) -> Scenarios:
         """Return the scenarios that clones play, one per key."""
 
     def compositions(self, keys: Sequence[int]) -> Sequence[Composed]:
-        """Return the teams that robots can be composed to, if any, in scenarios of the keys."""
+        """Return the teams that can be composed of the robots, if any, in scenarios of the keys."""
 
     def composition(self, labels: Sequence[str]) -> dict[str, int | None]:
-        """Return how many robots belong to each collective behaviour, and to none.
+        """Return the number of robots that belong to each collective behaviour, and to none.
 
         Args:
             labels: of each robot, a behaviour or "non-specialized".
         """
 
     def details(self, lifetimes: Sequence[dict[str, Any]]) -> dict[str, Any]:
-        """Return everything else about what was seen, as plain data.
+        """Return all further observations, as plain data.
 
         Args:
             lifetimes: of each robot, ``studies.lifetimes.Lifetime`` as plain data.
@@ -104,12 +104,12 @@ class Seen(Protocol):
 
 
 class WorldStudy(Protocol):
-    """What the module of a study has."""
+    """The members of a study's module."""
 
     BEHAVIOURS: tuple[str, ...]
-    """What a robot can be seen to do: the castes of this world, in the order of their lists."""
+    """Behaviours of a robot, which are the castes of the study, in the order of their lists."""
     COLLECTIVES: tuple[str, ...]
-    """What robots can be seen to do together; the last one is "none" of these."""
+    """Collective behaviours; the last one is "none" of these."""
     WORDS: StudyWords
 
     def observe(
@@ -121,19 +121,19 @@ class WorldStudy(Protocol):
         seed: int,
         rules: Any = None,
     ) -> Seen:
-        """Record a team and return what it is seen to do.
+        """Record a team and return its observed behaviour.
 
         Args:
             simulator: of the team's world.
             genes: pool of genotypes [K, G].
             team: [R, U] rows of the pool.
             keys: of the scenarios.
-            seed: of what is drawn further.
-            rules: by which behaviours are told, those of the study by default.
+            seed: of further random numbers.
+            rules: that identify behaviours, those of the study by default.
         """
 
     def account(self, found: Mapping[str, Any]) -> Account:
-        """Return what ``Seen.details`` holds, to be printed."""
+        """Return the contents of ``Seen.details``, to be printed."""
 
 
 def load_study(world: str, module: str) -> WorldStudy:

@@ -1,7 +1,7 @@
-"""Epochs of a world run step by step in several forms at once, and what that shows.
+"""Epochs of a world run step by step in several forms at once, and the faults that they reveal.
 
-The same teams play in the order of a rollout, with robots visited in reverse and in random order,
-and in memory that another epoch has used. All of them must agree, bit for bit, after each step.
+The same teams play with robots visited in the order of a rollout, in reverse and in random order,
+and in memory that another epoch has used. All forms must agree, bit for bit, after each step.
 """
 
 from collections.abc import Iterator
@@ -17,18 +17,18 @@ from conevo.worlds.stepping import Arrays, Order, Stepper
 
 __all__ = ["Trial"]
 
-SENTINEL = np.full(1, -7.7712321e-19, np.float32)  # no result: what still holds it was not written
+SENTINEL = np.full(1, -7.7712321e-19, np.float32)  # never a result: it marks unwritten elements
 RESULTS = ("fitness", "counts", "switches", "performance")
-Seen = tuple[str, list[str], str]  # topic, problems, what is said if there are none
+Seen = tuple[str, list[str], str]  # topic, problems, text without problems
 
 
 class Trial:
-    """Runs epochs step by step and looks at them.
+    """Runs epochs step by step and checks them.
 
     Args:
         world: the world.
         genes: pool of neuron genotypes [K, G].
-        teams: pool rows of the neurons [N, R, U]; of each heuristic controller one, at the end.
+        teams: pool rows of the neurons [N, R, U]; at the end one for each heuristic controller.
         heuristic: [N, R].
         scenarios: E scenarios.
 
@@ -59,7 +59,7 @@ class Trial:
         self._action = np.full((self.n_worlds, world.n_robots), -1, np.int32)
 
     def run(self) -> Iterator[None]:
-        """Run the epochs, which ends the process where an array has no such index; yields often."""
+        """Run the epochs; an index outside its array ends the process. It yields often."""
         plain, iterations = self.plain, self.world.params.iterations
         robots = stream(1, "check", "order")
         others = {"reverse": Stepper(*self._task), "random": Stepper(*self._task)}
@@ -88,7 +88,7 @@ class Trial:
                 self._count(plain.arrays()["action"])
 
     def _count(self, action: npt.NDArray[np.int32]) -> None:
-        """Add what has been executed in one iteration to what the world must have counted."""
+        """Add the actions executed in one iteration to the counts that the world must have."""
         n = len(self.world.actions)
         if not self._counts and ((action < -1) | (action >= n)).any():
             bad = action[(action < -1) | (action >= n)][0]
@@ -99,7 +99,7 @@ class Trial:
         self._action = action.copy()
 
     def _look_at_sensors(self, t: int) -> None:
-        """Run "sense" alone, robot by robot, on inputs that hold what nobody writes."""
+        """Run "sense" alone, robot by robot, on inputs filled with the sentinel."""
         if self._sensors:
             return
         arrays, names = self.plain.arrays(), self.world.inputs
@@ -126,7 +126,7 @@ class Trial:
             self._sensors.append(f"sense never writes input {which}")
 
     def _explain_order(self, step: str, t: int, names: list[str], before: Arrays) -> None:
-        """Say which step depends on the order of robots, and who writes what is not its own."""
+        """Explain which step depends on the order of robots, and who writes another's data."""
         text = (
             f"{step} gives other results if robots are visited in another order "
             f"({', '.join(f'`{name}`' for name in names)} differ in iteration {t})"
@@ -166,18 +166,18 @@ class Trial:
         self._order.append(text)
 
     def seen(self) -> Iterator[Seen]:
-        """Yield topics with what is wrong, after the run."""
+        """Yield topics with their problems, after the run."""
         n = len(self.world.inputs)
         fine = f"all {n} inputs are written, and nothing else"
         if self._has_phases:
-            fine = "not looked at: sense has phases over items of its own"
+            fine = "not checked: sense has phases over other items"
         yield "sensors", self._sensors, fine
         yield "values", list(self._of_values()), "fitness and performance are written and finite"
         done = np.asarray(self._executed.any(axis=(0, 1)))
         idle = ", ".join(name for a, name in enumerate(self.world.actions) if not done[a])
         never = f"; never executed here: {idle}" if idle else ""
         yield "counts", list(self._of_counts()), f"sum up to the executed actions{never}"
-        yield "order", self._order, "robots in reverse and in random order: the same bits"
+        yield "order", self._order, "robots in reverse and in random order: equal bit for bit"
         yield "reset", list(self._of_reset()), "nothing of another epoch is left over"
         yield "heuristics", list(self._of_heuristics()), f"{len(self.world.heuristics)} play"
 
@@ -226,12 +226,12 @@ class Trial:
         ended, should = used.arrays(), self.plain.arrays()
         if wrong := [n for n in RESULTS if ended[n].tobytes() != should[n].tobytes()]:
             yield (
-                f"{', '.join(wrong)} depend on the epoch before, in the same memory; reset leaves "
+                f"{', '.join(wrong)} depend on the previous epoch in the same memory; reset leaves "
                 f"{', '.join(f'`{name}`' for name in left)} as they were"
             )
 
     def _differences(self, a: Arrays, b: Arrays) -> list[str]:
-        """Return the names of the arrays that differ, scratch left out."""
+        """Return the names of the arrays that differ, without scratch."""
         bits = (
             (n, a[n].view(np.uint8), b[n].view(np.uint8))
             for n in a
@@ -250,9 +250,9 @@ class Trial:
             played[row.tobytes()] = repr(name)
 
     def unplayed_heuristics(self) -> Iterator[str]:
-        """Yield a line for each that ends as a network without neurons, as if act did not know it.
+        """Yield a line for each that plays like a network without neurons, as if unknown to act.
 
-        One that is meant to do what such a network does ends so, too.
+        This includes one that is meant to play like such a network.
         """
         world, genes, teams, scenarios, heuristic = self._task
         nobody = np.full_like(teams[:1], -1), scenarios, np.full_like(heuristic[:1], -1)
@@ -271,5 +271,5 @@ class Trial:
 
 
 def _only(order: Order, i: int) -> Order:
-    """Return an order in which robot ``i`` alone is visited."""
+    """Return an order in which only robot ``i`` is visited."""
     return np.where(np.arange(order.shape[1]) == 0, i, -1).astype(np.int32) + np.zeros_like(order)

@@ -1,4 +1,4 @@
-"""What a robot of ``worlds.gacc.world`` chooses to do: detect, move or grip (6.2.7, 6.2.8)."""
+"""Actions of a robot of ``worlds.gacc.world``: detect, move or grip (6.2.7, 6.2.8)."""
 
 import warp as wp
 
@@ -42,7 +42,7 @@ def fetch(team: GaccTeam, scene: GaccScene, p: GaccConstants, i: int, k: int) ->
 
 @wp.func
 def straight_step(p: GaccConstants, dx: float, dy: float) -> wp.vec2f:
-    """Return the longest step towards a place that lies so far away, not beyond it."""
+    """Return the longest step towards a place at this distance, but not beyond it."""
     d = wp.sqrt(dx * dx + dy * dy)
     step = wp.min(p.move_range, d) / d
     return wp.vec2f(step * dx, step * dy)
@@ -96,7 +96,7 @@ def closest_at_home(team: GaccTeam, p: GaccConstants, i: int, t: int) -> int:
 
 @wp.func
 def takes_over(team: GaccTeam, scene: GaccScene, p: GaccConstants, i: int, t: int) -> int:
-    """Return which situation of 6.2.8 decides for robot ``i``, after it has decided; 0 if none."""
+    """Apply the situation of 6.2.8 that decides for robot ``i``, if any; return it, or 0."""
     if not is_home(p, team.x[i], team.y[i]):
         return 0
     k = team.held[i]
@@ -137,8 +137,8 @@ def within_grip(team: GaccTeam, p: GaccConstants, i: int, t: int, kind: int) -> 
 
 @wp.func
 def act(team: GaccTeam, scene: GaccScene, p: GaccConstants, i: int, t: int) -> None:
-    """Choose robot ``i``'s action (6.2.7, 6.2.8) and propose where it will be, or what it grips."""
-    if i == 0:  # what has changed has been sensed
+    """Choose robot ``i``'s action (6.2.7, 6.2.8); propose its next place, or an object to grip."""
+    if i == 0:  # all changes have been sensed
         team.moved[0] = wp.uint64(0)
         team.stirred[0] = wp.uint64(0)
         team.turned[0] = wp.uint64(0)
@@ -169,7 +169,7 @@ def act(team: GaccTeam, scene: GaccScene, p: GaccConstants, i: int, t: int) -> N
 
 @wp.func
 def follow_preferences(team: GaccTeam, scene: GaccScene, p: GaccConstants, i: int, t: int) -> None:
-    """Choose heuristic robot ``i``'s action as table 6.3 prefers; constructors stay at home."""
+    """Choose heuristic robot ``i``'s action by table 6.3; constructors stay at home."""
     h = team.heuristic[i]
     u = uniform(scene.seed[0], t, 0, i)
     at_home = is_home(p, team.x[i], team.y[i])

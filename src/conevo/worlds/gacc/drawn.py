@@ -1,4 +1,4 @@
-"""The playback of gathering and construction: objects, home area, what is being built."""
+"""The playback of gathering and construction: objects, home area, complex objects."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from conevo.worlds.gacc.plans import TYPES, plan
 
 __all__ = ["CASTES", "playback"]
 
-# Choice: hue is the type of object, lightness what is done: detecting is light, gripping and
+# Choice: hue is the type of object, lightness the action: detecting is light, gripping and
 # gathering are as light as the objects themselves, constructing is dark.
 OBJECTS = {"A": ORANGE, "B": SKY, "C": GREEN}
 _DETECT, _GRIP, _CONSTRUCT = 0.5, 0.0, -0.35
@@ -52,7 +52,7 @@ LIFE = (  # in the order of its numbers
     Kind("delivered", FAINT),
     Kind("dropped", ""),
 )
-RADIUS = 0.009  # Choice: a robot is a point in its world, and drawn this large
+RADIUS = 0.009  # Choice: a robot is a point in its world, and drawn in this size
 OBJECT = 0.006  # Choice: half a side of an object, which is a point as well
 HOME_REACH = 0.12  # Choice: home is sensed from everywhere; its sensors are drawn this long
 
@@ -140,10 +140,10 @@ def _demand(parts: Parts) -> tuple[Gauge, ...]:
 
 
 def _plan(parts: Parts, building: Building) -> tuple[PlanRow, ...]:
-    """Return what there is to build; where no order is asked for, what came first, then the rest.
+    """Return the plan; parts without a prescribed order in the order of building, then the rest.
 
     Raises:
-        ValueError: something else was built.
+        ValueError: the plan was not followed.
     """
     wanted = parts.index("scene/plan", len(TYPES), -1, -1).values.tolist()
     ordered = plan(parts.about["environment"]).is_ordered

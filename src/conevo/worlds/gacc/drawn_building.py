@@ -1,4 +1,4 @@
-"""What becomes of the objects of the gathering world: who grips, helps, lets go, builds in."""
+"""Events of the objects of the gathering world: gripped, helped with, let go, built in."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ EVENT_KINDS = (
 )
 GRIP, LET_GO, WAIT, HELP, DELIVERY, COMPLETION = range(len(EVENT_KINDS))
 FIRST_GRIP = 4  # actions from here on grip, one for each type
-GRIPPED, CARRIED, WAITING, HELPED = 1, 2, 3, 4  # of an object's life
+GRIPPED, CARRIED, WAITING, HELPED = 1, 2, 3, 4  # states of an object's life
 NOT_NEEDED = 4  # situation of section 6.2.8 in which robots let go
 
 
 class Building:
-    """The objects' story, told from what is recorded.
+    """The history of the objects in a recording.
 
     Args:
         parts: of the trajectory.
@@ -56,7 +56,7 @@ class Building:
 
     @cached_property
     def _built(self) -> list[tuple[int, int]]:
-        """Iteration and object of every part that was built in, in the order of places."""
+        """Iteration and object of every part built in, in the order of places."""
         at = np.argwhere((self._part >= 0) & (self._part_before < 0)).tolist()
         return sorted(((t, k) for t, k in at), key=lambda one: int(self._part[one]))
 
@@ -68,10 +68,10 @@ class Building:
 
     @property
     def rows(self) -> list[list[tuple[int, int]]]:
-        """Type, and iteration in which it was built in, of each part of each complex object.
+        """Type, and iteration of building, of each part of each complex object.
 
         Raises:
-            ValueError: a part is built twice, or before the one before it.
+            ValueError: a part is built twice, or before its predecessor.
         """
         found: list[list[tuple[int, int]]] = [[] for _ in range(self._rows)]
         for t, k in self._built:
@@ -82,7 +82,7 @@ class Building:
         return found
 
     def events(self) -> tuple[Event, ...]:
-        """Return all that happens to objects."""
+        """Return all events of objects."""
         return (*self._grips(), *self._openings(), *self._arrivals(), *self._deliveries())
 
     def _letter(self, k: int) -> str:
@@ -92,7 +92,7 @@ class Building:
         return [int(i) for i in np.flatnonzero(self._held[t] == k)]
 
     def _grips(self) -> list[Event]:
-        """Return who takes hold of what, alone or as help; robots that do it at once as one."""
+        """Return grips, alone or as help; those of several robots at once are one event."""
         is_new = (self._held != self._held_before) & (self._held >= 0)
         pairs = {(t, int(self._held[t, i])) for t, i in np.argwhere(is_new).tolist()}
         events = []
@@ -111,7 +111,7 @@ class Building:
         return events
 
     def _openings(self) -> list[Event]:
-        """Return who lets go of what without having delivered it."""
+        """Return the events in which a robot lets go of an object that is not delivered."""
         wait = int(self._parts.param("wait"))
         waited = _before(self._parts.whole("waited", *self._held.shape), 0)
         situation = self._parts.whole("situation", *self._held.shape)
@@ -130,7 +130,7 @@ class Building:
         return events
 
     def _arrivals(self) -> list[Event]:
-        """Return who comes into the home area with an object, and begins to wait."""
+        """Return arrivals in the home area with an object, from which on robots wait."""
         came = (self._life == WAITING) & np.isin(_before(self._life, 0), (GRIPPED, CARRIED))
         events = []
         for t, k in np.argwhere(came).tolist():
@@ -140,7 +140,7 @@ class Building:
         return events
 
     def _deliveries(self) -> list[Event]:
-        """Return what is built in by whom, and what is completed by that."""
+        """Return the parts built in, with their builders, and the completed complex objects."""
         events = []
         for t, k in self._built:
             row, step = divmod(int(self._part[t, k]), self._steps)
@@ -154,10 +154,11 @@ class Building:
         return events
 
     def _builders(self, t: int, k: int) -> list[int]:
-        """Return who is paid for building in an object.
+        """Return the robots that are credited with building in an object.
 
-        These have held it, or gripped it in this very iteration, after which they hold nothing.
-        Choice: if several objects of its type are built in at once, these go with the closest one.
+        They have held it, or gripped it in the same iteration, after which they hold nothing.
+        Choice: if several objects of its type are built in at once, the latter belong to the
+        closest one.
         """
         shape = self._held.shape
         before = _before(self._parts.whole("fitness", *shape), 0)
@@ -170,7 +171,7 @@ class Building:
         return [int(i) for i in np.flatnonzero(fresh | (is_paid & (self._held_before[t] == k)))]
 
     def _closest(self, t: int, objects: list[int]) -> Ints:
-        """Return which of some objects lay closest to each robot [R] that stood still in t."""
+        """Return which of some objects lay closest to each robot [R] that did not move in t."""
         gap = np.zeros((self._held.shape[1], len(objects)))
         for of_robot, of_object in (("x", "object_x"), ("y", "object_y")):
             robot = self._parts.floats(of_robot, *self._held.shape)[t]
@@ -182,5 +183,5 @@ class Building:
 
 
 def _before(values: Ints, first: int) -> Ints:
-    """Return what was in the iteration before [T, n]; ``first`` before the first."""
+    """Return the values of the previous iteration [T, n]; ``first`` for the first one."""
     return np.concatenate([np.full_like(values[:1], first), values[:-1]])

@@ -1,8 +1,8 @@
-"""What a robot of ``worlds.gacc.world`` does in one iteration, and what becomes of objects.
+"""One iteration of ``worlds.gacc.world``: actions of a robot, and their effects on objects.
 
-Reset, commit, outcome, and all phases together; rules and choices stand on the card of
-``worlds.gacc.world``. Every function writes only data of the robot it is called for and of the
-object that only this robot holds; words that robots share are added to by atomic operations.
+Reset, commit, outcome, and the list of all phases. The card of ``worlds.gacc.world`` lists rules
+and choices. Every function writes only data of its robot and of an object that only this robot
+holds. Words that robots share are changed by atomic operations.
 """
 
 import warp as wp
@@ -45,7 +45,7 @@ __all__ = ["FUNCTIONS", "fail"]
 
 @wp.func
 def sort_objects(team: GaccTeam, scene: GaccScene, p: GaccConstants) -> None:
-    """Let all objects lie where they are, and note which are in the home area and of each type."""
+    """Mark all objects as lying, and list those in the home area and those of each type."""
     for kind in range(3):
         team.kinds[kind] = wp.uint64(0)
     team.lying[0] = all_of(p.n_objects)
@@ -59,7 +59,7 @@ def sort_objects(team: GaccTeam, scene: GaccScene, p: GaccConstants) -> None:
 
 @wp.func
 def reset(team: GaccTeam, scene: GaccScene, p: GaccConstants, i: int) -> None:
-    """Put robot ``i`` at its start and clear its share of what is recorded."""
+    """Put robot ``i`` at its start and clear its share of the recorded arrays."""
     team.x[i] = scene.start_x[i]
     team.y[i] = scene.start_y[i]
     team.target[i] = NONE
@@ -108,7 +108,7 @@ def reset(team: GaccTeam, scene: GaccScene, p: GaccConstants, i: int) -> None:
 
 @wp.func
 def is_first(team: GaccTeam, i: int, k: int) -> bool:
-    """Return whether no robot with a lower number grips at the same object."""
+    """Return whether no robot with a lower number grips the same object."""
     j = int(0)
     while j < i:
         if team.target[j] == k:
@@ -119,7 +119,7 @@ def is_first(team: GaccTeam, i: int, k: int) -> bool:
 
 @wp.func
 def move(team: GaccTeam, p: GaccConstants, i: int) -> None:
-    """Move robot ``i`` and what it holds to where it proposes.
+    """Move robot ``i`` and the object that it holds to its proposed place.
 
     Choice: of two robots that propose the same place, the one with the lower number gets it.
     """
@@ -140,7 +140,7 @@ def move(team: GaccTeam, p: GaccConstants, i: int) -> None:
     if not is_home(p, x, y):
         team.dropped[i] = NONE
     k = team.held[i]
-    if k >= 0:  # outside the home area, where nobody else holds it
+    if k >= 0:  # outside the home area, where no other robot holds it
         team.object_x[k] = x
         team.object_y[k] = y
         team.life[k] = CARRIED
@@ -187,7 +187,7 @@ def commit(team: GaccTeam, scene: GaccScene, p: GaccConstants, i: int, t: int) -
 
 @wp.func
 def fail(team: GaccTeam, scene: GaccScene, p: GaccConstants, i: int, t: int) -> None:
-    """Let robot ``i`` have no energy any more if it fails, and let go of what it holds."""
+    """If robot ``i`` fails, set its energy to 0 and release its object."""
     if team.energy[i] > 0.0 and fails(scene.seed[0], p, i, t):
         team.energy[i] = 0.0
         team.waited[i] = 0

@@ -18,17 +18,18 @@ def draw_obstacles(
 ) -> Blocks:
     """Return obstacles [E, n, 4], apart from the home area, the walls and each other.
 
-    One after another: each is the first of its candidates that is apart from all before it.
+    They are drawn one after another: each is the first of its candidates that is apart from all
+    previous ones.
 
     Args:
         keys: [E] of the scenarios.
-        n: how many in each.
+        n: number of obstacles in each scenario.
         home: half a side of the home area.
-        sides: least and most of an obstacle's side.
-        gap: least distance of an obstacle from everything else.
+        sides: shortest and longest side of an obstacle.
+        gap: smallest distance of an obstacle from everything else.
 
     Raises:
-        UsageError: no room for so many.
+        UsageError: no room for this number of obstacles.
     """
     e = len(keys)
     blocks = np.empty((e, n + 1, 4))  # the home area is the first

@@ -1,4 +1,4 @@
-"""What there is to build in each environment of gacc: complex objects and their parts.
+"""Building plans of the environments of gacc: complex objects and their parts.
 
 Nitschke 2009, tables 6.6 to 6.8, section 6.4.2. The objects of an environment are exactly the parts
 of its complex objects, ten each.
@@ -32,7 +32,7 @@ COMPLEX = (
     ("BABACABACB", "CACACABABC", "BABABABACB", "CABACABABC"),
     ("BABACABABB", "CACACABABB", "BABABABACB", "BABABBBABB"),
 )
-# Choice: which of several is the disordered one is not said: the last.
+# Choice: the thesis does not state which of several is the disordered one: the last.
 DISORDERED = {1: 0, 2: 0, 4: 1, 6: 2, 8: 3}
 
 ENVIRONMENTS = tuple(f"simple-{n}" for n in range(1, len(SIMPLE) + 1)) + tuple(
@@ -42,7 +42,7 @@ ENVIRONMENTS = tuple(f"simple-{n}" for n in range(1, len(SIMPLE) + 1)) + tuple(
 
 @dataclass(frozen=True)
 class BuildingPlan:
-    """What is to be built in one environment.
+    """The building plan of one environment.
 
     Attributes:
         parts: [C, 10] int32, type (0..2) of each part of each complex object, in order.
@@ -61,7 +61,7 @@ class BuildingPlan:
 
 
 def plan(environment: str) -> BuildingPlan:
-    """Return what is to be built in an environment like "complex-4"."""
+    """Return the building plan of an environment like "complex-4"."""
     kind, _, number = environment.partition("-")
     n = int(number)
     is_simple = kind == "simple"

@@ -1,7 +1,7 @@
-"""The referee of ``worlds.gacc.world``: what becomes of objects that robots hold.
+"""The referee of ``worlds.gacc.world``, which decides about objects that robots hold.
 
 Objects that are ready to be built in compete for places in a plan, so one lane decides about them
-in their order. Lanes share all else.
+in their order. Lanes share all other work.
 """
 
 import warp as wp
@@ -48,7 +48,7 @@ def place_for(team: GaccTeam, scene: GaccScene, p: GaccConstants, kind: int) -> 
 
 @wp.func
 def let_go(team: GaccTeam, i: int) -> None:
-    """Open robot ``i``'s gripper in the home area; it keeps off the object until it has left."""
+    """Open robot ``i``'s gripper in the home area; it avoids the object until it has left."""
     team.dropped[i] = team.held[i]
     team.waited[i] = 0
     release(team, i)
@@ -82,10 +82,11 @@ def build(team: GaccTeam, scene: GaccScene, p: GaccConstants, k: int, c: int) ->
 
 @wp.func
 def signal(team: GaccTeam, scene: GaccScene, p: GaccConstants) -> None:
-    """Set the demand for each type (6.2.3): how soon it is needed, over how many are missing.
+    """Set the demand for each type (6.2.3): how soon it is needed, over the number missing.
 
-    Choice: a complex object of two parts or more asks for a type with 1 / steps until its next use,
-    if it has an order, else with 1; the team hears the strongest, divided as in eqs 6.4 to 6.6.
+    Choice: the demand of a complex object of two parts or more for a type is 1 / steps until its
+    next use if it has an order, else 1. The team senses the strongest, divided as in eqs 6.4 to
+    6.6.
     """
     parts = scene.plan.shape[1]
     for kind in range(3):
@@ -110,7 +111,7 @@ def signal(team: GaccTeam, scene: GaccScene, p: GaccConstants) -> None:
 
 @wp.func
 def count_holders(team: GaccTeam, scene: GaccScene, p: GaccConstants, q: int, t: int) -> None:
-    """Note for part ``q`` of the robots what they hold, and what several hold."""
+    """List the objects that robots of part ``q`` hold, and those that several robots hold."""
     rest = part_of(team.carriers[0], q)
     while rest != wp.uint64(0):
         j = lowest(rest)
@@ -123,7 +124,7 @@ def count_holders(team: GaccTeam, scene: GaccScene, p: GaccConstants, q: int, t:
 
 @wp.func
 def judge(team: GaccTeam, scene: GaccScene, p: GaccConstants, q: int, t: int) -> None:
-    """Build or refuse what several hold in the home area: objects compete for places in a plan."""
+    """Build in or refuse objects held by several robots at home, which compete for places."""
     team.waiting[0] = wp.uint64(0)
     has_built = int(0)
     rest = team.shared[0]
@@ -151,7 +152,7 @@ def judge(team: GaccTeam, scene: GaccScene, p: GaccConstants, q: int, t: int) ->
 
 @wp.func
 def end_waits(team: GaccTeam, scene: GaccScene, p: GaccConstants, q: int, t: int) -> None:
-    """Let those of part ``q`` of the robots let go that have waited for too long."""
+    """Make those robots of part ``q`` let go that have waited for too long."""
     rest = part_of(team.carriers[0], q)
     while rest != wp.uint64(0):
         j = lowest(rest)
@@ -163,7 +164,7 @@ def end_waits(team: GaccTeam, scene: GaccScene, p: GaccConstants, q: int, t: int
 
 @wp.func
 def name_lives(team: GaccTeam, scene: GaccScene, p: GaccConstants, q: int, t: int) -> None:
-    """Name the lives of those of part ``q`` of the objects that somebody holds or has held."""
+    """Set the life of those objects of part ``q`` that a robot holds or has held."""
     rest = part_of(team.taken[0], q)
     while rest != wp.uint64(0):
         k = lowest(rest)

@@ -1,7 +1,7 @@
-"""What a robot of ``worlds.gacc.world`` senses: objects and obstacles, robots, home area, demand.
+"""Sensors of a robot of ``worlds.gacc.world``: objects and obstacles, robots, home area, demand.
 
-Nitschke 2009, sections 6.2.1 to 6.2.4, eqs 6.2 to 6.7. Eight octants each for the first three.
-Readings are kept until something that they depend on has changed.
+Nitschke 2009, sections 6.2.1 to 6.2.4, eqs 6.2 to 6.7. The first three have eight octants each.
+Readings are kept until something changes on which they depend.
 """
 
 from typing import TYPE_CHECKING, Any
@@ -23,7 +23,7 @@ from conevo.worlds.gacc.state import (
 
 __all__ = ["sense"]
 
-SENSING = wp.constant(16)  # counters of random numbers, from here on one for each thing
+SENSING = wp.constant(16)  # first counter of random numbers: one for each thing
 
 if TYPE_CHECKING:
     octants = Any  # a Warp type that only Warp can read
@@ -44,7 +44,7 @@ def all_eight(value: float) -> octants:
 
 @wp.func
 def value_of(values: octants, o: int) -> float:
-    """Return the value of an octant (selected: a vector with a variable index lies in memory)."""
+    """Return the value of an octant (by selection: a variable index puts a vector into memory)."""
     value = values[0]
     k = int(1)
     while k < 8:
@@ -55,7 +55,7 @@ def value_of(values: octants, o: int) -> float:
 
 @wp.func
 def with_value(values: octants, o: int, value: float) -> octants:
-    """Return the values of eight octants with another one for octant ``o``."""
+    """Return the values of eight octants with a new one for octant ``o``."""
     changed = octants()
     k = int(0)
     while k < 8:
@@ -66,13 +66,13 @@ def with_value(values: octants, o: int, value: float) -> octants:
 
 @wp.func
 def nearness(p: GaccConstants, d2: float) -> float:
-    """Return 1 within the least distance of eq. 6.1, from there on falling with the square."""
+    """Return 1 within the smallest distance of eq. 6.1; beyond it, it falls with the square."""
     return p.min_distance_2 / wp.max(d2, p.min_distance_2)
 
 
 @wp.func
 def is_noticed(scene: GaccScene, p: GaccConstants, i: int, t: int, thing: int) -> bool:
-    """Return whether robot ``i``'s detection sensors succeed on a thing in this iteration."""
+    """Return whether robot ``i``'s detection sensors sense a thing in this iteration."""
     if p.object_accuracy >= 1.0:
         return True
     return uniform(scene.seed[0], t, SENSING + thing, i) < p.object_accuracy
@@ -100,7 +100,7 @@ def look(team: GaccTeam, scene: GaccScene, p: GaccConstants, i: int, t: int, set
             if d2 < value_of(closest, o) or is_new:
                 if is_noticed(scene, p, i, t, k) and not is_blocked(scene, walls, x, y, dx, dy):
                     if is_new:
-                        team.detected[k] = t  # the same from every robot that finds it now
+                        team.detected[k] = t  # every robot that finds it now writes the same
                     if d2 < value_of(closest, o):
                         closest = with_value(closest, o, d2)
                         team.inputs[i, o] = float(setting + 1) / 3.0 * nearness(p, d2)
@@ -141,9 +141,9 @@ def look(team: GaccTeam, scene: GaccScene, p: GaccConstants, i: int, t: int, set
 
 @wp.func
 def look_around(team: GaccTeam, scene: GaccScene, p: GaccConstants, i: int) -> None:
-    """Fill the eight robot sensors: what the closest robot carries (eq. 6.3), 0 if nothing.
+    """Fill the eight robot sensors: the load of the closest robot (eq. 6.3), 0 without one.
 
-    Robots that are no longer in reach are forgotten.
+    Robots that are no longer in reach are removed from the set of those near.
     """
     near = team.near[i]
     if (near & team.carriers[0]) == wp.uint64(0):
@@ -189,7 +189,7 @@ def look_home(team: GaccTeam, p: GaccConstants, i: int) -> None:
 
 @wp.func
 def silence(team: GaccTeam, i: int, first: int) -> None:
-    """Let eight of robot ``i``'s sensors, from number ``first`` on, sense nothing."""
+    """Set eight of robot ``i``'s sensors, from number ``first`` on, to 0."""
     o = int(0)
     while o < 8:
         team.inputs[i, first + o] = 0.0
@@ -220,7 +220,7 @@ def sense_again(team: GaccTeam, scene: GaccScene, p: GaccConstants, i: int, t: i
 
 @wp.func
 def sense(team: GaccTeam, scene: GaccScene, p: GaccConstants, q: int, t: int) -> None:
-    """Let those of part ``q`` of the robots sense for whom something may have changed."""
+    """Update the sensors of those robots of part ``q`` for which something may have changed."""
     robots = team.stirred[0] | team.turned[0]
     if team.has_news[0] != 0:
         robots = all_of(p.n_robots)

@@ -1,6 +1,6 @@
-"""State of the gathering and construction world, and where things are in it, as Warp functions.
+"""State of the gathering and construction world, and Warp functions for places and objects.
 
-The rules and the choices stand on the card of ``worlds.gacc.world``.
+The card of ``worlds.gacc.world`` lists the rules and the choices.
 """
 
 from typing import Annotated
@@ -52,8 +52,8 @@ MOVE = wp.constant(3)
 GRIP = wp.constant(4)
 N_ACTIONS = wp.constant(7)
 
-# What a robot's time is counted as: its action, or gathering if it moves with an object; and
-# constructing, from the arrival in the home area on, once the object is delivered.
+# A robot's time counts as its action, or as gathering if it moves with an object. Once an object is
+# delivered, the time since its arrival in the home area counts as constructing.
 N_CASTES = wp.constant(10)
 
 GATHER = wp.constant(4)  # gather A, B, C
@@ -68,12 +68,12 @@ HELPED = wp.constant(4)
 DELIVERED = wp.constant(5)
 DROPPED = wp.constant(6)
 
-STALE = wp.constant(-2)  # of a view: something in it has changed
+STALE = wp.constant(-2)  # a view in which something has changed
 
 
 @wp.struct
 class GaccConstants:
-    """What the kernels need of ``GaccParams``, by its names; ``NAME_2`` is a square."""
+    """The fields of ``GaccParams`` for the kernels; ``NAME_2`` is a square."""
 
     n_robots: int
     n_objects: int
@@ -97,11 +97,11 @@ class GaccConstants:
     needs_detection: int
     min_distance_2: float
     separation_2: float
-    near_2: float  # how far other robots matter to a robot
-    reach_2: float  # how far objects do
-    walls_2: float  # how far obstacles do
+    near_2: float  # distance within which other robots matter to a robot
+    reach_2: float  # the same for objects
+    walls_2: float  # the same for obstacles
     sensor_noise: float
-    signed_inputs: int  # the first of the inputs, those with a range of [-1, 1]
+    signed_inputs: int  # number of the first inputs, which have a range of [-1, 1]
     action_noise: float
     failure: float
     failure_at: int
@@ -126,7 +126,7 @@ class GaccScene:
 
 @named_arrays
 class GaccTeam:
-    """State of a team. Sets of robots, objects and obstacles are words, so of 64 at most."""
+    """State of a team. Sets of robots, objects and obstacles are words, with 64 members at most."""
 
     inputs: wp.array2d[float]
     outputs: wp.array2d[float]
@@ -138,7 +138,7 @@ class GaccTeam:
     chosen: wp.array[int]
     target: wp.array[int]  # object it wants to grip
     held: wp.array[int]  # object it holds
-    waited: wp.array[int]  # iterations in the home area with what it holds
+    waited: wp.array[int]  # iterations in the home area with its object
     dropped: wp.array[int]  # object it let go of in the home area, until it leaves
     situation: wp.array[int]  # of section 6.2.8, 0 if the controller decided
     heuristic: wp.array[int]
@@ -157,8 +157,8 @@ class GaccTeam:
     life: Annotated[wp.array[int], "objects"]
     # iteration in which it was sensed first; "known at t" is detected < t
     detected: Annotated[wp.array[int], "objects"]
-    part: Annotated[wp.array[int], "objects"]  # which part of what it has become: c * M + step
-    holders: Annotated[wp.array[wp.uint64], "objects"]  # while the referee is at it
+    part: Annotated[wp.array[int], "objects"]  # part of a complex object: c * M + step
+    holders: Annotated[wp.array[wp.uint64], "objects"]  # valid during the referee's phases
     built: Annotated[wp.array[int], "complex_objects"]  # parts of each complex object
     missing: Annotated[wp.array[int], "complex_objects", "types"]  # parts that it lacks
     demand: Annotated[wp.array[float], "types"]
@@ -166,17 +166,17 @@ class GaccTeam:
     carriers: Annotated[wp.array[wp.uint64], "team"]  # robots that hold something
     waiting: Annotated[wp.array[wp.uint64], "team"]  # those of them in the home area
     taken: Annotated[wp.array[wp.uint64], "team"]  # objects that are held
-    shared: Annotated[wp.array[wp.uint64], "team"]  # by several, while the referee is at it
-    lying: Annotated[wp.array[wp.uint64], "team"]  # objects that lie somewhere; nobody holds them
+    shared: Annotated[wp.array[wp.uint64], "team"]  # held by several, as valid as ``holders``
+    lying: Annotated[wp.array[wp.uint64], "team"]  # objects that no robot holds
     lying_home: Annotated[wp.array[wp.uint64], "team"]  # those of them in the home area
     kept_inputs: Annotated[wp.array[float], "kept_inputs"]  # without noise
     kept_heuristic: Annotated[wp.array[int], "kept_robots"]  # while outputs are random
-    # What has changed since robots sensed last:
+    # Changes since robots sensed last:
     moved: Annotated[wp.array[wp.uint64], "team"]  # robots that have moved
     stirred: Annotated[wp.array[wp.uint64], "team"]  # those, and robots near which one has
     # moved, gripped or let go
-    turned: Annotated[wp.array[wp.uint64], "team"]  # robots whose view is another than it was
-    changed: Annotated[wp.array[wp.uint64], "team"]  # objects that lie now or do no more
+    turned: Annotated[wp.array[wp.uint64], "team"]  # robots whose view has changed
+    changed: Annotated[wp.array[wp.uint64], "team"]  # objects now lying, or no longer
     has_news: Annotated[wp.array[int], "team"]  # of the demand
     performance: wp.array[float]  # delivered, completed, delivered_share
 
@@ -186,13 +186,13 @@ class GaccTeam:
 
 @wp.func
 def robot_parts(team: GaccTeam, scene: GaccScene, p: GaccConstants) -> int:
-    """Return into how many parts lanes cut a set of robots."""
+    """Return the number of parts into which lanes cut a set of robots."""
     return parts(p.n_robots)
 
 
 @wp.func
 def object_parts(team: GaccTeam, scene: GaccScene, p: GaccConstants) -> int:
-    """Return into how many parts lanes cut a set of objects."""
+    """Return the number of parts into which lanes cut a set of objects."""
     return parts(p.n_objects)
 
 
@@ -244,9 +244,9 @@ def is_refused(
 
 @wp.func
 def within(low: float, high: float, start: float, way: float) -> wp.vec2f:
-    """Return which part of a way in one dimension, from 0 to 1, lies between two bounds.
+    """Return the part of a path in one dimension, from 0 to 1, that lies between two bounds.
 
-    From the first number to the second; nothing if the second is smaller.
+    It extends from the first number to the second, and is empty if the second is smaller.
     """
     if way == 0.0:
         if start < low or start > high:
@@ -261,7 +261,7 @@ def within(low: float, high: float, start: float, way: float) -> wp.vec2f:
 def is_blocked(
     scene: GaccScene, walls: wp.uint64, x: float, y: float, dx: float, dy: float
 ) -> bool:
-    """Return whether an obstacle of a set stands in the view from a place along a way."""
+    """Return whether an obstacle of a set blocks the view from a place along a path."""
     rest = walls
     while rest != wp.uint64(0):
         k = lowest(rest)
@@ -284,7 +284,7 @@ def setting_of(action: int) -> int:
 
 @wp.func
 def spoil(team: GaccTeam, i: int) -> None:
-    """Let what robot ``i`` sees of objects and obstacles no longer be what is there."""
+    """Mark robot ``i``'s view of objects and obstacles as outdated."""
     if team.view[i] != NONE:
         team.view[i] = STALE
 

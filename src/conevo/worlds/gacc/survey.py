@@ -1,9 +1,8 @@
-"""What is in reach of a robot of ``worlds.gacc.world``, kept until it moves.
+"""The things in reach of a robot of ``worlds.gacc.world``, kept until it moves.
 
-A robot asks only the few things in reach what it would have to ask all: which object is the
-closest, what stands in the view, which place is taken. Robots, objects and obstacles in reach are
-sets. They may hold more than what a question is about, which is decided by the distance, so nothing
-depends on how far reach is.
+Searches look only at the few things in reach, not at all: for the closest object, for obstacles in
+the view, for taken places. Robots, objects and obstacles in reach are sets. These may contain more
+than a search needs; since it compares distances, results do not depend on how far reach is.
 """
 
 import warp as wp
@@ -19,13 +18,13 @@ PARTS = wp.constant(4)  # of a robot's survey, where a block has many lanes
 
 @wp.func
 def survey_parts(team: GaccTeam, scene: GaccScene, p: GaccConstants) -> int:
-    """Return into how many parts the survey is cut: one lane takes it as a whole."""
+    """Return the number of parts into which the survey is cut: 1 for a single lane."""
     return wp.where(n_lanes() == 1, 1, PARTS * p.n_robots)
 
 
 @wp.func
 def survey(team: GaccTeam, scene: GaccScene, p: GaccConstants, q: int, t: int) -> None:
-    """Do part ``q`` of finding what is in reach of the robots that have moved."""
+    """Do part ``q`` of the search for things in reach of the robots that have moved."""
     first = int(0)
     step = int(1)
     robots = team.moved[0]
@@ -43,7 +42,7 @@ def survey(team: GaccTeam, scene: GaccScene, p: GaccConstants, q: int, t: int) -
 
 @wp.func
 def meet(team: GaccTeam, p: GaccConstants, i: int, first: int, step: int) -> None:
-    """Note in robot ``i``'s set each robot in reach, and in that one's set robot ``i``."""
+    """Add each robot in reach to robot ``i``'s set, and robot ``i`` to its set."""
     x = team.x[i]
     y = team.y[i]
     found = wp.uint64(0)
@@ -63,7 +62,7 @@ def meet(team: GaccTeam, p: GaccConstants, i: int, first: int, step: int) -> Non
 
 @wp.func
 def lying_in_reach(team: GaccTeam, p: GaccConstants, i: int, first: int, step: int) -> wp.uint64:
-    """Return which objects lie in reach of robot ``i``, of every ``step``-th from ``first`` on."""
+    """Return which of every ``step``-th object, from ``first`` on, lie in reach of robot ``i``."""
     x = team.x[i]
     y = team.y[i]
     found = wp.uint64(0)
@@ -80,7 +79,7 @@ def lying_in_reach(team: GaccTeam, p: GaccConstants, i: int, first: int, step: i
 def walls_in_reach(
     team: GaccTeam, scene: GaccScene, p: GaccConstants, i: int, first: int, step: int
 ) -> wp.uint64:
-    """Return which obstacles are in reach of robot ``i``, of every ``step``-th."""
+    """Return which of every ``step``-th obstacle are in reach of robot ``i``."""
     x = team.x[i]
     y = team.y[i]
     found = wp.uint64(0)
@@ -95,7 +94,7 @@ def walls_in_reach(
 
 @wp.func
 def spread(team: GaccTeam, scene: GaccScene, p: GaccConstants, q: int, t: int) -> None:
-    """Tell robots in reach of those objects of part ``q`` that lie there now, or do no more."""
+    """Update robots in reach of those objects of part ``q`` that now lie there, or no longer."""
     objects = part_of(team.changed[0], q)
     while objects != wp.uint64(0):
         k = lowest(objects)

@@ -27,7 +27,7 @@ complex object takes only the next type of its sequence, a disordered one any ty
 state      meaning                          what comes next
 =========  ===============================  ====================================================
 LYING      where it was                     GRIPPED, by one robot outside the home area
-GRIPPED    held outside the home area       CARRIED, as its robot moves; or as that
+GRIPPED    held outside the home area       CARRIED, when its robot moves; or as CARRIED
 CARRIED    goes where its robot goes        WAITING, in the home area; DROPPED, if let go
 WAITING    one robot holds it at home       HELPED, another grips it; DROPPED, after 30 iterations
 HELPED     several do, not yet enough       DELIVERED, enough do and it is needed next; DROPPED,
@@ -37,56 +37,58 @@ DELIVERED  a part of a complex object       nothing
 DROPPED    lies where a robot let it go     GRIPPED outside, WAITING or more in the home area
 =========  ===============================  ====================================================
 
-States are those at the end of an iteration: what is gripped and let go in one has not changed.
+States are those at the end of an iteration: an object gripped and let go within one iteration has
+not changed.
 
-**One iteration.** Every robot senses and chooses where all were at the end of the iteration before;
-then all move and grip; then a referee looks at what is held in the home area.
+**One iteration.** Every robot senses the world as it was at the end of the previous iteration, and
+chooses. Then all move and grip. Then a referee decides about objects held in the home area.
 
 **In the home area** four situations of section 6.2.8 decide instead of the controller. (1) Another
 robot holds an object: go to the closest such robot and grip it too. (2) The robot itself holds one:
 wait. (3) An object lies there: go to the closest one and grip it. (4) At least two hold an object
-that cannot be built in now: they let go. Else, and everywhere outside, the controller decides.
+that cannot be built in now: they let go. Otherwise, and everywhere outside, the controller decides.
 
 Choices, all declared in ``GaccParams`` or here:
 
-- Choice: an object can be gripped whether or not it has been detected; detection tells a robot
-  where to go. "It must first be detected" (6.5.3) is ``needs_detection``: then any robot's
-  detection, once, is enough. But eq. 6.8 pays only those who deliver, not who detects for them.
-- Choice: in the home area a robot is aware of all of it (``home_sight``): with the sensors' own
-  0.05 hardly anybody is helped within the 30 iterations of table 6.4.
-- Choice: home area, grip distance and home sight are as large as they are because in smaller ones
-  nothing is ever delivered by random teams, so nothing can evolve (docs/results/gacc.md).
-- Choice: outside the home area one robot carries an object alone and nobody else can grip it; of
-  two that grip it in the same iteration the one with the lower number gets it. Nobody grips over
-  the border of the home area.
-- Choice: gripping with another setting lets go of what is held; with the same, nothing happens.
-- Choice: every robot waits its own 30 iterations (table 6.4), then lets go. It keeps off that
-  object ("other objects", 6.2.8) until it has left the home area.
+- Choice: an object can be gripped whether or not it has been detected; detection shows a robot
+  where to go. "It must first be detected" (6.5.3) is ``needs_detection``: then one detection by any
+  robot is enough. But eq. 6.8 pays only those who deliver, not who detects for them.
+- Choice: in the home area a robot senses all of it (``home_sight``): with the sensors' own 0.05
+  hardly any robot gets help within the 30 iterations of table 6.4.
+- Choice: home area, grip distance and home sight have these sizes because with smaller ones random
+  teams never deliver anything, so nothing can evolve (docs/results/gacc.md).
+- Choice: outside the home area one robot carries an object alone and no other can grip it. If two
+  grip it in the same iteration, the one with the lower number gets it. No robot grips across the
+  border of the home area.
+- Choice: gripping with another setting lets go of the held object; with the same, nothing happens.
+- Choice: every robot waits its own 30 iterations (table 6.4), then lets go. It avoids that object
+  ("other objects", 6.2.8) until it has left the home area.
 - Choice: waiting counts as gripping. "Leave the home area and continue searching" (situation 1) is
   left to the controller.
 - Choice: a robot without energy lets go, stays where it is as a body, and does nothing more.
-- Choice: an obstacle blocks the view of other robots too, not of the home area or of the demand.
-- Choice: where several complex objects need a type, the first of them gets it; of several objects
-  that are ready in one iteration, the first comes first.
-- Choice: walls and obstacles are sensed where they are closest, with a negative reading. The bound
-  of eq. 6.1 limits a reading, not which thing is the closest.
-- Choice: a step is refused by where it ends; obstacles are too wide to be jumped over.
+- Choice: an obstacle blocks the view of other robots too, but not of the home area or the demand.
+- Choice: if several complex objects need a type, the first of them gets it. If several objects are
+  ready in one iteration, they are built in by their numbers.
+- Choice: walls and obstacles are sensed at their closest points, with a negative reading. The bound
+  of eq. 6.1 limits a reading, but does not change which thing is the closest.
+- Choice: only the end of a step decides whether it is refused; obstacles are too wide to be jumped
+  over.
 
-**Places.** Objects and robots are anywhere outside the home area at first. With ``segregation`` a
-type has a region, and with ``starts = "by_robot"`` so has a robot: three sectors around the middle
-(``worlds.places.sectors``).
+**Places.** At first objects and robots are anywhere outside the home area. With ``segregation``
+each type has a region, and with ``starts = "by_robot"`` each robot has one, too: three sectors
+around the middle (``worlds.places.sectors``).
 
-**Castes** (6.1.1) go by how a robot spends its time: activating its detection sensors; gripping or
-moving with an object (gatherer); from its arrival in the home area on, or from its grip there, with
-an object that is then built in (constructor). Choice: a robot that mostly moves with empty hands
-has none of these, and is non-specialized. Choice: the other nine are the settings among which a
-robot chooses, as both its sensors and its gripper have one for each type (6.2).
+**Castes** (6.1.1) depend on how a robot spends its time: activating its detection sensors; gripping
+or moving with an object (gatherer); from its arrival in the home area on, or from its grip there,
+with an object that is then built in (constructor). Choice: a robot that mostly moves with empty
+hands belongs to none of these, and is non-specialized. Choice: the other nine are the settings
+among which a robot chooses, as both its sensors and its gripper have one for each type (6.2).
 
 Version history:
 
 - v1: first version.
-- v2: sine, cosine and arc tangent of kernels are the same bits on every device; scenarios are drawn
-  from other random numbers, those of all keys at once.
+- v2: sine, cosine and arc tangent of kernels are equal bit for bit on every device; scenarios are
+  drawn from other random numbers, those of all keys at once.
 """
 
 from collections.abc import Sequence
@@ -117,7 +119,7 @@ Range = Annotated[float, Gt(0), Le(0.5)]
 Ints = npt.NDArray[np.intp]
 Floats = npt.NDArray[np.float32]
 
-SLACK = 1e-3  # of what is in reach of a robot: more than float32 rounds
+SLACK = 1e-3  # added to the reach of a robot: more than float32 rounding errors
 
 
 @parameters("world")
@@ -139,21 +141,22 @@ class GaccParams(Disturbances):
     zone_side: Annotated[float, Gt(0), Le(0.5)] = 0.06  # Choice
     """(side) side of the construction zone, in the middle of the home area."""
     home_range: Annotated[float, Gt(0), Le(1)] = 1.0  # Choice: sensed from everywhere
-    """(side) how far from its centre the home area is sensed."""
+    """(side) distance from its centre at which the home area is sensed."""
     home_sight: Annotated[float, Gt(0), Le(1)] = 1.0  # Choice: at home, all of home is in sight
-    """(side) how far a robot in the home area sees who needs help there, and objects."""
+    """(side) distance at which a robot in the home area senses objects there, and robots that need
+    help."""
     object_range: Range = 0.05
-    """(side) how far the object and obstacle sensors see."""
+    """(side) range of the object and obstacle sensors."""
     object_accuracy: Annotated[float, Ge(0), Le(1)] = 1.0  # Choice
     """(probability) that an object or an obstacle in range is sensed."""
     object_cost: NonNegative = 0.02  # Choice
     """(energy) of an activation of these sensors."""
     robot_range: Range = 0.05
-    """(side) how far the robot sensors see."""
+    """(side) range of the robot sensors."""
     robot_cost: NonNegative = 0.01
     """(energy) of the robot sensors, in every iteration."""
-    grip_distance: Range = 0.05  # Choice: what can be detected can be gripped
-    """(side) how far from a robot an object may be that it grips."""
+    grip_distance: Range = 0.05  # Choice: the detection range
+    """(side) largest distance of an object that a robot grips."""
     grip_cost: NonNegative = 0.01  # Choice
     """(energy) of an activation of the gripper, waiting with an object included."""
     move_range: Annotated[float, Gt(0), Le(0.02)] = 0.01  # Choice: the rovers', table 5.4
@@ -161,19 +164,19 @@ class GaccParams(Disturbances):
     move_cost: NonNegative = 0.01
     """(energy) of a move, refused or not."""
     wait: Annotated[int, Ge(1), Le(1_000_000)] = 30
-    """(iterations) how long a robot waits with an object for help."""
-    needs_detection: bool = False  # Choice: whether nobody grips what nobody has detected
+    """(iterations) time that a robot waits for help with an object."""
+    needs_detection: bool = False  # Choice: undetected objects can be gripped
     """whether an object must have been detected before it can be gripped."""
     min_distance: Positive = 0.01  # Choice: the bound of eq. 6.1, read as a maximum
     """(side) lower bound of distances in eqs 6.1 to 6.3."""
     separation: NonNegative = 0.002  # Choice: "only one robot can occupy any position" (6.1.2)
-    """(side) a robot may not come closer than this to another."""
+    """(side) smallest distance between two robots."""
     obstacle_least: Annotated[float, Ge(0.02), Le(0.1)] = 0.02  # Choice: sides of an obstacle
     """(side) shortest side of an obstacle."""
     obstacle_most: Annotated[float, Ge(0.02), Le(0.1)] = 0.1  # Choice
     """(side) longest side of an obstacle."""
     obstacle_gap: Annotated[float, Gt(0), Le(0.05)] = 0.03  # Choice: around every obstacle
-    """(side) least distance of an obstacle from walls, home area and the others."""
+    """(side) smallest distance of an obstacle from walls, home area and other obstacles."""
     segregation: Annotated[float, Ge(0), Le(1)] = 0.0
     """(share) of the objects of each type that lie in that type's region; the others lie anywhere.
     0 draws types independently of place, 1 gives one type to a region."""
@@ -197,7 +200,7 @@ class GaccParams(Disturbances):
         return self.home_side / 2
 
     def region_of_objects(self, types: npt.NDArray[np.int32]) -> Ints:
-        """Return the region of each object [K], by its type: its type's, or -1, anywhere."""
+        """Return the region of each object [K]: that of its type, or -1 for anywhere."""
         counts = np.bincount(types, minlength=len(TYPES))
         number = np.arange(len(types)) - (np.cumsum(counts) - counts)[types]  # of its type
         in_region = (self.segregation * counts + 0.5).astype(np.intp)[types]
@@ -205,7 +208,7 @@ class GaccParams(Disturbances):
 
     @property
     def region_of_robots(self) -> Ints:
-        """The region that each robot starts in [R], -1 for anywhere."""
+        """The region in which each robot starts [R], -1 for anywhere."""
         robots = np.arange(self.n_robots)
         return robots % len(TYPES) if self.starts == "by_robot" else np.full_like(robots, -1)
 
@@ -289,7 +292,7 @@ class GaccWorld:
 
     @property
     def plan(self) -> BuildingPlan:
-        """What is to be built."""
+        """The building plan."""
         return plan(self.environment)
 
     def scenarios(self, keys: Sequence[int]) -> GaccScenarios:
@@ -307,7 +310,7 @@ class GaccWorld:
             (p.obstacle_least, p.obstacle_most),
             p.obstacle_gap,
         ).astype(np.float32)
-        edge = np.float32(p.home + 1e-6)  # more than float32 rounds
+        edge = np.float32(p.home + 1e-6)  # more than float32 rounding errors
         types = plan.object_types
 
         def drawn(what: str, separation: float, region: npt.NDArray[np.intp]) -> Floats:
@@ -361,7 +364,7 @@ class GaccWorld:
                 ordered=sum(1 << k for k, ordered in enumerate(plan.is_ordered) if ordered),
             ),
             functions=disturbed(FUNCTIONS, (GaccTeam, GaccScene, GaccConstants), p, fail),
-            lanes=96,  # Choice: as of the rover world; there are as many neurons and sensors
+            lanes=96,  # Choice: as in the rover world, whose neurons and sensors are as numerous
             recorded=(
                 *("x", "y", "energy", "fitness", "action", "held", "waited", "dropped"),
                 *("situation", "object_x", "object_y", "life", "detected", "part", "demand"),

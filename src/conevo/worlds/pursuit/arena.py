@@ -35,7 +35,7 @@ RECORDED = ("x", "y", "heading", "left", "right", "collided", "action", "fitness
 
 @parameters("world")
 class ArenaParams(Disturbances):
-    """What both worlds have in common; lengths in cm, one iteration is 0.1 s.
+    """Parameters of both worlds; lengths in cm, one iteration is 0.1 s.
 
     Nitschke 2009, table 4.1, unless marked.
     """
@@ -46,10 +46,10 @@ class ArenaParams(Disturbances):
     """(cm) side of the arena. Choice: a tenth of the printed 1000, in which robots of this speed do
     not meet (docs/results/arena.md)."""
     sensor_range_cm: Annotated[float, Gt(0), Le(200)] = 22.0
-    """(cm) how far an infrared or light sensor sees, from its place on the rim."""
+    """(cm) range of an infrared or light sensor, from its place on the rim."""
     sensor_angle_deg: Annotated[float, Gt(0), Le(89)] = 30.0
-    """(degrees) half angle of the cone a sensor sees. Choice: 30, so that the sensors ahead overlap
-    and a gap remains behind the shoulders, as on the real robot."""
+    """(degrees) half angle of a sensor's cone. Choice: 30, so that the sensors ahead overlap and a
+    gap remains behind the shoulders, as on the real robot."""
     max_speed_cm: Annotated[float, Gt(0), Le(5)] = 0.8
     """(cm per iteration) speed of a predator at full command. Choice: 0.8, the 8 cm/s of Khepera
     simulators. At 5 (0.5 m/s, the robot's own limit) bodies still cannot jump past one another."""
@@ -63,17 +63,17 @@ class ArenaParams(Disturbances):
 
     @property
     def sight_cm(self) -> float:
-        """Distance up to which a body may be seen, between centres."""
+        """Distance between centres up to which a body may be seen."""
         return self.sensor_range_cm + 2 * float(RADIUS)
 
     @property
     def touch_cm(self) -> float:
-        """Distance up to which two bodies, or their moves, may meet; and a little more."""
+        """Distance up to which two bodies, or their moves, may meet, and a little more."""
         return 2 * (float(RADIUS) + max(self.max_speed_cm, self.prey_speed_cm)) + 0.1
 
     @property
     def cone(self) -> tuple[float, float]:
-        """Cosine and sine of half the angle that a sensor sees."""
+        """Cosine and sine of the half angle of a sensor's cone."""
         angle = math.radians(self.sensor_angle_deg)
         return math.cos(angle), math.sin(angle)
 
@@ -118,14 +118,14 @@ def draw_scenarios(
         keys: of the scenarios.
         arena_cm: side of the arena.
         robots: R, robots of the team.
-        others: least and most of the other bodies.
-        obstacles: least and most of the obstacles.
+        others: smallest and largest number of other bodies.
+        obstacles: smallest and largest number of obstacles.
         n_sensors: S.
         by_robot: whether robot i starts in sector i of R around the middle of the arena.
         prey: weights of the prey's networks, [Q * H, 8] and [Q * H, 2].
 
     Raises:
-        UsageError: no room for so many.
+        UsageError: no room for this number of bodies.
     """
     most = robots + others[1]
     seed = np.array(keys, dtype=np.uint64)
@@ -169,7 +169,7 @@ def _places(
 ) -> npt.NDArray[np.float32]:
     """Draw places [E, bodies and obstacles, 2], a little away from walls and from each other.
 
-    The first ``in_sectors`` are in a sector of their own, and absent bodies at 0.
+    The first ``in_sectors`` are each in a separate sector, and absent bodies at 0.
     """
 
     def is_free(
@@ -177,7 +177,7 @@ def _places(
     ) -> npt.NDArray[np.bool_]:
         return (body >= in_sectors)[:, None] | (sectors(xy, in_sectors) == body[:, None])
 
-    margin = 0.01  # more than float32 rounds in the largest arena
+    margin = 0.01  # more than float32 rounding errors in the largest arena
     edge = float(RADIUS) + margin
     side = max(arena_cm - 2 * edge, margin)
     n = is_there.shape[1]
@@ -198,7 +198,7 @@ def simulate(
     Args:
         world: the world.
         functions: its phases.
-        bodies: the most that a scenario has.
+        bodies: the most in a scenario.
         team_is_prey: whether the robots of the team are prey.
         given: fields of ``bodies.Params`` that its parameters do not have.
     """

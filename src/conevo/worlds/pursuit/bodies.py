@@ -1,8 +1,8 @@
-"""Predators and prey as bodies: their state, and what the kernels know of their world.
+"""Predators and prey as bodies: their state, scenarios and constants for the kernels.
 
 Bodies are numbered: first the team's robots, then the others (the prey, or the heuristic
 predators). A body and an obstacle are discs; disc ``j`` is body ``j`` below 16, and obstacle
-``j - 16`` from there on, so that a set of discs is an integer.
+``j - 16`` from 16 on, so that a set of discs is an integer.
 """
 
 from typing import Annotated
@@ -33,7 +33,7 @@ SLOTS = wp.constant(16)  # hidden neurons of a prey that are computed at once on
 
 @wp.struct
 class PursuitConstants:
-    """What the kernels need of the parameters of both worlds, by their names."""
+    """The parameters of both worlds for the kernels."""
 
     n_robots: int
     team_is_prey: int
@@ -51,7 +51,7 @@ class PursuitConstants:
     sight_cm_2: float  # of the squared distance at which a body may be seen at all
     touch_cm_2: float  # of the squared distance at which two bodies may meet in one iteration
     sensor_noise: float
-    signed_inputs: int  # the first of the inputs, those with a range of [-1, 1]
+    signed_inputs: int  # number of the first inputs, which have a range of [-1, 1]
     action_noise: float
     failure: float
     failure_at: int
@@ -94,7 +94,7 @@ class PursuitTeam:
     refused: Annotated[wp.array[int], "bodies"]  # by walls, obstacles and where others are
     collided: Annotated[wp.array[int], "bodies"]  # refused for any reason
     collisions: Annotated[wp.array[int], "bodies"]
-    has_moved: Annotated[wp.array[int], "bodies"]  # in the iteration before
+    has_moved: Annotated[wp.array[int], "bodies"]  # in the previous iteration
     near: Annotated[wp.array[int], "bodies"]  # discs that may be seen
     close: Annotated[wp.array[int], "bodies"]  # discs that may be met in this iteration
     looks: Annotated[wp.array[int], "bodies"]  # whether anything that it may see has changed
@@ -107,7 +107,7 @@ class PursuitTeam:
     prey_in: Annotated[wp.array[float], "prey", "sensors", "slots"]  # networks of the prey
     prey_out: Annotated[wp.array[float], "prey", "wheels", "slots"]
     prey_hidden: Annotated[wp.array[float], "prey", "slots"]
-    moved: Annotated[wp.array[int], "prey", "window"]  # ways in 2**-18 cm, a ring
+    moved: Annotated[wp.array[int], "prey", "window"]  # path lengths in 2**-18 cm, a ring
     commanded: Annotated[wp.array[int], "prey", "window"]
     moved_sum: Annotated[wp.array[int], "prey"]  # of the ring
     commanded_sum: Annotated[wp.array[int], "prey"]
@@ -116,7 +116,7 @@ class PursuitTeam:
     first: Annotated[wp.array[int], "team"]  # iteration of the first capture, NONE before
     kept_inputs: Annotated[wp.array[float], "kept_inputs"]  # without noise
     kept_heuristic: Annotated[wp.array[int], "kept_robots"]  # while outputs are random
-    failed: Annotated[wp.array[int], "failing"]  # robots that do nothing any more
+    failed: Annotated[wp.array[int], "failing"]  # robots that no longer do anything
     action: wp.array[int]
     fitness: wp.array[float]
     counts: wp.array[int]
@@ -132,7 +132,7 @@ def is_prey(p: PursuitConstants, b: int) -> bool:
 
 @wp.func
 def wheel_speed(p: PursuitConstants, b: int) -> float:
-    """Return how far body ``b``'s wheel rolls in an iteration at command 1."""
+    """Return the distance that body ``b``'s wheel rolls in an iteration at command 1."""
     return wp.where(is_prey(p, b), p.prey_speed_cm, p.max_speed_cm)
 
 
@@ -144,7 +144,7 @@ def first_of(discs: int) -> int:
 
 @wp.func
 def place_of(team: PursuitTeam, scene: PursuitScene, j: int) -> wp.vec2f:
-    """Return where disc ``j`` is."""
+    """Return the place of disc ``j``."""
     if j < OBSTACLES:
         return wp.vec2f(team.x[j], team.y[j])
     return wp.vec2f(scene.obstacle_x[j - OBSTACLES], scene.obstacle_y[j - OBSTACLES])

@@ -1,4 +1,4 @@
-"""What predators and prey do with their wheels: networks, heuristics, the random walk.
+"""Wheel commands of predators and prey: networks, heuristics, the random walk.
 
 Nitschke 2009, sections 4.1, 4.3, 4.6.6.
 """
@@ -41,7 +41,7 @@ def has_network(team: PursuitTeam, scene: PursuitScene, p: PursuitConstants) -> 
 def set_up_prey(
     team: PursuitTeam, scene: PursuitScene, p: PursuitConstants, q: int, t: int
 ) -> None:
-    """Lay out the weights of prey ``q``'s network: hidden neurons side by side, empty slots 0."""
+    """Lay out the weights of prey ``q``'s network: neurons next to each other, empty slots 0."""
     slots = team.prey_hidden.shape[0] // team.captured.shape[0]
     k = int(0)
     while k < slots:
@@ -62,7 +62,7 @@ def set_up_prey(
 
 @wp.func
 def neurons(team: PursuitTeam, scene: PursuitScene, p: PursuitConstants) -> int:
-    """Return the items of ``fire``: a neuron each, or, on one lane, some of a prey's."""
+    """Return the number of items of ``fire``: a neuron each, or, on one lane, some of a prey's."""
     if not has_network(team, scene, p):
         return 0
     return team.prey_hidden.shape[0] // wp.where(n_lanes() == 1, SLOTS, 1)
@@ -70,7 +70,7 @@ def neurons(team: PursuitTeam, scene: PursuitScene, p: PursuitConstants) -> int:
 
 @wp.func
 def fire(team: PursuitTeam, scene: PursuitScene, p: PursuitConstants, q: int, t: int) -> None:
-    """Compute hidden neurons of a prey that is not the team (fig. 4.2) if it sees anything new."""
+    """Compute hidden neurons of a prey that is not the team (fig. 4.2) if its view has changed."""
     slots = team.prey_hidden.shape[0] // team.captured.shape[0]
     at = q * wp.where(n_lanes() == 1, SLOTS, 1)
     prey = at // slots
@@ -101,7 +101,7 @@ FIRE = Phase(fire, neurons)
 @wp.func
 def as_network(team: PursuitTeam, p: PursuitConstants, b: int) -> wp.vec2f:
     """Return wheel commands of a prey that is not the team, from its hidden neurons."""
-    if team.looks[b] == 0:  # what it sees has not changed
+    if team.looks[b] == 0:  # its view has not changed
         return wp.vec2f(team.left[b], team.right[b])
     q = b - p.n_robots
     slots = team.prey_hidden.shape[0] // team.captured.shape[0]
@@ -129,7 +129,7 @@ def wheels_of(left: float, right: float) -> wp.vec2f:
 def walk_randomly(
     team: PursuitTeam, scene: PursuitScene, p: PursuitConstants, b: int, t: int
 ) -> wp.vec2f:
-    """Return wheel commands of a random walk: straight on, now and then another way.
+    """Return wheel commands of a random walk: straight ahead, with a turn now and then.
 
     Choice: it turns with chance 0.05 in an iteration, and whenever its last move was refused.
     """
@@ -142,8 +142,8 @@ def walk_randomly(
 def pursue(team: PursuitTeam, scene: PursuitScene, p: PursuitConstants, b: int, t: int) -> wp.vec2f:
     """Return wheel commands of the heuristic predator (sections 4.3, 4.6.6).
 
-    Straight at the closest prey in light range; else to where it was seen last; else a random walk.
-    Choice: it turns on the spot as fast as needed, knows prey all around it, and gives up a place
+    Straight at the closest prey in light range; else to its last known place; else a random walk.
+    Choice: it turns on the spot as fast as needed, senses prey all around it, and gives up a place
     once it is within a robot's diameter of it.
     """
     x = team.x[b]
@@ -166,7 +166,7 @@ def pursue(team: PursuitTeam, scene: PursuitScene, p: PursuitConstants, b: int, 
         dx = team.known_x[b] - x
         dy = team.known_y[b] - y
         if dx * dx + dy * dy < 4.0 * RADIUS * RADIUS:
-            team.known[b] = 0  # it is not here any more
+            team.known[b] = 0  # it is no longer here
     if team.known[b] == 0:
         return walk_randomly(team, scene, p, b, t)
     ahead = wp.vec2f(team.ahead_x[b], team.ahead_y[b])
@@ -185,7 +185,7 @@ def avoid(team: PursuitTeam, p: PursuitConstants, b: int) -> wp.vec2f:
     """Return wheel commands of the heuristic prey: ahead, and away from the nearer side.
 
     Choice: the thesis has no heuristic prey; this one turns by the difference between its three
-    sensors on either side, and on the spot where both sides are as near.
+    sensors on either side, and on the spot if both sides are equally near.
     """
     k = b * N_SENSORS
     left = wp.max(wp.max(team.infrared[k], team.infrared[k + 1]), team.infrared[k + 2])
@@ -205,7 +205,7 @@ def avoid(team: PursuitTeam, p: PursuitConstants, b: int) -> wp.vec2f:
 def command(
     team: PursuitTeam, scene: PursuitScene, p: PursuitConstants, b: int, t: int
 ) -> wp.vec2f:
-    """Return the wheel commands, left and right, that body ``b``'s controller gives."""
+    """Return the wheel commands, left and right, of body ``b``'s controller."""
     h = int(NONE)
     if b < p.n_robots:
         h = team.heuristic[b]

@@ -1,4 +1,4 @@
-"""The playback of predators and prey in their arena, of the worlds pursuit and prey."""
+"""The playback of predators and prey in their arena, for the worlds pursuit and prey."""
 
 from __future__ import annotations
 
@@ -117,7 +117,7 @@ def _backdrop(parts: Parts, side: float) -> tuple[Backdrop, ...]:
 
 
 def _halos(captured: Channel, x: Channel, y: Channel, r: int) -> Things:
-    """Return a disc under every prey that cannot be seen but for its rim, while it is captured."""
+    """Return a disc under every prey, of which only the rim is visible, while it is captured."""
     prey = np.zeros(captured.codes.shape[1], dtype=np.int64)
     return Things(
         "captured prey",
@@ -148,10 +148,10 @@ def _path(parts: Parts) -> Curve:
 def _captures(
     captured: npt.NDArray[np.int64], x: Channel, y: Channel, r: int, reach: float
 ) -> list[Event]:
-    """Return when captures begin, with the predators in light range of the prey, and when they end.
+    """Return the starts of captures, with the predators in light range of the prey, and their ends.
 
-    A predator is in range if the gap between the rims is at most the range, give or take what
-    recorded places are off.
+    A predator is in range if the gap between the rims is at most the range, within the rounding
+    error of recorded places.
     """
     limit = reach + 2 * RADIUS + 2 * (x.step + y.step)
     at = np.stack([x.values, y.values], axis=-1)
@@ -173,7 +173,7 @@ def _captures(
 
 
 def _collisions(parts: Parts) -> list[Event]:
-    """Return when moves of a predator begin to be refused."""
+    """Return the iterations in which moves of a predator start to be refused."""
     collided = parts.index("collided", 2, parts.t, -1).values[:, : parts.r]
     begins = np.diff(collided, axis=0, prepend=0) > 0
     return [

@@ -1,7 +1,7 @@
-"""The phases of an epoch of predators and prey: how it begins, what is captured, how it ends.
+"""The phases of an epoch of predators and prey: its start, captures, its end.
 
-One set of rules serves two worlds: in ``pursuit.world`` the team are the predators, in
-``pursuit.prey`` the prey. The rules and the choices are listed on the cards of the two worlds.
+One set of rules serves two worlds: the team consists of the predators in ``pursuit.world``, and of
+the prey in ``pursuit.prey``. The cards of the two worlds list the rules and the choices.
 """
 
 import warp as wp
@@ -23,7 +23,7 @@ __all__ = ["ACTIONS", "N_ACTIONS", "PREY_FUNCTIONS", "PURSUIT_FUNCTIONS", "fail"
 
 @wp.func
 def places(team: PursuitTeam, scene: PursuitScene, p: PursuitConstants) -> int:
-    """Return how many bodies a scenario can have: nothing of another team is left in a record."""
+    """Return the largest number of bodies, so that a record has no remains of another team."""
     return team.x.shape[0]
 
 
@@ -53,7 +53,7 @@ def reset_body(team: PursuitTeam, scene: PursuitScene, p: PursuitConstants, b: i
 def reset_robot(
     team: PursuitTeam, scene: PursuitScene, p: PursuitConstants, i: int, t: int
 ) -> None:
-    """Clear the records of robot ``i``; note which of its sensors are held."""
+    """Clear the records of robot ``i``, and list its sensors that are held."""
     held = int(0)
     k = int(0)
     while k < scene.clamp.shape[1]:
@@ -68,7 +68,7 @@ def reset_robot(
 
 @wp.func
 def prey(team: PursuitTeam, scene: PursuitScene, p: PursuitConstants) -> int:
-    """Return how many prey are opponents; one that is not there if they are the team."""
+    """Return the number of prey that are opponents; one, which is absent, if they are the team."""
     return team.captured.shape[0]
 
 
@@ -92,14 +92,14 @@ def reset_prey(team: PursuitTeam, scene: PursuitScene, p: PursuitConstants, q: i
 
 @wp.func
 def fail(team: PursuitTeam, scene: PursuitScene, p: PursuitConstants, i: int, t: int) -> None:
-    """Note if robot ``i`` fails."""
+    """Record whether robot ``i`` fails."""
     if fails(scene.seed[0], p, i, t):
         team.failed[i] = 1
 
 
 @wp.func
 def stand(team: PursuitTeam, scene: PursuitScene, p: PursuitConstants, i: int, t: int) -> None:
-    """Let the wheels of robot ``i`` stand still if it has failed, whatever controls it."""
+    """Stop the wheels of robot ``i`` if it has failed, whatever controls it."""
     if t == 0:
         team.failed[i] = 0
     if team.failed[i] != 0:
@@ -134,7 +134,7 @@ def is_captured(team: PursuitTeam, p: PursuitConstants, q: int, t: int) -> bool:
 
 @wp.func
 def capture(team: PursuitTeam, scene: PursuitScene, p: PursuitConstants, q: int, t: int) -> None:
-    """Find out whether prey ``q`` is captured, and count captures."""
+    """Determine whether prey ``q`` is captured, and count captures."""
     now = int(is_captured(team, p, q, t))
     team.captures[q] = team.captures[q] + wp.max(now - team.captured[q], 0)
     team.captured[q] = now
@@ -144,7 +144,7 @@ def capture(team: PursuitTeam, scene: PursuitScene, p: PursuitConstants, q: int,
 def resolve_capture(
     team: PursuitTeam, scene: PursuitScene, p: PursuitConstants, i: int, t: int
 ) -> None:
-    """Credit predator ``i`` if any prey is captured, as all predators are (section 4.4)."""
+    """Credit predator ``i``, like all predators, if any prey is captured (section 4.4)."""
     held = int(0)
     q = int(0)
     while q < team.captured.shape[0]:
@@ -159,7 +159,7 @@ def resolve_capture(
 def resolve_escape(
     team: PursuitTeam, scene: PursuitScene, p: PursuitConstants, i: int, t: int
 ) -> None:
-    """Credit prey ``i`` with the way it has come, the straighter the more; nothing once collided.
+    """Credit prey ``i`` with its path, more for a straight one; nothing once it has collided.
 
     Section 4.3: "how far and fast the prey could move in a straight line without colliding".
     Choice: distance times 1 - sqrt(difference of the wheels), Floreano and Mondada's form of it.

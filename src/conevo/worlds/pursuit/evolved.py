@@ -1,7 +1,7 @@
-"""The prey that the six experiments of prey shaping end with, in one file.
+"""The evolved prey of the six experiments of prey shaping, in one file.
 
 Nitschke 2009, section 4.3: experiments 1 to 3 shape one prey, 4 to 6 two. The champions of the
-third and of the sixth are what the predators of the pursuit world are then set on.
+third and of the sixth are the prey of the pursuit world.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ TASKS = tuple(f"prey-v2/shaping-{number}" for number in range(1, 7))
 
 
 def refuse(stages: Sequence[Any]) -> None:
-    """Raise UsageError unless the stages' configurations are of networks such as the file holds."""
+    """Raise UsageError unless the stages' configurations have networks that fit into the file."""
     right = {
         "name": "srn",
         "recurrent": False,
@@ -41,8 +41,8 @@ def refuse(stages: Sequence[Any]) -> None:
 def save(stages: Sequence[Any], path: Path) -> None:
     """Write the evolved prey of six finished stages, which are runs.
 
-    The file says what made it, but neither when nor on which machine, so that the same command
-    writes the same bytes.
+    The file records the command and versions that made it, but neither time nor machine, so that
+    the same command writes the same bytes.
     """
     one, two = (stages[k].champion for k in (2, 5))
     if one is None or two is None:

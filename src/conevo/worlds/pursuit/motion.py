@@ -1,4 +1,4 @@
-"""How predators and prey move: where their wheels take them, and what refuses a move."""
+"""Motion of predators and prey: from wheel commands to places, and reasons to refuse a move."""
 
 import warp as wp
 
@@ -22,7 +22,7 @@ from conevo.worlds.pursuit.senses import bodies
 
 __all__ = ["ACT", "ACTIONS", "COMMIT", "N_ACTIONS"]
 
-# Choice: motor outputs name no actions; for S a predator's wheel pair is one of five primitives.
+# Choice: motor outputs are not actions; for S a predator's wheel pair is one of five primitives.
 ACTIONS = ("stop", "forward", "left", "right", "reverse")
 
 STOP = wp.constant(0)
@@ -32,7 +32,7 @@ RIGHT = wp.constant(3)
 REVERSE = wp.constant(4)
 N_ACTIONS = wp.constant(5)
 STOP_BELOW = wp.constant(0.1)  # Choice: both wheels below a tenth of full speed
-WAY_UNITS = wp.constant(262144.0)  # in a cm: sums are exact, and 1000 ways of 6 cm fit an int32
+WAY_UNITS = wp.constant(262144.0)  # in a cm: sums are exact, and 1000 x 6 cm fit into an int32
 
 
 # --- act ------------------------------------------------------------------------------------------
@@ -50,7 +50,7 @@ def overlaps(ax: float, ay: float, bx: float, by: float) -> bool:
 def is_refused(
     team: PursuitTeam, scene: PursuitScene, p: PursuitConstants, b: int, x: float, y: float
 ) -> int:
-    """Return 1 if body ``b`` may not move to a place: wall, obstacle, or another body there now."""
+    """Return 1 if body ``b`` may not move to a place: wall, obstacle or another body's place."""
     far = p.arena_cm - RADIUS
     if x < RADIUS or x > far or y < RADIUS or y > far:
         return 1
@@ -67,7 +67,7 @@ def is_refused(
 def set_wheels(team: PursuitTeam, scene: PursuitScene, p: PursuitConstants, b: int, t: int) -> None:
     """Set the wheels of body ``b``.
 
-    A prey of the team that has collided does nothing more in its epoch (section 4.3).
+    A prey of the team that has collided does nothing for the rest of its epoch (section 4.3).
     """
     wheels = wp.vec2f(0.0, 0.0)
     if p.team_is_prey == 0 or b >= p.n_robots or team.collisions[b] == 0:
@@ -78,7 +78,7 @@ def set_wheels(team: PursuitTeam, scene: PursuitScene, p: PursuitConstants, b: i
 
 @wp.func
 def act(team: PursuitTeam, scene: PursuitScene, p: PursuitConstants, b: int, t: int) -> None:
-    """Propose where body ``b`` will be, and whether it may be there."""
+    """Propose the next place of body ``b``, and check whether it may be there."""
     v = wheel_speed(p, b)
     ahead = wp.vec2f(team.ahead_x[b], team.ahead_y[b])
     to = drive(team.x[b], team.y[b], team.heading[b], ahead, v * team.left[b], v * team.right[b])
@@ -105,10 +105,10 @@ def primitive(left: float, right: float) -> int:
 
 @wp.func
 def commit(team: PursuitTeam, scene: PursuitScene, p: PursuitConstants, b: int, t: int) -> None:
-    """Move body ``b`` unless that is refused; count a robot's action, sum up a prey's way.
+    """Move body ``b`` unless that is refused; count a robot's action, sum up a prey's path.
 
-    Choice: of two bodies that would overlap where both want to go, neither moves, so that no order
-    of bodies matters. Refused: the whole old pose is kept (Evorobot's rule).
+    Choice: if two bodies would overlap at their proposed places, neither moves, so that the order
+    of bodies does not matter. After a refusal the whole old pose is kept (Evorobot's rule).
     """
     is_out = team.refused[b]
     others = team.close[b] & ((1 << OBSTACLES) - 1)
@@ -146,7 +146,7 @@ def commit(team: PursuitTeam, scene: PursuitScene, p: PursuitConstants, b: int, 
 
 @wp.func
 def add_way(team: PursuitTeam, p: PursuitConstants, b: int, is_out: int, t: int) -> None:
-    """Add the way of an iteration to what prey ``b`` has commanded and moved in the window."""
+    """Add an iteration's commanded and driven distance of prey ``b`` to the sums of the window."""
     q = b - p.n_robots
     way = int(0.5 * wp.abs(team.left[b] + team.right[b]) * p.prey_speed_cm * WAY_UNITS + 0.5)
     moved = wp.where(is_out == 0, way, 0)

@@ -1,4 +1,4 @@
-"""Prey shaping: a prey learns to run fast and straight without running into anything.
+"""Prey shaping: a prey learns to run fast and straight without collisions.
 
 =============  =========================================================================
 name           ``prey-v2``
@@ -14,21 +14,22 @@ performance    ``path`` in cm, see below; ``collided``, share of the prey that d
                (smaller is better)
 =============  =========================================================================
 
-**Fitness.** The way a prey has come, the straighter the more: the sum over iterations of the
+**Fitness.** The length of a prey's path, more for a straight one: the sum over iterations of the
 distance driven times 1 - sqrt(half the difference of its wheel commands). A prey whose own move is
 refused has collided: its fitness is 0 and its epoch is over; it stays as a body.
 
 The rules of motion, sensing and collisions are those of ``pursuit.world``; the predators are its
-heuristic predators. Experiments 1 to 6 in turn, each beginning with the populations of the one
-before, are ``conevo shape-prey``.
+heuristic predators. ``conevo shape-prey`` runs experiments 1 to 6 in turn, each from the
+populations of the previous one.
 
-Choice: a predator that runs into a prey is refused like any move; that is no collision of the prey.
+Choice: the move of a predator into a prey is refused like any other; it is not a collision of the
+prey.
 
 Version history:
 
 - v1: first version.
-- v2: sine, cosine and arc tangent of kernels are the same bits on every device; scenarios are drawn
-  from other random numbers, those of all keys at once.
+- v2: sine, cosine and arc tangent of kernels are equal bit for bit on every device; scenarios are
+  drawn from other random numbers, those of all keys at once.
 """
 
 from collections.abc import Sequence
@@ -49,7 +50,7 @@ __all__ = ["PreyParams", "PreyWorld"]
 
 @parameters("world")
 class PreyParams(ArenaParams):
-    """Parameters of the world, beside those of the arena."""
+    """Parameters of the world, in addition to those of the arena."""
 
     least: Annotated[int, Ge(0), Le(6)] = 2
     """fewest obstacles, and fewest predators, of an epoch (section 4.3)."""

@@ -35,7 +35,7 @@ class PreySet:
 
     Attributes:
         one: [1, U, G] float32, the prey that evolved alone.
-        one_active: [1, U] bool, whether a slot holds a neuron.
+        one_active: [1, U] bool, whether a slot contains a neuron.
         two: [2, U, G] float32, the two that evolved together.
         two_active: [2, U] bool.
         about: the command, seed and versions that made them.
@@ -49,7 +49,7 @@ class PreySet:
 
     @property
     def digest(self) -> str:
-        """Twelve hex digits of the networks, whatever the file says about their making."""
+        """Twelve hex digits that identify the networks, whatever command made them."""
         found = hashlib.blake2b(digest_size=6)
         for array in (self.one, self.one_active, self.two, self.two_active):
             found.update(f"{array.dtype.str} {array.shape}".encode())
@@ -95,7 +95,7 @@ def save(path: Path, prey: PreySet) -> None:
 
 
 def load(path: str | Path | None = None) -> PreySet:
-    """Return a prey set, by default the one that is shipped.
+    """Return a prey set, by default the shipped one.
 
     Raises:
         UsageError: the file cannot be read, or is not a prey set.
@@ -113,7 +113,7 @@ def load(path: str | Path | None = None) -> PreySet:
                 raise ValueError("wrong content")
             if not (np.abs(genes) <= 1).all():
                 raise ValueError("genes outside [-1, 1]")
-    except Exception as error:  # whatever a damaged file makes its readers say
+    except Exception as error:  # a damaged file may make its readers raise anything
         raise UsageError(f"{path} is damaged or not a prey set ({error})") from error
     return prey
 

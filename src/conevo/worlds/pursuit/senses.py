@@ -1,7 +1,7 @@
-"""What predators and prey see (Nitschke 2009, section 4.1), looked at again where it has changed.
+"""Sensors of predators and prey (Nitschke 2009, section 4.1), updated where views have changed.
 
-On one lane an item is a body, whose eight sensors are computed at once; where lanes share the
-items, one is a single sensor. The nearest thing in a cone is a minimum, so no order matters.
+On one lane an item is a body, whose eight sensors are computed at once. With several lanes an item
+is a single sensor. The nearest thing in a cone is a minimum, so the order does not matter.
 """
 
 from typing import Any
@@ -25,7 +25,7 @@ __all__ = ["SENSE", "bodies"]
 
 @wp.func
 def bodies(team: PursuitTeam, scene: PursuitScene, p: PursuitConstants) -> int:
-    """Return how many bodies there are."""
+    """Return the number of bodies."""
     return scene.n_bodies[0]
 
 
@@ -68,7 +68,7 @@ def survey(team: PursuitTeam, scene: PursuitScene, p: PursuitConstants, b: int, 
 
 
 def sight_of(width: int) -> Any:
-    """Return the function that looks with ``width`` of a body's sensors, from number ``first``."""
+    """Return the function for ``width`` of a body's sensors, from number ``first`` on."""
     gaps = wp.types.vector(length=width, dtype=float)
 
     @wp.func
@@ -150,7 +150,7 @@ def glances(team: PursuitTeam, scene: PursuitScene, p: PursuitConstants) -> int:
 def look(team: PursuitTeam, scene: PursuitScene, p: PursuitConstants, q: int, t: int) -> None:
     """Fill the sensor inputs of a robot, or of a prey that is not the team; or one of each kind.
 
-    Infrared sees walls, obstacles and bodies; light sees prey, over the heads of others.
+    Infrared senses walls, obstacles and bodies; light senses prey, also behind other bodies.
     """
     b = q
     if n_lanes() > 1:

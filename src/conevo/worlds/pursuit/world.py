@@ -1,10 +1,10 @@
-"""Pursuit-evasion: Khepera predators capture prey that are faster than they are.
+"""Pursuit-evasion: Khepera predators capture faster prey.
 
 =============  =========================================================================
 name           ``pursuit-v2``
 source         Nitschke 2009, chapter 4, appendix B
 environments   ``team-1..10`` (table 4.2): 2, 3, 4, 5, 6 predators and one prey, then two
-robots         2 to 6 predators; the prey are opponents with controllers of their own
+robots         2 to 6 predators; the prey are opponents with their own controllers
 epoch          1000 iterations of 0.1 s
 sensors        8 infrared (everything), 8 light (prey only)
 actions        stop, forward, left, right, reverse: motor primitives, see below
@@ -15,30 +15,30 @@ performance    ``capture_time`` in iterations; ``first_capture``, its iteration 
 =============  =========================================================================
 
 **Capture.** A prey is captured in an iteration if it is immobilized and at least two predators are
-within light range of it. It is immobilized if it moved less than a tenth of what its wheels
-commanded over the last ten iterations, or less than 0.2 cm. The fitness of every predator is the
-number of iterations in which a prey is captured (section 4.4).
+within light range of it. It is immobilized if, over the last ten iterations, it moved less than a
+tenth of the distance that its wheels commanded, or less than 0.2 cm. The fitness of every predator
+is the number of iterations in which a prey is captured (section 4.4).
 
-**One iteration.** Every body senses, thinks and sets its wheels where all were at the end of the
-iteration before; then all move along exact arcs. A move into a wall, an obstacle or another body is
-refused: the old pose is kept.
+**One iteration.** Every body senses the world as it was at the end of the previous iteration,
+thinks and sets its wheels. Then all move along exact arcs. A move into a wall, an obstacle or
+another body is refused: the old pose is kept.
 
 Choices, all declared in ``PursuitParams``, ``ArenaParams`` or here:
 
 - Choice: with two prey, capture time counts iterations in which at least one is captured.
-- Choice: "moved" and "commanded" are lengths of way, not distances between places: a prey that runs
-  in a tight circle is not immobilized, one that is refused every move is. Nothing is captured
-  before a whole window has passed.
-- Choice: within light range means that the gap between the rims is at most the range, whichever way
-  the predator looks.
+- Choice: "moved" and "commanded" are lengths of paths, not distances between places: a prey that
+  runs in a tight circle is not immobilized, but a prey whose moves are all refused is. Captures are
+  possible only after a whole window.
+- Choice: within light range means that the gap between the rims is at most the range, in whichever
+  direction the predator looks.
 - Choice: MO-0 is the left wheel, MO-1 the right.
 
 Version history:
 
 - v1: first version.
-- v2: sine, cosine and arc tangent of kernels are the same bits on every device; the ways of a prey
-  are summed up in integers; scenarios are drawn from other random numbers, those of all keys at
-  once.
+- v2: sine, cosine and arc tangent of kernels are equal bit for bit on every device; the path
+  lengths of a prey are summed up in integers; scenarios are drawn from other random numbers, those
+  of all keys at once.
 """
 
 from collections.abc import Sequence
@@ -66,11 +66,11 @@ PREY_MODES = {"shaped": 0, "heuristic": 1, "random": 2}  # a file's prey are con
 
 @parameters("world")
 class PursuitParams(ArenaParams):
-    """Parameters of the world, beside those of the arena."""
+    """Parameters of the world, in addition to those of the arena."""
 
     prey: str = "shaped"
-    """who they are: "shaped" (the evolved prey that are shipped), "heuristic", "random", or a file
-    that ``conevo shape-prey`` made."""
+    """controllers of the prey: "shaped" (the shipped, evolved ones), "heuristic", "random", or a
+    file made by ``conevo shape-prey``."""
     prey_digest: str = ""
     """digest of a prey file; a run fills it in and checks it."""
     n_obstacles: Annotated[int, Ge(0), Le(6)] = 0
@@ -79,9 +79,9 @@ class PursuitParams(ArenaParams):
     """where predators start: anywhere, or each in its own sector around the middle of the arena,
     all of the same area; prey start anywhere."""
     capture_window: Annotated[int, Ge(1), Le(1000)] = 10
-    """(iterations) over which a captured prey has hardly moved. Choice: 10, one second."""
+    """(iterations) time over which a captured prey has hardly moved. Choice: 10, one second."""
     capture_share: Annotated[float, Ge(0), Le(1)] = 0.1
-    """it moved less than this share of what its wheels commanded. Choice: a tenth."""
+    """it moved less than this share of the distance that its wheels commanded. Choice: a tenth."""
     capture_distance_cm: Annotated[float, Ge(0), Le(100)] = 0.2
     """(cm) or it moved less than this. Choice: 0.2."""
     capture_predators: Annotated[int, Ge(1), Le(6)] = 2
@@ -182,7 +182,7 @@ class PursuitWorld:
         )
 
     def _prey_weights(self) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]:
-        """Return the weights of the prey's networks, of no hidden units if they have none."""
+        """Return the weights of the prey's networks, without hidden units if they have none."""
         if PREY_MODES.get(self.params.prey, 0) != 0:
             return np.zeros((0, 8), dtype=np.float32), np.zeros((0, 2), dtype=np.float32)
         found = prey_sets.load(None if self.params.prey == "shaped" else self.params.prey)

@@ -1,4 +1,4 @@
-"""What rovers do: they choose an action and propose a place, then all proposals are settled."""
+"""Actions of rovers: each chooses one and proposes a place, then all proposals are settled."""
 
 import warp as wp
 
@@ -27,7 +27,7 @@ HEURISTIC = wp.constant(2**20 - 4)  # counters above every rock's, for heuristic
 
 @wp.func
 def act(team: RoverTeam, scene: RoverScene, p: RoverConstants, i: int, t: int) -> None:
-    """Choose rover ``i``'s action from its outputs (section 5.2) and propose where it will be.
+    """Choose rover ``i``'s action from its outputs (section 5.2) and propose its next place.
 
     A heuristic rover draws its action from table 5.3 and, if it moves, a random direction.
     """
@@ -66,7 +66,7 @@ def act(team: RoverTeam, scene: RoverScene, p: RoverConstants, i: int, t: int) -
 def is_refused(
     team: RoverTeam, scene: RoverScene, p: RoverConstants, i: int, x: float, y: float
 ) -> bool:
-    """Return whether rover ``i`` may not move to a place: edge, canal, or another rover there."""
+    """Return whether rover ``i`` may not move to a place: edge, canal or another rover."""
     if x < 0.0 or x >= 1.0 or y < 0.0 or y >= 1.0:
         return True
     n = float(CANAL_CELLS)
@@ -128,6 +128,6 @@ def commit(team: RoverTeam, scene: RoverScene, p: RoverConstants, i: int, t: int
 
 @wp.func
 def fail(team: RoverTeam, scene: RoverScene, p: RoverConstants, i: int, t: int) -> None:
-    """Let rover ``i`` have no energy any more if it fails."""
+    """If rover ``i`` fails, set its energy to 0."""
     if fails(scene.seed[0], p, i, t):
         team.energy[i] = wp.min(team.energy[i], 0.0)

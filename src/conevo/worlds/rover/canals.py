@@ -1,19 +1,20 @@
 """Red rock canals: ten pre-drawn layouts from joined meanders (1) to scattered pieces (10).
 
-Nitschke 2009, section 5.1.4 and figures 5.1-5.5: canals hold the red rocks, rovers cannot enter
+Nitschke 2009, section 5.1.4 and figures 5.1-5.5: canals contain the red rocks, rovers cannot enter
 them, and ten environments range from "a high degree of structure" (joined, canal-like) to "a low
 degree of structure" (disjoint pieces, generally not canal-like). The figures are lost.
 
 Choice: a layout is a raster of 200 x 200 cells of side 0.005 over the unit square. A canal cell is
 impassable and the site of at most one rock, at its centre. A canal is a brush of six cells (0.03)
 drawn along a sine-generated curve, the classic shape of a river meander (Langbein and Leopold
-1966). With falling structure the same area (5500 cells, 13.75 %) is cut into more pieces of
-shorter, straighter strokes. Every layout keeps these promises (tests/worlds/test_canals.py):
+1966). With less structure the same area (5500 cells, 13.75 %) is cut into more pieces of shorter,
+straighter strokes. Every layout has these properties (tests/worlds/test_canals.py):
 
-* 5000 to 6000 canal cells, so that the 5000 rocks of a simple environment find a site each;
+* 5000 to 6000 canal cells, so that each of the 5000 rocks of a simple environment has a site;
 * no canal cell is further than 4.5 cells from a free cell (width at most 0.04), so that the
   shortest sensor range, 0.03, reaches the middle of every canal;
-* every canal cell lies in a canal block of 4 x 4 cells (0.02), so that no step of 0.01 jumps over;
+* every canal cell lies in a canal block of 4 x 4 cells (0.02), so that no step of 0.01 jumps over
+  it;
 * the free cells are connected (4 neighbours) and a margin of 8 cells along the border is free, so
   that no rover is walled in.
 
@@ -63,7 +64,7 @@ def load(environment: int) -> BoolArray:
         floor(x / 0.005).
 
     Raises:
-        UsageError: there is no such layout.
+        UsageError: no layout has this number.
     """
     _check(environment)
     with np.load(_DATA, allow_pickle=False) as data:
@@ -85,7 +86,7 @@ def sites(mask: BoolArray) -> npt.NDArray[np.float32]:
 
 
 def generate(environment: int) -> BoolArray:
-    """Draw one layout from scratch; deterministic, equal to what ``load`` returns.
+    """Draw one layout from scratch; deterministic, equal to that of ``load``.
 
     Args:
         environment: number of the layout, 1 to 10.
@@ -121,9 +122,9 @@ class _Drawing:
         self.others: FloatArray = np.empty((0, 2))  # points of all finished pieces, in cells
 
     def finish(self) -> bool:
-        """Draw all pieces; False if the drawing must be thrown away.
+        """Draw all pieces; return False if the drawing must be discarded.
 
-        That is if a piece found no room, a quarter stays nearly empty or a free cell is walled in.
+        Reasons are a piece without room, a nearly empty quarter or an enclosed free cell.
         """
         for left in range(self.n_pieces, 0, -1):
             goal = int(self.mask.sum()) + (_AREA - int(self.mask.sum())) // left
@@ -134,11 +135,11 @@ class _Drawing:
         return bool(quarters.min() >= _QUARTER * quarters.sum()) and _connected(~self.mask)
 
     def _piece(self, goal: int) -> bool:
-        """Draw strokes until ``goal`` cells are canal: the first somewhere, the others joined."""
+        """Draw strokes until ``goal`` cells are canal: the first anywhere, the others joined."""
         piece: FloatArray = np.empty((0, 3))  # x, y, heading
         for _ in range(400):
             missing = (goal - int(self.mask.sum())) / _WIDTH
-            if missing <= 0.15 * self.longest:  # the pieces to come get the rest
+            if missing <= 0.15 * self.longest:  # the next pieces get the rest
                 self.others = np.concatenate([self.others, piece[:, :2]])
                 return True
             stroke = self._stroke(piece, missing)
@@ -183,7 +184,7 @@ class _Drawing:
         swing = (0.3 + 0.9 * self.structure) * (0.8 + 0.4 * self.random())  # rad
         period = 55.0 + 25.0 * self.random()  # cells of arc
         side = 1.0 if self.random() < 0.5 else -1.0
-        # A joined stroke leaves squarely, a free one begins anywhere on the wave.
+        # A joined stroke starts at a right angle, a free one anywhere on the wave.
         phase = 0.0 if len(piece) else 2 * math.pi * self.random()
         drift = (self.random() - 0.5) * 0.012
         piece = piece[((piece - start) ** 2).sum(axis=1) > (_CLEAR + 3) ** 2]
@@ -219,7 +220,7 @@ def _brush(mask: BoolArray, stroke: FloatArray) -> None:
 
 
 def _deep(mask: BoolArray) -> bool:
-    """Whether some canal cell is further than _REACH from every free cell (margin is free)."""
+    """Return whether a canal cell is further than _REACH from every free cell (margin is free)."""
     reach = int(_REACH)
     free = np.zeros_like(mask)
     for dy in range(-reach, reach + 1):
@@ -230,7 +231,7 @@ def _deep(mask: BoolArray) -> bool:
 
 
 def _connected(free: BoolArray) -> bool:
-    """Whether all free cells hang together by their sides; cell [0, 0] must be free."""
+    """Return whether all free cells are connected by their sides; cell [0, 0] must be free."""
     found = np.zeros_like(free)
     found[0, 0] = True
     size = 0

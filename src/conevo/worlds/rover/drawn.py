@@ -1,4 +1,4 @@
-"""The playback of the multi-rover world: canals, red rocks, rovers, and what they detect."""
+"""The playback of the multi-rover world: canals, red rocks, rovers, and their detections."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ __all__ = ["CASTES", "playback"]
 ACTIONS = {"low": YELLOW, "med": SKY, "hi": BLUE, "move": MOVE}
 CASTES = ACTIONS
 OUTPUTS = ("low", "med", "hi", "move: dx", "move: dy")
-# Choice: all rocks are red, as they are called, and the darker the more they are worth; type E,
-# which is never with others, looks like A, which is worth the same.
+# Choice: all rocks are red, like their name, and darker the more they are worth. Type E, which is
+# never with others, looks like A, which is worth the same.
 ROCKS = ("#eb9b80", "#d2613d", "#9c2f17", "#521107", "#eb9b80")
 CANAL = "#dde5ea"
-RADIUS = 0.009  # Choice: a rover is a point in its world, and drawn this large
+RADIUS = 0.009  # Choice: a rover is a point in its world, and drawn in this size
 ROCK = 0.002  # half a side; sites are 0.005 apart
 LANDER = 0.012  # Choice: radius; the lander only records
 
@@ -43,7 +43,7 @@ def playback(parts: Parts) -> Playback:
         x=parts.channel("x", t, r),
         y=parts.channel("y", t, r),
         energy=parts.channel("energy", t, r),
-        # Choice: a rock sensor reaches as far as the setting in use; drawn as far as the largest.
+        # Choice: rock sensors have the range of the setting in use, and are drawn with the largest.
         sensor_groups=(octants("rovers", 0, near), octants("red rocks", 8, max(ranges))),
         backdrop=_backdrop(parts),
         things=(_rocks(parts),),
@@ -58,7 +58,7 @@ def playback(parts: Parts) -> Playback:
 
 
 def _radius(parts: Parts, name: str) -> float:
-    """Return how far something reaches."""
+    """Return the radius of a range."""
     found = parts.param(f"{name}_range")
     is_area = parts.about["params"].get("range_is") == "area"
     return math.sqrt(found / math.pi) if is_area else found
@@ -95,7 +95,7 @@ def _area(parts: Parts) -> Curve:
 
 
 def _value(parts: Parts) -> Curve:
-    """Return the value that the lander has recorded: an iteration after each detection."""
+    """Return the value that the lander has recorded, one iteration after each detection."""
     gone = parts.whole("detected", -1)
     value = parts.whole("scene/rock_value", len(gone))
     seen = gone < parts.t
@@ -104,7 +104,7 @@ def _value(parts: Parts) -> Curve:
 
 
 def _detections(parts: Parts) -> tuple[Event, ...]:
-    """Return an event for every iteration in which rocks are detected, with who is paid."""
+    """Return an event for every iteration with detected rocks, with the credited rovers."""
     gone = parts.whole("detected", -1)
     kind = parts.whole("scene/rock_type", len(gone))
     value = parts.whole("value", parts.t, parts.r)

@@ -1,7 +1,7 @@
-"""The dynamics of the multi-rover world: how an epoch begins and ends, and its phases in turn.
+"""The dynamics of the multi-rover world: start and end of an epoch, and the list of its phases.
 
-The phases are in ``sense``, ``act`` and ``resolve``; the rules and the choices stand on the card of
-``worlds.rover.world``. Sums over rocks and cells are integers, so neither lanes nor their order
+The phases are in ``sense``, ``act`` and ``resolve``. The card of ``worlds.rover.world`` lists the
+rules and the choices. Sums over rocks and cells are integers, so neither lanes nor their order
 change a bit.
 
 Hot loops over a number known only at run time are written with ``while``: Warp keeps the iterator
@@ -50,7 +50,7 @@ SCRATCH = ("scanning", "covering", "detecting")
 
 @wp.func
 def begin(team: RoverTeam, scene: RoverScene, p: RoverConstants, i: int, t: int) -> None:
-    """Put rover ``i`` at its start and clear its share of what is recorded and kept."""
+    """Put rover ``i`` at its start and clear its share of the recorded and kept arrays."""
     team.x[i] = scene.start_x[i]
     team.y[i] = scene.start_y[i]
     team.setting[i] = 0
@@ -83,7 +83,7 @@ def all_lanes(team: RoverTeam, scene: RoverScene, p: RoverConstants) -> int:
 
 @wp.func
 def hide_rocks(team: RoverTeam, scene: RoverScene, p: RoverConstants, q: int, t: int) -> None:
-    """Let a lane's share of the rocks be undetected."""
+    """Mark a lane's share of the rocks as undetected."""
     k = int(q)
     while k < team.detected.shape[0]:
         team.detected[k] = UNDETECTED
@@ -92,7 +92,7 @@ def hide_rocks(team: RoverTeam, scene: RoverScene, p: RoverConstants, q: int, t:
 
 @wp.func
 def clear_total(team: RoverTeam, scene: RoverScene, p: RoverConstants, q: int, t: int) -> None:
-    """Begin to add up the team's task performance."""
+    """Set the sums of the team's task performance to 0."""
     team.total[0] = 0
     team.total[1] = 0
 
@@ -117,7 +117,7 @@ def add_up(team: RoverTeam, scene: RoverScene, p: RoverConstants, q: int, t_end:
 
 @wp.func
 def report(team: RoverTeam, scene: RoverScene, p: RoverConstants, i: int, t_end: int) -> None:
-    """Write the team's task performance: value the lander has recorded, share of area covered."""
+    """Write the team's task performance: value recorded by the lander, share of area covered."""
     cells = float(COVER_CELLS * COVER_CELLS)
     if i == 0:
         team.performance[0] = float(team.total[0])

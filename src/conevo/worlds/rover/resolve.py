@@ -1,4 +1,4 @@
-"""What comes of a detection: the area that it covers, and rocks that two rovers detect together."""
+"""Results of a detection: the area that it covers, and rocks that two rovers detect together."""
 
 import warp as wp
 
@@ -28,14 +28,14 @@ from conevo.worlds.rover.state import (
 
 __all__ = ["RESOLVE", "RESOLVE_ONE_ROCK", "forget"]
 
-ORDER = wp.constant(64)  # above every rover's number: of the order in which rocks are taken
+ORDER = wp.constant(64)  # counter for the order of taking rocks, above every rover's number
 ROCK_BITS = wp.constant(wp.int64(20))
 DRAWS = wp.constant(2.0**24)  # different numbers that ``uniform`` returns
 
 
 @wp.func
 def partner(rock_type: int, setting: int) -> int:
-    """Return the setting a second rover needs to detect such a rock with this one, or NONE."""
+    """Return the setting that a second rover needs to detect such a rock with this one, or NONE."""
     if rock_type == 4:
         return setting
     if rock_type == setting or rock_type == setting + 1:
@@ -45,10 +45,10 @@ def partner(rock_type: int, setting: int) -> int:
 
 @wp.func
 def enlist(team: RoverTeam, scene: RoverScene, p: RoverConstants, i: int, t: int) -> None:
-    """List rover ``i`` if it covers new cells, and if it may detect a rock with another.
+    """List rover ``i`` if it covers new cells, or if it may detect a rock with another one.
 
-    Two that found no rock for their settings, or no cells that both reach, need not try again until
-    one of them has moved or the other has another setting.
+    Two rovers without a rock for their settings, or without common cells, need not try again until
+    one of them has moved or the other has a new setting.
     """
     changed = team.changed[0]
     if (changed & team.company[i]) != wp.uint64(0):
@@ -80,7 +80,7 @@ def enlist(team: RoverTeam, scene: RoverScene, p: RoverConstants, i: int, t: int
 def in_reach(
     team: RoverTeam, p: RoverConstants, i: int, a: int, r: float, others: wp.uint64
 ) -> wp.uint64:
-    """Return the others whose detection overlaps rover ``i``'s; keep where, and who are too far."""
+    """Return the rovers whose detection overlaps rover ``i``'s; keep the cells, and the others."""
     x = team.x[i]
     y = team.y[i]
     left = float(2.0)
@@ -121,7 +121,7 @@ def n_detecting(team: RoverTeam, scene: RoverScene, p: RoverConstants) -> int:
 
 @wp.func
 def detect(team: RoverTeam, scene: RoverScene, p: RoverConstants, q: int, t: int) -> None:
-    """Do a part of what a listed rover covers, or of what it detects."""
+    """Do a part of a listed rover's coverage, or of its detection."""
     at = int(q)
     part = int(0)
     if n_parts() > 1:
@@ -141,10 +141,10 @@ def detect(team: RoverTeam, scene: RoverScene, p: RoverConstants, q: int, t: int
 
 @wp.func
 def pair(team: RoverTeam, scene: RoverScene, p: RoverConstants, i: int, part: int, t: int) -> None:
-    """Find the rocks that rover ``i`` detects with a mate, and what it gains.
+    """Find the rocks that rover ``i`` detects with a mate, and its gain.
 
-    Both rovers of a pair find the detection by themselves; ``detected[k]`` becomes t, whoever is
-    first.
+    Both rovers of a pair find the detection independently; ``detected[k]`` becomes t for either
+    order.
     """
     rows = int(1)
     subs = int(1)
@@ -212,7 +212,7 @@ def succeed(
     k: int,
     t: int,
 ) -> bool:
-    """Return whether rover ``i`` succeeds on rock ``k``, and one of the mates too."""
+    """Return whether both rover ``i`` and one of the mates succeed on rock ``k``."""
     if uniform(scene.seed[0], t, k, i) >= of_setting(p.accuracy, a):
         return False
     rest = mates
@@ -227,10 +227,10 @@ def succeed(
 def gain(
     team: RoverTeam, scene: RoverScene, p: RoverConstants, i: int, k: int, d2: float, t: int
 ) -> None:
-    """Let rover ``i`` have detected rock ``k``; the first to say so takes it off all that is kept.
+    """Record that rover ``i`` detects rock ``k``; the first call takes the rock off all kept sums.
 
-    Choice: the sum of value d_min^2 / d^2 over what a rover detects in an iteration is in integers,
-    each rock cut to 2^-32.
+    Choice: the sum of value d_min^2 / d^2 over the rocks that a rover detects in an iteration is in
+    integers, each rock cut to 2^-32.
     """
     value = scene.rock_value[k]
     wp.atomic_add(team.gain, i, int(value))
@@ -248,7 +248,7 @@ def n_crediting(team: RoverTeam, scene: RoverScene, p: RoverConstants) -> int:
 
 @wp.func
 def credit(team: RoverTeam, scene: RoverScene, p: RoverConstants, q: int, t: int) -> None:
-    """Credit a listed rover with what it has detected, and let it pay for the report."""
+    """Credit a listed rover with its detections, and charge it for the report."""
     i = team.detecting[q]
     at = i * N_SETTINGS + team.action[i]
     team.barren[at] = team.barren[at] | (team.mates[i] & ~team.hopeful[i])
@@ -266,15 +266,15 @@ def credit(team: RoverTeam, scene: RoverScene, p: RoverConstants, q: int, t: int
 
 @wp.func
 def forget(team: RoverTeam, scene: RoverScene, p: RoverConstants, i: int, t: int) -> None:
-    """Let rover ``i`` take no rock yet."""
+    """Reset the rock that rover ``i`` takes."""
     team.pick[i] = NO_PICK
 
 
 @wp.func
 def prefer(team: RoverTeam, scene: RoverScene, i: int, k: int, t: int) -> None:
-    """Let rover ``i``, which can detect rock ``k``, take it if it comes before its others.
+    """Make rover ``i`` take rock ``k``, which it can detect, if it comes before its other rocks.
 
-    Choice: the order in which rocks are taken is drawn for each iteration, one for all rovers.
+    Choice: the order in which rocks are taken is drawn for each iteration, the same for all rovers.
     """
     rank = wp.int64(uniform(scene.seed[0], t, k, ORDER) * DRAWS)
     wp.atomic_min(team.pick, i, (rank << ROCK_BITS) | wp.int64(k))
@@ -282,7 +282,7 @@ def prefer(team: RoverTeam, scene: RoverScene, i: int, k: int, t: int) -> None:
 
 @wp.func
 def take(team: RoverTeam, scene: RoverScene, p: RoverConstants, q: int, t: int) -> None:
-    """Let a listed rover detect the rock that it takes if a fitting mate takes the same."""
+    """Detect the rock that a listed rover takes, if a fitting mate takes the same one."""
     i = team.detecting[q]
     pick = team.pick[i]
     if pick == NO_PICK:
@@ -301,7 +301,7 @@ def take(team: RoverTeam, scene: RoverScene, p: RoverConstants, q: int, t: int) 
 
 @wp.func
 def credit_one(team: RoverTeam, scene: RoverScene, p: RoverConstants, q: int, t: int) -> None:
-    """Credit a listed rover, and let it choose anew."""
+    """Credit a listed rover, and reset its choice of a rock."""
     credit(team, scene, p, q, t)
     team.pick[team.detecting[q]] = NO_PICK
 

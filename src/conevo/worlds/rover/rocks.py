@@ -1,12 +1,12 @@
-"""Red rocks: what the five types are worth, and how many of each the 40 environments hold.
+"""Red rocks: the values of the five types, and the number of each in the 40 environments.
 
 Nitschke 2009, sections 5.1, 5.4 and table 5.1. The total red rock value of every environment is
-5000 (table 5.4); a simple environment holds only type E, a complex one types A to D. The counts of
-table 5.6 are lost.
+5000 (table 5.4). A simple environment contains only type E, a complex one types A to D. The counts
+of table 5.6 are lost.
 
-``simple-e`` and ``complex-e`` use canal layout e; all extended environments use layout 10, the
-least structured (they vary what is there, not where). Choice: the ten extended mixes, derived from
-500 of each type A to D, whole rocks, value exactly 5000:
+``simple-e`` and ``complex-e`` use canal layout e. All extended environments use layout 10, the
+least structured: they vary types, not places. Choice: the ten extended mixes, derived from 500 of
+each type A to D, whole rocks, value exactly 5000:
 
 ============  ====================================  ====  ====  ====  ====
 environment   rule                                     A     B     C     D
@@ -23,8 +23,8 @@ extended-9    no D, the others equal                 833   834   833     0
 extended-10   A and D only, equal                   1000     0     0  1000
 ============  ====================================  ====  ====  ====  ====
 
-Choice: ``apart-e`` is not in the thesis. It has the rocks and canals of ``complex-e`` and defaults
-of its own, ``APART``, with which a division of labour pays.
+Choice: ``apart-e`` is not in the thesis. It has the rocks and canals of ``complex-e`` and its own
+defaults, ``APART``, with which a division of labour pays.
 """
 
 from __future__ import annotations
@@ -72,8 +72,8 @@ _TABLE = (
 
 ENVIRONMENTS = tuple(_TABLE)
 
-# With these settings teams of castes by place pass teams that do everything, before anybody evolves
-# (docs/results/calibration.md); what evolved teams gain there is docs/results/specialists.md.
+# With these settings teams of castes by place surpass teams of generalists, without any evolution
+# (docs/results/calibration.md). The gains of evolved teams are in docs/results/specialists.md.
 APART: dict[str, Any] = {
     "segregation": 1.0,  # each type has a place: where types are mixed, switchers gain more
     "starts": "by_robot",  # a population has a place to learn for: from random starts, none
@@ -89,10 +89,10 @@ DEFAULTS = {name: APART for name in ENVIRONMENTS if name.startswith("apart-")}
 
 
 def mix(environment: str) -> Mix:
-    """Return how many rocks of types A to E an environment holds (total value 5000).
+    """Return the number of rocks of each type A to E in an environment (total value 5000).
 
     Raises:
-        UsageError: there is no such environment.
+        UsageError: the environment is unknown.
     """
     return _look_up(environment)[1]
 
@@ -101,7 +101,7 @@ def layout(environment: str) -> int:
     """Return the number of an environment's canal layout, 1 to 10.
 
     Raises:
-        UsageError: there is no such environment.
+        UsageError: the environment is unknown.
     """
     return _look_up(environment)[0]
 

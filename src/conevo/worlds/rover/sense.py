@@ -1,7 +1,7 @@
-"""What rovers sense: the closest rover and the red rocks in each octant.
+"""Sensors of rovers: the closest rover and the red rocks in each octant.
 
-What nothing has changed is not looked at again: a rover's sums over rocks, one for each setting,
-are kept until it moves; a rock that is detected is taken off them.
+Only changes are computed: a rover's sums over rocks, one for each setting, are kept until it moves,
+and a detected rock is taken off them.
 """
 
 import warp as wp
@@ -32,7 +32,7 @@ from conevo.worlds.rover.state import (
 __all__ = ["ROWS", "SENSE", "SUBS", "share", "take_off"]
 
 N_SENSORS = wp.constant(8)  # of each kind, one for every octant
-SUBS = wp.constant(4)  # rocks of a row that lanes look at side by side
+SUBS = wp.constant(4)  # rocks of a row that lanes process in parallel
 ROWS = wp.constant(int(PARTS) // 4)
 
 
@@ -70,7 +70,7 @@ def look(team: RoverTeam, scene: RoverScene, p: RoverConstants, i: int, t: int) 
 
 @wp.func
 def survey(team: RoverTeam, p: RoverConstants, i: int) -> None:
-    """Find who may come near rover ``i`` before the next survey."""
+    """Find the rovers that may come near rover ``i`` before the next survey."""
     x = team.x[i]
     y = team.y[i]
     crowd = wp.uint64(0)
@@ -132,7 +132,7 @@ def n_scanning(team: RoverTeam, scene: RoverScene, p: RoverConstants) -> int:
 
 @wp.func
 def scan(team: RoverTeam, scene: RoverScene, p: RoverConstants, q: int, t: int) -> None:
-    """Add up what a listed rover's rock sensors see, or one of ``PARTS`` of it (eq. 5.2).
+    """Add up the readings of a listed rover's rock sensors, or one of ``PARTS`` of them (eq. 5.2).
 
     Choice: a rock adds value d_min^2 / d^2, rounded to 2^-16, so that rocks may be added up in any
     order; d is at least d_min.
@@ -190,7 +190,7 @@ def n_reading(team: RoverTeam, scene: RoverScene, p: RoverConstants) -> int:
 
 @wp.func
 def read(team: RoverTeam, scene: RoverScene, p: RoverConstants, q: int, t: int) -> None:
-    """Fill one rock sensor of a rover that has scanned; all at once on one lane."""
+    """Fill one rock sensor of a rover that has scanned; a single lane fills all at once."""
     if n_lanes() == 1:
         i = team.scanning[q]
         for o in range(N_SENSORS):
@@ -204,13 +204,13 @@ def read(team: RoverTeam, scene: RoverScene, p: RoverConstants, q: int, t: int) 
 
 @wp.func
 def row_of(i: int, a: int) -> int:
-    """Return where what rover ``i`` sees with a setting begins in ``rocks``."""
+    """Return the index in ``rocks`` of rover ``i``'s first sum with a setting."""
     return (i * N_SETTINGS + a) * N_SENSORS
 
 
 @wp.func
 def show(team: RoverTeam, i: int, a: int, o: int) -> None:
-    """Let rover ``i``'s rock sensor of an octant read what is kept for a setting.
+    """Set rover ``i``'s rock sensor of an octant from the kept sum of a setting.
 
     Choice: it reads z / (1 + z), with z the sum over the undetected rocks in its octant.
     """
@@ -220,7 +220,7 @@ def show(team: RoverTeam, i: int, a: int, o: int) -> None:
 
 @wp.func
 def take_off(team: RoverTeam, scene: RoverScene, p: RoverConstants, i: int, k: int) -> None:
-    """Take rock ``k``, which rover ``i`` has detected, off what is kept of it."""
+    """Take rock ``k``, which rover ``i`` has detected, off the kept sums."""
     rest = team.company[i] | one(i)
     while rest != wp.uint64(0):
         j = lowest(rest)

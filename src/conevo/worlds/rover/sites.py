@@ -1,9 +1,9 @@
-"""Which sites of a layout carry a rock, and of which type: for many scenarios at once.
+"""Random rocks at the sites of a layout, with their types, for many scenarios at once.
 
-Choice: the four regions that types and rovers may have hold as many sites each, but for those on
-the lines between them: a vertical line halves the sites of a layout, and a horizontal one each
-half. Region 0 is below on the left, 1 below on the right, 2 above on the left, 3 above on the
-right. A, B, C, D have 0, 1, 2, 3; E has none.
+Choice: the four regions for types and rovers have equal numbers of sites, except for sites on the
+lines between them: a vertical line halves the sites of a layout, and a horizontal one each half.
+Region 0 is at the lower left, 1 at the lower right, 2 at the upper left, 3 at the upper right. A,
+B, C, D have 0, 1, 2, 3; E has none.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from conevo.worlds.rover.state import ROCK_CELLS
 
 __all__ = ["N_REGIONS", "RockSites", "draw_rocks", "rock_sites"]
 
-AT_ONCE = 16  # scenarios: what is made of them stays in the processor's cache (measured)
+AT_ONCE = 16  # scenarios: their arrays fit into the processor's cache (measured)
 N_REGIONS = 4
 _TYPE = np.uint32(3)  # bits of a rock's type
 
@@ -30,10 +30,10 @@ Ints = npt.NDArray[np.intp]
 
 @dataclass(frozen=True)
 class RockSites:
-    """The S rock sites of a layout, sorted by the grid cell that they lie in.
+    """The S rock sites of a layout, sorted by grid cell.
 
     mask [rows, columns] canal raster; x, y [S] float32 in sides of the square; first [cells + 1]
-    the first site of each grid cell; cuts: where the regions end, the x of the vertical line and
+    the first site of each grid cell; cuts: the lines between regions, the x of the vertical one and
     the y of the horizontal ones left and right of it.
     """
 
@@ -82,9 +82,9 @@ def draw_rocks(
     """Return site and type of each rock, [E, K] by site, and the first rock of each grid cell.
 
     Every site has a random number. Those with the smallest carry rocks of the first type, those
-    with the next ones of the second, and so on. With segregation, that is done for the rocks of
-    each type that lie anywhere; then those that lie in their type's region get sites there that are
-    left over, by other random numbers.
+    with the next ones rocks of the second, and so on. With segregation, this applies to the rocks
+    of each type that lie anywhere. The rocks that lie in their type's region then get free sites
+    there, by other random numbers.
 
     Args:
         keys: [E] of the scenarios.
@@ -122,8 +122,8 @@ def _shuffled(
     n: int,
     is_taken: npt.NDArray[np.bool_] | None = None,
 ) -> Ints:
-    """Return some of n sites in random order for each key: those that are taken [E, n] last."""
-    bits = np.uint64(n.bit_length())  # of a site, which are the last of its random number
+    """Return some of n sites in random order for each key, with the taken ones [E, n] last."""
+    bits = np.uint64(n.bit_length())  # of a site: the last bits of its random number
     order = numbers(keys[:, None], draw, some, 0)
     if is_taken is not None:
         order[is_taken[:, some]] = np.uint64(2**64 - 1)

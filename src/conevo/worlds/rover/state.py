@@ -1,4 +1,4 @@
-"""What the kernels of the multi-rover world work on: constants, a scenario, a team's state."""
+"""Data of the kernels of the multi-rover world: constants, a scenario, a team's state."""
 
 from typing import Annotated
 
@@ -42,16 +42,16 @@ N_SETTINGS = wp.constant(3)
 MOVE = wp.constant(3)
 ROCK_CELLS = wp.constant(40)  # grid over the rocks; 0.025 wide, so a disc needs few cells
 CANAL_CELLS = wp.constant(canals.N_CELLS)
-OLD = wp.constant(-2)  # what rock sensors read is no longer true
+OLD = wp.constant(-2)  # the readings of rock sensors are outdated
 UNIT = wp.constant(2.0**16)  # sums of sensors are integers in 1 / UNIT: at most 5000 * UNIT
 
-# The lists of an iteration: who scans rocks, who covers cells, who may detect with another.
+# The lists of an iteration: rovers that scan rocks, cover cells, may detect with another one.
 LISTS = wp.constant(3)
 SCANNING = wp.constant(0)
 COVERING = wp.constant(1)
 DETECTING = wp.constant(2)
 
-# What a rover is credited with: ``RoverParams.fitness``, and where in it.
+# The values of ``RoverParams.fitness`` and their numbers.
 FITNESS = ("cumulative", "activation", "product", "value")
 ACTIVATION = wp.constant(1)
 PRODUCT = wp.constant(2)
@@ -59,14 +59,14 @@ VALUE = wp.constant(3)
 
 NO_PICK = wp.constant(wp.int64(2**62))
 
-# Every so many iterations each rover's company is looked up: who may be near until the next time.
+# Iterations between two surveys of each rover's company, those that may be near until the next one.
 SURVEYED = wp.constant(4)
-PARTS = wp.constant(32)  # that lanes cut a scan into: 8 rows x 4 rocks, or 32 rows of cells
+PARTS = wp.constant(32)  # of a scan for several lanes: 8 rows x 4 rocks, or 32 rows of cells
 
 
 @wp.struct
 class RoverConstants:
-    """What the kernels need of ``RoverParams``, by its names; ``NAME_2`` is a square.
+    """The fields of ``RoverParams`` for the kernels; ``NAME_2`` is a square.
 
     crowd_2, company_2: squared distance within which another rover may be sensed or be in the way,
     and within which its detection may overlap, before the next survey.
@@ -90,7 +90,7 @@ class RoverConstants:
     fitness_reading: int
     rocks_per_activation: int
     sensor_noise: float
-    signed_inputs: int  # the first of the inputs, those with a range of [-1, 1]
+    signed_inputs: int  # number of the first inputs, which have a range of [-1, 1]
     action_noise: float
     failure: float
     failure_at: int
@@ -138,14 +138,14 @@ class RoverTeam:
     performance: wp.array[float]  # value, area
     kept_inputs: Annotated[wp.array[float], "kept_inputs"]  # without noise
     kept_heuristic: Annotated[wp.array[int], "kept_robots"]  # while outputs are random
-    # What is kept.
-    changed: Annotated[wp.array[wp.uint64], "team"]  # who has moved or has another setting
-    acting: Annotated[wp.array[wp.uint64], "settings"]  # who activates with each setting
-    crowd: wp.array[wp.uint64]  # who may be sensed, or be in the way
-    company: wp.array[wp.uint64]  # whose detection may overlap
-    # for each setting of this rover who, as it is, can detect nothing with it from here
+    # Kept from one iteration to the next.
+    changed: Annotated[wp.array[wp.uint64], "team"]  # rovers that moved or have a new setting
+    acting: Annotated[wp.array[wp.uint64], "settings"]  # rovers that activate with each setting
+    crowd: wp.array[wp.uint64]  # rovers that may be sensed, or be in the way
+    company: wp.array[wp.uint64]  # rovers whose detection may overlap
+    # for each setting of this rover the rovers that, unless changed, detect nothing with it here
     barren: Annotated[wp.array[wp.uint64], "robots", "settings"]
-    mates: wp.array[wp.uint64]  # whose detection overlaps, with a setting that may fit
+    mates: wp.array[wp.uint64]  # rovers whose detection overlaps, with a setting that may fit
     hopeful: wp.array[wp.uint64]  # mates with whom a rock is left
     box: wp.array[int]  # first and last column and row of cells that a mate and this rover reach
     sees_rovers: wp.array[int]  # whether a rover sensor is not 0
@@ -153,7 +153,7 @@ class RoverTeam:
     rocks: Annotated[wp.array[int], "robots", "settings", "octants"]  # in 1 / UNIT
     shown: wp.array[int]  # setting whose ``rocks`` the rock sensors read, NONE for 0, or OLD
     closest: Annotated[wp.array[float], "robots", "octants"]  # squared distance of a rover
-    # What an iteration or the outcome adds up, in integers.
+    # Sums of an iteration or of the outcome, in integers.
     gain: wp.array[int]
     gain_near: wp.array[wp.int64]  # in 1 / UNIT^2
     # the rock that a rover takes, behind its rank, if it may detect one only
@@ -168,7 +168,7 @@ class RoverTeam:
 
 @wp.func
 def n_parts() -> int:
-    """Return how many items one scan is: a single one if one lane does all."""
+    """Return the number of items of one scan: 1 for a single lane."""
     return wp.where(n_lanes() == 1, 1, PARTS)
 
 
@@ -186,5 +186,5 @@ def is_activation(a: int) -> bool:
 
 @wp.func
 def of_setting(of: wp.vec3f, a: int) -> float:
-    """Return one of three numbers; no array is kept for it, as ``of[a]`` would."""
+    """Return one of three numbers, without the array in memory that ``of[a]`` needs."""
     return wp.where(a == 0, of[0], wp.where(a == 1, of[1], of[2]))

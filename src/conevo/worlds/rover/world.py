@@ -4,7 +4,7 @@
 name           ``rover-v2``
 source         Nitschke 2009, chapter 5
 environments   ``simple-1..10``, ``complex-1..10``, ``extended-1..10`` (section 5.1, appendix C);
-               ``apart-1..10``, which are ours
+               ``apart-1..10``, which are conevo's own
 robots         20 rovers, one lander that records what they report
 epoch          2500 iterations
 sensors        8 rover sensors, 8 red rock sensors, one of each for every octant
@@ -18,21 +18,21 @@ in range activate in the same iteration with the settings A low+low, B low+med, 
 E any equal pair, and both succeed, each with the accuracy of its setting (table 5.1).
 
 **One iteration.** Every rover senses, thinks and chooses; then all move; then all detect. A rover
-sees the world as it was at the end of the previous iteration, so the order of rovers is without
+senses the world as it was at the end of the previous iteration, so the order of rovers has no
 effect. Refused moves (canal, edge, another rover) cost the same as others.
 
 Choices, all declared in ``RoverParams`` or here, with their sensitivity on the page *Fidelity*:
 
-- Rocks stand at the centres of a 200 x 200 lattice inside the canals (``rover.canals``). Each
-  scenario draws which sites carry a rock, and of which type, the rovers' starts and the lander.
-  Types are drawn independently of place; with ``segregation`` each has a region (``rover.sites``),
-  and with ``starts = "by_robot"`` so has a rover.
+- Rocks lie at the centres of a 200 x 200 lattice inside the canals (``rover.canals``). Each
+  scenario draws the sites with a rock, its type, the rovers' starts and the lander. Types are drawn
+  independently of place. With ``segregation`` each type has a region (``rover.sites``), and with
+  ``starts = "by_robot"`` each rover has one, too.
 - If more than two rovers succeed on one rock in one iteration, all that belong to a valid pair are
-  credited; the team's value counts the rock once. So no order of rovers decides who is paid.
+  credited; the team's value counts the rock once. So credit does not depend on the order of rovers.
 - With ``rocks_per_activation`` 1, a rover that could detect several rocks, with any others, takes
   the one that comes first in an order drawn for the iteration, the same for all rovers; a rock is
   detected by those that take it. So two rovers that meet detect one rock at a time.
-- The area of an activation is that of its whole disc, over the edge of the square too.
+- The area of an activation is that of its whole disc, even beyond the edge of the square.
 - A rover without energy stays where it is as a body that others sense, and does nothing more.
 - The lander records a detection one iteration later (section 5.1), so those of the last iteration
   are not in ``value``.
@@ -42,9 +42,9 @@ Choices, all declared in ``RoverParams`` or here, with their sensitivity on the 
 Version history:
 
 - v1: first version.
-- v2: sine, cosine and arc tangent of kernels are the same bits on every device; what rocks add
-  to sensors and fitness is in integers, in 2^-16 and 2^-32, so that any order gives the same sum;
-  scenarios are drawn from other random numbers, those of all keys at once.
+- v2: sine, cosine and arc tangent of kernels are equal bit for bit on every device; the shares of
+  rocks in sensors and fitness are integers, in 2^-16 and 2^-32, so that any order gives the same
+  sum; scenarios are drawn from other random numbers, those of all keys at once.
 """
 
 import math
@@ -101,7 +101,7 @@ class RoverParams(Disturbances):
     energy: Positive = 1000.0
     """(energy) of a rover at the start of an epoch."""
     low_range: Range = 0.07
-    """(side) radius of a detection with setting low, unless ``range_is`` says otherwise."""
+    """(side) radius of a detection with setting low, unless ``range_is`` makes it an area."""
     med_range: Range = 0.05
     """(side) radius of a detection with setting med."""
     hi_range: Range = 0.03
@@ -119,9 +119,9 @@ class RoverParams(Disturbances):
     hi_cost: NonNegative = 0.3
     """(energy) of a detection with setting hi."""
     rover_sensor_range: Range = 0.02
-    """(side) how far the rover sensors see."""
+    """(side) range of the rover sensors."""
     range_is: Literal["radius", "area"] = "radius"
-    """what these four ranges are: the radius of a disc, or its share of the square's area."""
+    """meaning of these four ranges: the radius of a disc, or its share of the square's area."""
     rover_sensor_cost: NonNegative = 0.05
     """(energy) of the rover sensors, in every iteration."""
     move_range: Annotated[float, Gt(0), Le(0.02)] = 0.01
@@ -133,10 +133,10 @@ class RoverParams(Disturbances):
     min_distance: Positive = 0.01  # Choice: the bound of eq. 5.1, read as a maximum
     """(side) lower bound of distances in eqs 5.1 and 5.4."""
     separation: NonNegative = 0.002  # Choice: "only one rover can occupy any position" (5.1)
-    """(side) a rover may not come closer than this to another."""
+    """(side) smallest distance between two rovers."""
     fitness: Literal["cumulative", "activation", "product", "value"] = "cumulative"
-    """what a rover is credited with: eq. 5.4 with the area that it has covered so far, or with the
-    area of the activation; value times area; or value."""
+    """credit of a rover: eq. 5.4 with the area that it has covered so far, or with the area of the
+    activation; value times area; or value."""
     rocks_per_activation: Annotated[int, Ge(0), Le(1)] = 0
     """(rocks) that an activation can detect; 0 is all in range."""
     segregation: Share = 0.0  # Choice: 0, as "each possible x, y position" of a canal (5.1.4)
@@ -163,7 +163,7 @@ class RoverParams(Disturbances):
 
     @property
     def rover_sensor_radius(self) -> float:
-        """Radius within which the rover sensors see."""
+        """Radius of the rover sensors."""
         return self._radius(self.rover_sensor_range)
 
     def _radius(self, of: float) -> float:
@@ -181,7 +181,7 @@ class RoverParams(Disturbances):
 
     @property
     def fitness_reading(self) -> int:
-        """What a rover is credited with, as kernels know it."""
+        """The number of ``fitness`` for the kernels."""
         return FITNESS.index(self.fitness)
 
 
@@ -307,7 +307,7 @@ class RoverWorld:
         )
 
     def _reaches(self) -> dict[str, float]:
-        """Return how far away, squared, rovers may be that meet before the next survey."""
+        """Return the squared distances of rovers that may meet before the next survey."""
         p = self.params
         steps = 2 * int(SURVEYED) * p.move_range
         reaches = {

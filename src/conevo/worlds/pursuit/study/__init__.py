@@ -1,1 +1,1 @@
-"""The study of the pursuit world: what predators do and sense, told from recorded epochs."""
+"""The study of the pursuit world: behaviour and sensing of predators in recorded epochs."""

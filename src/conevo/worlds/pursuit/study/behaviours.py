@@ -1,21 +1,21 @@
 """Individual behaviours of predators: pursuer, blocker, flanker, knocker, idle.
 
-Nitschke 2009, sections 4.5, 4.6 and appendix B, where an experimenter names what he sees. Here the
-same words are geometric rules over the last second of a recorded epoch:
+Nitschke 2009, sections 4.5, 4.6 and appendix B, where an experimenter names the behaviours. Here
+the same words are geometric rules over the last second of a recorded epoch:
 
 - **idle**: does not drive; it stands, or turns on the spot.
-- **knocker**: bumps into the prey again and again, its heading turning through an arc meanwhile.
+- **knocker**: bumps into the prey again and again, while its heading turns through an arc.
 - **flanker**: bumps into the prey again and again, staying close to the left or right of its rear.
 - **blocker**: drives straight at a prey that faces it.
 - **pursuer**: drives straight at the prey from anywhere else.
 
-The first that holds is the behaviour; if none does, the predator performs none. Choice: in this
-order, because a knocker is told by how it moves wherever it is, a flanker by where it stays, and
-both are also driving at the prey most of the time.
+The first rule that applies gives the behaviour; without one, the predator performs none. Choice: in
+this order, because a knocker is identified by its motion in any place, a flanker by its place, and
+both also drive at the prey most of the time.
 
 All but idle count only in an interaction: within infrared range of another predator and within
 light range of a prey (appendix B). Choice: idle counts anywhere, since its definition names neither
-prey nor other predators, and keeping out of the way is what it is good for (section 4.5.6).
+prey nor other predators, and its use is to keep out of the way (section 4.5.6).
 """
 
 from __future__ import annotations
@@ -50,35 +50,36 @@ Ints = npt.NDArray[np.int64]
 
 @dataclass(frozen=True)
 class Rules:
-    """Where one behaviour ends and another begins. The thesis gives no numbers; all are ours.
+    """Limits of the behaviours. The thesis gives no numbers; all are conevo's own.
 
     Attributes:
-        window: iterations that a behaviour is judged by, the last ones. Choice: 10, one second, as
-            long as a prey must hardly move to be captured.
-        idle_cm: idle below this way in a window, as commanded. Choice: 0.5, a sixteenth of what a
-            predator can drive. One that drives and is refused is not idle but in the way.
-        share: directions must hold in this share of a window's iterations. Choice: half.
-        aim_deg: driving at the prey: this far off its direction at most, or on a line that meets
-            it. Choice: 30, half of what a sensor sees; pressing on a prey is driving at it.
+        window: number of last iterations that determine a behaviour. Choice: 10, one second, the
+            time for which a prey must hardly move to be captured.
+        idle_cm: idle below this commanded path length in a window. Choice: 0.5, a sixteenth of the
+            distance that a predator can drive. One whose moves are refused is not idle but in the
+            way.
+        share: directions must be right in this share of a window's iterations. Choice: half.
+        aim_deg: driving at the prey: largest angle from its direction, or on a line that meets it.
+            Choice: 30, half of a sensor's cone; pressing on a prey is driving at it.
         arc_deg: straight below this turn of the heading in a window, an arc from it on. Choice: 45,
             a circle of 10 cm radius at full speed.
-        front_deg: a prey faces whoever is this far off its heading at most. Choice: 45.
-        rear_deg: the sides of a prey's rear begin here, counted from its heading. Choice: 90, the
+        front_deg: a prey faces others up to this angle from its heading. Choice: 45.
+        rear_deg: the sides of a prey's rear start here, counted from its heading. Choice: 90, the
             axle.
         behind_deg: and end here. Choice: 165; straight behind is neither left nor right.
-        near_cm: close: at most this gap between the rims, in all iterations of a window. Choice:
-            5.5, a robot's diameter.
+        near_cm: close: largest gap between the rims, in all iterations of a window. Choice: 5.5, a
+            robot's diameter.
         touch_cm: a move refused within this gap, towards the prey, is a collision with the prey.
-            Choice: 1.8, just above what two robots can come nearer in one iteration.
-        bumps: "repeatedly": so many collisions begin in a window. Choice: 2; a predator that
+            Choice: 1.8, just above the distance by which two robots can approach in one iteration.
+        bumps: "repeatedly": number of collisions that start in a window. Choice: 2; a predator that
             presses on without moving collides once.
-        approach: iterations before a capture that belong to it. Choice: 30, what a predator needs
-            to cross its sensors' range.
-        pause: a capture resumed before so many iterations is still the same. Choice: 10.
-        role_share: a predator has the roles it plays for this share of a capture, approach
-            included. Choice: a fifth.
-        wall_cm: a prey is at a wall if no more than this is between them, in half of the captured
-            iterations or more. Choice: 5.5; no robot fits in between.
+        approach: iterations before a capture that belong to it. Choice: 30, the time in which a
+            predator crosses its sensors' range.
+        pause: a capture resumed before this number of iterations is still the same. Choice: 10.
+        role_share: a predator has the roles that it plays for this share of a capture, including
+            the approach. Choice: a fifth.
+        wall_cm: a prey is at a wall if the gap between them is at most this, in half of the
+            captured iterations or more. Choice: 5.5; no robot fits in between.
     """
 
     window: int = 10
@@ -100,13 +101,13 @@ class Rules:
 
 @dataclass(frozen=True)
 class ArenaSizes:
-    """What the rules must know of the arena and the robots; lengths in cm.
+    """Sizes of the arena and the robots for the rules; lengths in cm.
 
     Attributes:
         n_predators: R, the first bodies of a record.
         arena_cm: side of the arena.
         range_cm: of infrared and light sensors, between rims.
-        speed_cm: a predator's way in one iteration at most.
+        speed_cm: the largest distance that a predator drives in one iteration.
         radius_cm: of a body.
         axle_cm: between its wheels.
     """
@@ -121,13 +122,13 @@ class ArenaSizes:
 
 @dataclass(frozen=True)
 class Conduct:
-    """What the predators did in one epoch.
+    """Behaviour of the predators in one epoch.
 
     Attributes:
         behaviour: [T, R] index into ``BEHAVIOURS``, or ``NONE``.
         interacts: [T, R] whether within range of another predator and of a prey.
-        prey: [T, R] the closest prey, the one that the behaviour is about.
-        start: first iteration with a whole window; nothing is judged before.
+        prey: [T, R] the closest prey, to which the behaviour refers.
+        start: first iteration with a whole window; earlier ones have no behaviour.
     """
 
     behaviour: Ints
@@ -139,12 +140,12 @@ class Conduct:
 def conduct(
     record: Mapping[str, npt.NDArray[Any]], sizes: ArenaSizes, rules: Rules | None = None
 ) -> Conduct:
-    """Return what every predator did in every iteration of a recorded epoch.
+    """Return the behaviour of every predator in every iteration of a recorded epoch.
 
     Args:
         record: x, y, heading (after each iteration), left, right, collided, each [T, B].
         sizes: the arena and the robots.
-        rules: where behaviours begin and end.
+        rules: limits of the behaviours.
     """
     rules = rules or Rules()
     r, w = sizes.n_predators, rules.window
@@ -164,7 +165,7 @@ def conduct(
     touches = refused & (gap <= rules.touch_cm) & (ahead > 0)
     begins = touches & ~_before(touches)
     seen_at = np.arctan2(-way[..., 1], -way[..., 0]) - heading_before[:, None, r:]
-    bearing = np.degrees(np.abs(_wrap(seen_at)))  # where the prey has the predator
+    bearing = np.degrees(np.abs(_wrap(seen_at)))  # of the predator, as seen from the prey
 
     turned = np.degrees(np.abs(_last(_wrap(heading - heading_before)[:, :r], w)))
     idle = _last(chord, w) < rules.idle_cm
@@ -172,7 +173,7 @@ def conduct(
     prey = is_prey.argmin(axis=-1)
 
     def towards(values: npt.NDArray[Any]) -> Floats:
-        """Return the window's sum of what concerns the closest prey."""
+        """Return the window's sum of the values for the closest prey."""
         chosen = np.take_along_axis(_last(values, w), prey[..., None], axis=-1)
         return np.asarray(chosen[..., 0], dtype=np.float64)
 
@@ -198,8 +199,8 @@ def conduct(
 def executed(conducts: Sequence[Conduct]) -> list[Ints]:
     """Return each predator's behaviour in the windows that count, ``NONE`` included.
 
-    Choice: a behaviour holds for a window, so a switch is possible from one window to the next, not
-    in every iteration. Choice: epochs are joined to one life.
+    Choice: a behaviour applies to a window, so a switch is possible from one window to the next,
+    not in every iteration. Choice: epochs are joined to one life.
     """
     predators = range(conducts[0].behaviour.shape[1])
     return [np.concatenate([_windows(one, i) for one in conducts]) for i in predators]
@@ -240,17 +241,17 @@ def _near(place: Floats, sizes: ArenaSizes) -> tuple[Floats, Bools]:
 
 
 def _before(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
-    """Return each iteration's value of the iteration before; the first has its own."""
+    """Return the previous iteration's values for each iteration; the first has its own."""
     return np.concatenate([values[:1], values[:-1]])
 
 
 def _last(values: npt.NDArray[Any], w: int) -> Floats:
-    """Return sums over the last ``w`` iterations, of what there is of them."""
+    """Return sums over the last ``w`` iterations, as far as they exist."""
     total = np.cumsum(values.astype(np.float64), axis=0)
     total[w:] -= total[:-w].copy()
     return np.asarray(total, dtype=np.float64)
 
 
 def _wrap(angle: Floats) -> Floats:
-    """Return angles as the same ones in [-pi, pi)."""
+    """Return angles wrapped to [-pi, pi)."""
     return (angle + np.pi) % (2 * np.pi) - np.pi

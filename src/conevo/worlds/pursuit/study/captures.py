@@ -9,11 +9,11 @@ spiders-fly      1 to 3 pursuers, 1 or 2 blockers, the prey at a wall (figure 4.
 role-switcher    1 to 3 flankers, 1 to 3 knockers, up to 3 idle; they switch these roles
 ===============  =============================================================================
 
-Choice: one blocker is enough for pursuer-blocker, as in figure 4.5 and 4.6.6; 4.6.3 asks for two.
+Choice: one blocker is enough for pursuer-blocker, as in figure 4.5 and 4.6.6; 4.6.3 requires two.
 Choice: the most demanding is tried first: role-switcher, spiders-fly, pursuer-blocker, entrapment;
-else the capture is none of them. Choice: idle predators are tolerated in all (4.5.3, 4.5.5); any
-other role that is not listed excludes the name. In the first three a predator counts for its
-longest role; in the role-switcher for all of them.
+if none fits, the capture is none of them. Choice: idle predators are tolerated in all (4.5.3,
+4.5.5); any other role that is not listed excludes the name. In the first three a predator counts
+for its longest role; in the role-switcher for all its roles.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ __all__ = [
 ]
 
 COLLECTIVES = ("entrapment", "pursuer-blocker", "spiders-fly", "role-switcher", "none")
-# How many predators of each role, least and most.
+# Smallest and largest number of predators of each role.
 COMPOSITIONS = {
     "entrapment": {"pursuer": (3, 4)},
     "pursuer-blocker": {"pursuer": (1, 3), "blocker": (1, 3)},
@@ -64,14 +64,14 @@ class Capture:
     """One capture of one prey.
 
     Attributes:
-        prey: which one.
+        prey: number of the prey.
         start: first iteration of the approach.
         first: first iteration in which the prey is captured.
         stop: first iteration in which it no longer is.
         roles: of each predator, the longest first; none if it took no part.
         at_wall: whether the prey was captured at a wall.
         switches: how often a predator changed between flanker, knocker and idle.
-        collective: what it is called.
+        collective: its name.
     """
 
     prey: int
@@ -94,9 +94,9 @@ def find_captures(
 
     Args:
         record: x, y [T, B] and captured [T, Q].
-        one: what the predators did in it.
+        one: behaviour of the predators in it.
         sizes: the arena and the robots.
-        rules: how long an approach is, and so on.
+        rules: length of an approach, and so on.
     """
     rules = rules or Rules()
     found = []
@@ -150,9 +150,9 @@ def name(roles: Roles, *, at_wall: bool, switches: int) -> str:
 
 
 def most_frequent(captures: Iterable[Capture]) -> tuple[str, dict[str, int]]:
-    """Return the most frequent collective behaviour (equals by the order of ``COLLECTIVES``).
+    """Return the most frequent collective behaviour (ties by the order of ``COLLECTIVES``).
 
-    Also returns how often each of them was seen; "none" if nothing was captured.
+    It also returns how often each was observed; "none" if nothing was captured.
     """
     seen = Counter(one.collective for one in captures)
     counts = {collective: seen[collective] for collective in COLLECTIVES}
@@ -162,11 +162,11 @@ def most_frequent(captures: Iterable[Capture]) -> tuple[str, dict[str, int]]:
 
 
 def composition(labels: Sequence[str], captures: Sequence[Capture]) -> dict[str, int | None]:
-    """Return how many predators belong to each collective behaviour, and to none.
+    """Return the number of predators that belong to each collective behaviour, and to none.
 
     Choice: a predator specialized to an individual behaviour belongs to the collective behaviour
-    that it took part in most often in that role (4.6.3); to none, and is counted as
-    non-specialized, if it never did.
+    in which it took part most often in that role (4.6.3). If it never did, it belongs to none and
+    is counted as non-specialized.
 
     Args:
         labels: of each predator, an individual behaviour or "non-specialized".
@@ -194,7 +194,7 @@ def _fits(counts: Mapping[str, int], listed: Mapping[str, tuple[int, int]]) -> b
 
 
 def _joined(intervals: list[tuple[int, int]], pause: int) -> list[tuple[int, int]]:
-    """Join intervals that less than ``pause`` iterations separate."""
+    """Join intervals that are separated by less than ``pause`` iterations."""
     joined: list[tuple[int, int]] = []
     for start, stop in intervals:
         if joined and start - joined[-1][1] < pause:

@@ -1,7 +1,7 @@
 """Teams composed of predators of several behaviours, by the number of predators.
 
-Nitschke 2009, section 4.6.5, figure 4.12. An entrapment team is one of clones, so it is not here.
-Choice: of six predators the role-switcher has one idle one: 4.6.5 lists seven, two of them idle.
+Nitschke 2009, section 4.6.5, figure 4.12. An entrapment team consists of clones, so it is not here.
+Choice: of six predators the role-switcher has one idle: 4.6.5 lists seven, two of them idle.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ COMPOSED = {
         6: {"flanker": 2, "knocker": 3, "idle": 1},
     },
 }
-"""Collective behaviour -> number of predators -> how many of each individual behaviour."""
+"""Collective behaviour -> number of predators -> number of each individual behaviour."""
 
 
 def roles_of(collective: str, n_predators: int) -> list[str]:
-    """Return each predator's individual behaviour; nothing if there is no such team."""
+    """Return each predator's individual behaviour; nothing if no such team exists."""
     of = COMPOSED[collective].get(n_predators, {})
     return [role for role, n in of.items() for _ in range(n)]

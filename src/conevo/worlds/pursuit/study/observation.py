@@ -1,4 +1,4 @@
-"""A team of predators in recorded epochs: what they do and sense.
+"""A team of predators in recorded epochs: their behaviour and sensing.
 
 Nitschke 2009, section 4.6.1 and appendix B: the fittest team is executed again in 20 fresh
 scenarios, those of the testing phase, and everything is recorded.
@@ -43,10 +43,10 @@ class Observation:
         simulator: of its world.
         genes: pool of genotypes [K, G].
         team: [R, U] rows of the pool.
-        seed: of what is drawn further.
+        seed: of further random numbers.
         keys: [E] of the scenarios.
         records: [E], each as ``Simulator.record`` returns it.
-        rules: by which behaviours are told.
+        rules: that identify behaviours.
     """
 
     simulator: Simulator
@@ -69,7 +69,7 @@ class Observation:
 
     @cached_property
     def conducts(self) -> list[Conduct]:
-        """What the predators did in each epoch."""
+        """Behaviour of the predators in each epoch."""
         return [conduct(record, self.sizes, self.rules) for record in self.records]
 
     @cached_property
@@ -109,9 +109,9 @@ class Observation:
         return sample(found, N_INSTANCES, stream(self.seed, "instances", behaviour, whose))
 
     def sensor_table(self) -> list[dict[str, Any]]:
-        """Return averages and ten-segment profiles of each behaviour that was seen, over the team.
+        """Return averages and ten-segment profiles of each observed behaviour, over the team.
 
-        Plain data: behaviour, instances (how many were sampled), proximity and light (averages of
+        Plain data: behaviour, instances (number of sampled ones), proximity and light (averages of
         the eight sensors), proximity_profile and light_profile (figures B-1 to B-9).
         """
         rows = []
@@ -147,7 +147,7 @@ def record_team(
 
 
 def sizes_of(world: PursuitWorld) -> ArenaSizes:
-    """Return what the rules of behaviours must know of a world."""
+    """Return the sizes of a world for the rules of behaviours."""
     from conevo.kernels.khepera import AXLE, RADIUS
 
     return ArenaSizes(

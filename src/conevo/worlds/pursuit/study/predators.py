@@ -1,10 +1,10 @@
-"""What the pursuit world brings to be studied: its predators' individual and collective behaviours.
+"""The study of the pursuit world: its predators' individual and collective behaviours.
 
-Nitschke 2009, sections 4.6.4 to 4.6.6. Their castes are their individual behaviours.
+Nitschke 2009, sections 4.6.4 to 4.6.6. Castes are individual behaviours.
 
-- Choice: predators begin clones' scenarios close together around the prey (4.6.5), all teams in the
-  same places; at random if obstacles are in the way or they see less far than they are wide. So do
-  composed teams, but for spiders-fly, whose prey is in infrared range of a wall.
+- Choice: in clones' scenarios predators start close together around the prey (4.6.5), all teams in
+  the same places; at random if obstacles are in the way or if their range is below their width.
+  This also applies to composed teams except spiders-fly, whose prey is in infrared range of a wall.
 """
 
 from __future__ import annotations
@@ -43,13 +43,13 @@ def observe(
     seed: int,
     rules: Rules | None = None,
 ) -> Predators:
-    """Record a team of predators and return what it is seen to do."""
+    """Record a team of predators and return its observed behaviour."""
     return Predators(record_team(simulator, genes, team, keys, seed, rules))
 
 
 @dataclass(frozen=True)
 class Predators:
-    """An observation as studies need it (``worlds.study.Seen``)."""
+    """An observation in the form for studies (``worlds.study.Seen``)."""
 
     seen: Observation
 
@@ -64,15 +64,15 @@ class Predators:
         return most_frequent(self.seen.all_captures)
 
     def composition(self, labels: Sequence[str]) -> dict[str, int | None]:
-        """Return how many predators belong to each collective behaviour, and to none."""
+        """Return the number of predators that belong to each collective behaviour, and to none."""
         return composition(labels, self.seen.all_captures)
 
     def details(self, lifetimes: Sequence[dict[str, Any]]) -> dict[str, Any]:
-        """Return everything else that was seen, as plain data.
+        """Return all further observations, as plain data.
 
         rules, capture_time; predators, each one's shares, windows, switches, specialization and
         label; collective (the most frequent) and captures (of each name); sensors (averages and
-        profiles) and reproduction (what each does with its sensors held at the averages).
+        profiles) and reproduction (behaviour of each with its sensors held at the averages).
         """
         collective, captures = self.collectives
         return {
@@ -86,11 +86,11 @@ class Predators:
         }
 
     def together(self, keys: Sequence[int]) -> Scenarios:
-        """Return scenarios in which the predators begin around the prey, at random if none fits."""
+        """Return scenarios in which predators start around the prey, at random if none fits."""
         return self._placed(keys, at_wall=False)
 
     def compositions(self, keys: Sequence[int]) -> list[Composed]:
-        """Return the teams of figure 4.12, of one prey only; spiders-fly begins at a wall."""
+        """Return the teams of figure 4.12, for one prey only; spiders-fly starts at a wall."""
         world = self.seen.world
         if world.n_prey > 1:
             return []
@@ -116,13 +116,13 @@ class Predators:
 
     @property
     def _fits_together(self) -> bool:
-        """Whether all predators find room in sight of one prey."""
+        """Return whether all predators find room in sight of one prey."""
         sizes, params = self.seen.sizes, self.seen.world.params
         return sizes.range_cm >= 2 * sizes.radius_cm and not params.n_obstacles
 
 
 def account(found: Mapping[str, Any]) -> Account:
-    """Return what ``Predators.details`` holds, to be printed."""
+    """Return the contents of ``Predators.details``, to be printed."""
     lives = found["predators"]
     names = list(lives[0]["shares"])
     seen = ", ".join(f"{name} {n}" for name, n in found["captures"].items() if n)

@@ -1,20 +1,20 @@
-"""Behaviours reproduced: that what was observed comes from what was sensed.
+"""Reproduction of behaviours, which shows that sensing causes the observed behaviour.
 
 Nitschke 2009, sections 4.6.2 and 4.6.3.
 
-**Individual.** A predator's sixteen sensor inputs are held at the averages that it had while it
-behaved, and what it then does is observed. Choice: each trial begins where an instance of the
-behaviour began, all bodies in their places, so the predator is within range of a prey and of
-another predator; all others act freely. Choice: a predator's own averages, "repeated for each
-predator" (appendix B).
+**Individual.** A predator's sixteen sensor inputs are held at their averages during a behaviour,
+and the resulting behaviour is observed. Choice: each trial starts like an instance of the
+behaviour, with all bodies in their places, so the predator is within range of a prey and of another
+predator; all others act freely. Choice: a predator's own averages, "repeated for each predator"
+(appendix B).
 
-**Collective.** The predators are put together around a prey, each where its role belongs, within
+**Collective.** The predators are put together around a prey, each in a place for its role, within
 infrared range of another and light range of the prey (for spiders-fly also with the prey in that
 range of a wall), and the captures are named. Choice: a predator's role is its most frequent longest
-one in the captures that are to be reproduced, and any place in range is right for one without a
-role; headings are random. Choice: blockers begin in front of the prey, flankers beside its rear,
-pursuers not in front of it. Choice: controllers are left free by default, since constant inputs
-cannot answer to a prey; ``clamped`` holds them at the averages of the role.
+one in the captures to be reproduced. A predator without a role may be anywhere in range; headings
+are random. Choice: blockers start in front of the prey, flankers at the sides of its rear, pursuers
+not in front of it. Choice: controllers are left free by default, since constant inputs cannot react
+to a prey; ``clamped`` holds them at the averages of the role.
 """
 
 from __future__ import annotations
@@ -43,15 +43,15 @@ __all__ = ["place_together", "reproduce_collectives", "reproduce_individuals"]
 
 TRIAL = 30  # Choice: iterations of an individual's trial, three windows of the default rules
 MARGIN = 0.01  # cm between bodies that are put into an arena
-N_TRIES = 1000  # places tried before an arrangement is begun anew
+N_TRIES = 1000  # places to try before an arrangement is started again
 
 Pose = tuple[float, float, float]
 
 
 def reproduce_individuals(seen: Observation) -> list[dict[str, Any]]:
-    """Return what each predator does with its sensors held at the averages of its behaviours.
+    """Return each predator's behaviour with its sensors held at the averages of its behaviours.
 
-    Plain data, a row per predator and behaviour that it showed: predator, behaviour, trials,
+    Plain data, a row per predator and observed behaviour: predator, behaviour, trials,
     sensors (the 16 averages, proximity first), result (the most frequent most executed behaviour,
     or "none"), reproduced (portion of the trials in which the behaviour is executed most),
     primitive (motor primitive executed most), left and right (mean wheel commands), and
@@ -97,14 +97,14 @@ def reproduce_individuals(seen: Observation) -> list[dict[str, Any]]:
 def reproduce_collectives(
     seen: Observation, trials: int = 20, *, clamped: bool = False
 ) -> list[dict[str, Any]]:
-    """Return what comes of putting the predators together as in each collective behaviour seen.
+    """Return the results of putting predators together as in each observed collective behaviour.
 
     Plain data, a row per collective behaviour: collective, roles (of each predator, "" without
     one), trials, captured (trials with a capture), reproduced (trials with a capture of that name),
-    seen (captures of each name), is_reproduced (whether there was one).
+    seen (captures of each name), is_reproduced (whether a trial had a capture of that name).
 
     Args:
-        seen: the team, observed.
+        seen: the observed team.
         trials: test simulations of each.
         clamped: hold each predator's sensors at its averages of its role.
     """
@@ -150,7 +150,7 @@ def place_together(
 
     Args:
         rng: draws places and headings.
-        seen: for the sizes of arena and bodies, and the rules.
+        seen: has the sizes of arena and bodies, and the rules.
         roles: of each predator, "" without one.
         at_wall: whether the prey is within infrared range of a wall.
     """
@@ -182,7 +182,7 @@ def place_together(
 def _fitting(
     rng: np.random.Generator, seen: Observation, role: str, prey: Pose, placed: Sequence[Pose]
 ) -> Pose | None:
-    """Draw a pose that suits a role: free, in range of the prey and of a predator placed before."""
+    """Draw a pose for a role: free, in range of the prey and of a predator already placed."""
     sizes, rules = seen.sizes, seen.rules
     body = 2 * (sizes.radius_cm + MARGIN)
     sector = {
@@ -215,7 +215,7 @@ def _together(seen: Observation, roles: list[str], collective: str, k: int) -> A
 
 
 def _resumed(seen: Observation, epoch: int, t: int) -> ArenaScenarios:
-    """Return an epoch's scenario with all bodies where they were before iteration ``t``."""
+    """Return an epoch's scenario with all bodies at their places before iteration ``t``."""
     record = seen.records[epoch]
     poses = np.stack([record[name][t - 1] for name in ("x", "y", "heading")], axis=-1)
     return _posed(seen.world.scenarios([seen.keys[epoch]]), poses)

@@ -1,14 +1,14 @@
-"""What predators sense while they behave: averages for reproduction, profiles as in figures B-1..9.
+"""Sensing during behaviours: averages for reproduction, profiles as in figures B-1 to B-9.
 
-Nitschke 2009, section 4.6.2 and appendix B: of every individual behaviour 20 instances are sampled;
+Nitschke 2009, section 4.6.2 and appendix B: 20 instances of every individual behaviour are sampled;
 sensors are averaged over the duration of each, then over all of them. The range [0, 1] is cut into
 ten segments, and "the portion of a given behavior's duration that the light or proximity sensors
 are active" is measured in each.
 
-Choice: an instance is an unbroken stretch of one behaviour within an interaction; a predator that
-is idle away from all others has nothing to sense and is no instance. Choice: a sensor at exactly 0
+Choice: an instance is an unbroken stretch of one behaviour within an interaction. A predator that
+is idle away from all others senses nothing, so it is not an instance. Choice: a sensor at exactly 0
 is not active, so the ten portions add up to the portion in which sensors are active. Choice: the
-portion is the average of the eight sensors' own ones. A segment includes its upper end.
+portion is the average over the eight sensors. A segment includes its upper end.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from conevo.worlds.pursuit.study.behaviours import BEHAVIOURS, Conduct, spells
 __all__ = ["N_SEGMENTS", "Profile", "Spell", "average", "find_spells", "profile", "sample"]
 
 N_SEGMENTS = 10
-N_EACH = 8  # proximity sensors come first, then as many light sensors
+N_EACH = 8  # proximity sensors come first, then eight light sensors
 Inputs = Sequence[npt.NDArray[Any]]
 
 
@@ -41,7 +41,7 @@ class Spell(NamedTuple):
 
 @dataclass(frozen=True)
 class Profile:
-    """Portions of a behaviour's duration, [10] each, that sensors are active in a segment."""
+    """Portions of a behaviour's duration, [10] each, in which sensors are active in a segment."""
 
     proximity: npt.NDArray[np.float64]
     light: npt.NDArray[np.float64]
@@ -97,6 +97,6 @@ def _during(one: Spell, inputs: Inputs) -> npt.NDArray[np.float64]:
 
 
 def _portions(sensed: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    """Return the portion of the iterations [T, S] that each sensor is in each segment, [S, 10]."""
+    """Return the portion of iterations [T, S] in which each sensor is in each segment, [S, 10]."""
     segment = np.ceil(sensed * N_SEGMENTS).astype(np.int64)  # 0 is not active, 1 the first
     return np.stack([(segment == k).mean(axis=0) for k in range(1, N_SEGMENTS + 1)], axis=-1)
