@@ -1,4 +1,4 @@
-"""What a campaign costs beside its runs: wall time against the core time of the runs.
+"""Overhead of a campaign: its wall time compared with the core time of its runs.
 
 Five methods, two environments, four seeds at smoke scale, with each executor in turn. The ratio is
 wall time / (core time of all runs / cores): 1 if every core were busy with runs all the time. A
@@ -22,7 +22,7 @@ METHODS = ("homcne", "hetcne", "ccga", "mesp", "cone")
 
 
 def measure(name: str, plan: Plan, cores: int, folder: Path) -> list[object]:
-    """Carry the plan out and return a row of the table."""
+    """Execute the plan and return a row of the table."""
     campaign = create(plan, folder)
     began = time.perf_counter()
     executor = make_executor(name, cores)

@@ -1,6 +1,6 @@
-"""What a kernel compiled for a CUDA device takes, read from the compiled file: needs no device.
+"""Resources of a kernel compiled for a CUDA device, read from the compiled file without a device.
 
-The file is in ELF; ``.nv.info`` tells registers and stack, the sections of the kernel the rest.
+The file is in ELF; ``.nv.info`` has registers and stack, the kernel's sections have the rest.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import warp as wp
 __all__ = ["Compiled", "compiled", "read_cubin"]
 
 REGISTERS, STACK = 0x2F, 0x11  # attributes of .nv.info: (symbol, number)
-SIZED = 0x04  # format of attributes that begin with their size
+SIZED = 0x04  # format of attributes that start with their size
 INSTRUCTION = 16  # bytes
 
 
@@ -26,7 +26,7 @@ class Compiled:
 
     Attributes:
         registers: of a thread.
-        instructions: in the file, with what fills its last line.
+        instructions: in the file, including padding.
         shared: bytes of a block, with 1,024 of CUDA's own and four of Warp's for each lane.
         stack: bytes of a thread, in local memory.
     """
@@ -38,11 +38,11 @@ class Compiled:
 
 
 def compiled(kernel: Any, lanes: int, arch: int = 90) -> Compiled:
-    """Return what a kernel takes in blocks of so many lanes.
+    """Return the resources of a kernel in blocks of this number of lanes.
 
-    It is that which a device here has loaded, or it is compiled for ``arch``, 90 for sm_90.
+    It is the one loaded by a device of this machine, or is compiled for ``arch``, 90 for sm_90.
     """
-    kernel.module.options["block_dim"] = lanes  # otherwise that of the module, 256
+    kernel.module.options["block_dim"] = lanes  # the module's default is 256
     folder = Path(wp.config.kernel_cache_dir) / kernel.module.get_module_identifier(lanes)
     found = sorted(folder.glob(f"*.sm{arch}*.cubin"))
     if not found:
@@ -52,10 +52,10 @@ def compiled(kernel: Any, lanes: int, arch: int = 90) -> Compiled:
 
 
 def read_cubin(data: bytes) -> dict[str, Compiled]:
-    """Return what each kernel in a compiled file takes, by its name.
+    """Return the resources of each kernel in a compiled file, by its name.
 
     Raises:
-        ValueError: the file is not one of CUDA code in ELF.
+        ValueError: the file is not CUDA code in ELF.
     """
     if data[:5] != b"\x7fELF\x02":
         raise ValueError("not an ELF file of 64 bits")

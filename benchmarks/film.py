@@ -1,8 +1,8 @@
 """Time and size of films: an epoch of 20 rovers among rocks, 2,500 iterations, drawing included.
 
-The team is one of random networks, or the champion of a run (``--run``, e.g. of an evolved one:
-teams that detect more are more work). Each film is written by a process of its own; "core s" is the
-time of all cores, of conevo and of ffmpeg.
+The team has random networks, or is the champion of a run (``--run``); teams that detect more are
+more work. Each film is written by a separate process. "core s" is the time of all cores, of conevo
+and of ffmpeg.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from conevo.runs.run import Run
 from machine import machine, spread, table
 
 ROOT = Path(__file__).resolve().parent.parent
-FILMS = (  # ending, size in px, how many teams side by side
+FILMS = (  # ending, size in px, number of teams next to each other
     ("mp4", 720, 1),
     ("mp4", 480, 1),
     ("mp4", 720, 2),
@@ -55,7 +55,7 @@ print(json.dumps({
 
 
 def measure(epoch: Path, ending: str, size: int, teams: int) -> dict[str, float | list[int]]:
-    """Write a film and return what that took."""
+    """Write a film and return its times, memory and size."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / f"epoch.{ending}"
         command = [sys.executable, "-c", MEASURED, str(epoch), str(path), str(size), str(teams)]

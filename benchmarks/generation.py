@@ -2,7 +2,7 @@
 
 Everything between two finished generations counts: breeding, assembling teams, scores, the record,
 checkpoint and elites on disk. Generation 0 (which compiles) is left out. With ``--iterations 2``
-epochs take hardly any time: what is left is what a faster device cannot make shorter.
+epochs take hardly any time: the rest is the part that a faster device does not shorten.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ HEAD = (
 
 
 class Timed:
-    """A context in which the seconds that a method of a class takes are added up."""
+    """A context that adds up the seconds in a method of a class."""
 
     def __init__(self, owner: type, name: str) -> None:
         self.owner, self.name, self.seconds = owner, name, 0.0

@@ -1,9 +1,9 @@
-"""Team-steps per second on a CUDA device, and what else decides whether it pays: in four minutes.
+"""Team-steps per second on a CUDA device, and the other facts that decide whether it pays.
 
-What kernels take of a multiprocessor; the kernel alone and the whole of ``evaluate`` for every
-number of lanes and batch; whether results are those of the CPU; a generation of the thesis' size.
-Without a device the kernels are compiled for sm_90, and all the rest runs on the CPU in sizes that
-take seconds: to see that it works, not how fast.
+In four minutes it measures the kernels' resources on a multiprocessor; the kernel alone and the
+whole of ``evaluate`` for every number of lanes and batch; whether results are those of the CPU; a
+generation of the thesis' size. Without a device the kernels are compiled for sm_90, and all else
+runs on the CPU in sizes that take seconds, which tests the script but not the speed.
 """
 
 from __future__ import annotations
@@ -41,10 +41,10 @@ PARTS = ("kernels", "speed", "bits", "generation")
 
 @dataclass(frozen=True)
 class Sizes:
-    """How much is played.
+    """Sizes of the measurements.
 
     Attributes:
-        batches: teams that are evaluated at once.
+        batches: numbers of teams that are evaluated at once.
         iterations: of an epoch, where speed is measured.
         equal_teams: teams that play whole epochs on both devices.
         equal_iterations: of these epochs.
@@ -82,7 +82,7 @@ def about(device: str) -> str:
 
 
 def kernels(paths: Sequence[str], lanes: Sequence[int], device: str) -> str:
-    """Return a table of what compiled kernels take; what follows finds them compiled."""
+    """Return a table of the kernels' resources, which also compiles them for later parts."""
     arch = 90 if device == CPU else wp.get_device(device).arch
     work = [(path, n, arch) for path in paths for n in lanes]
     with multiprocessing.get_context("spawn").Pool(min(len(work), usable_cores())) as pool:
@@ -92,7 +92,7 @@ def kernels(paths: Sequence[str], lanes: Sequence[int], device: str) -> str:
 
 
 def _compiled(path: str, lanes: int, arch: int) -> list[object]:
-    """Return a row of that table, in a process of its own: a compiler uses one core."""
+    """Return a row of that table, in a separate process, since a compiler uses one core."""
     one = compiled(Rollout(build_world(path)).cuda_form(lanes), lanes, arch)
     return [path, lanes, one.registers, one.instructions, one.shared, one.stack]
 
@@ -169,7 +169,7 @@ def generation(sizes: Sizes, device: str) -> str:
 
 
 def main() -> None:
-    """Print one table after the other, as they are made."""
+    """Print each table as soon as it is made."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--device", default="auto")
     parser.add_argument("--world", nargs="+", default=WORLDS)

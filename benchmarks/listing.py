@@ -1,9 +1,9 @@
-"""How long it takes to look at results: show, list and campaign status with many runs there.
+"""Time of commands that show results: show, list and campaign status, with many runs.
 
-One smoke run is made and copied. Copies differ in what looking reads: the run's id and seed, its
-generations, and how it is: finished, interrupted or damaged. Each time is that of a whole process,
-from the start of Python to its end; where other programs use the cores, the CPU time is nearer to
-what it would be without them.
+One smoke run is made and copied. Copies differ in the data that these commands read: the run's id
+and seed, its generations, and its state: finished, interrupted or damaged. Each time is that of a
+whole process, from the start of Python to its end. If other programs use the cores, the CPU time is
+a better estimate.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ METHODS = ("homcne", "hetcne", "ccga", "mesp", "cone")
 def copy(
     run: Path, target: Path, changes: dict[str, object], generations: int, is_old: bool = False
 ) -> None:
-    """Make another run of the files of one; conevo 0.1.0 kept no digest of the configuration."""
+    """Make another run from the files of one; conevo 0.1.0 kept no digest of the configuration."""
 
     def take(source: str, place: str) -> None:
         (os.link if source.endswith(LARGE) else shutil.copyfile)(source, place)
@@ -56,7 +56,7 @@ def copy(
 
 
 def make_runs(run: Path, folder: Path, n_runs: int, generations: int) -> Path:
-    """Return a run of a folder of many: of ten, two are interrupted, one is damaged, one old."""
+    """Return a run in a folder of many; of ten, two are interrupted, one is damaged, one old."""
     for k in range(n_runs):
         changes: dict[str, object] = {"seed": k, "method": METHODS[k % 5]}
         copy(run, folder / f"run-{k:04d}", changes, generations, is_old=k % 10 == 4)
@@ -68,7 +68,7 @@ def make_runs(run: Path, folder: Path, n_runs: int, generations: int) -> Path:
 
 
 def make_campaign(run: Path, folder: Path, n_runs: int, generations: int) -> Path:
-    """Return a campaign whose runs are finished, but for one of ten that has not begun."""
+    """Return a campaign in which nine of ten runs are finished and one has not started."""
     plan = Plan(
         name="many",
         title="",
@@ -89,7 +89,7 @@ def make_campaign(run: Path, folder: Path, n_runs: int, generations: int) -> Pat
 
 
 def seconds(command: list[str], repeats: int) -> tuple[list[float], float]:
-    """Return the wall times of a command, again and again, and the mean of its CPU time."""
+    """Return the wall times of a repeated command, and the mean of its CPU time."""
     found = []
     before = spent()
     for _ in range(repeats):

@@ -1,4 +1,4 @@
-"""What a number was measured on, and how: standard library only, to run in any environment."""
+"""The machine of a measurement, and its statistics; standard library only, for any environment."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def machine(*packages: str) -> str:
 def alternate(work: Mapping[Name, Callable[[], float]], repeats: int) -> dict[Name, list[float]]:
     """Return ``repeats`` results of each piece of work, taken in turns.
 
-    In turns, so that a slow minute of the machine falls on all of them alike.
+    Turns distribute a slow minute of the machine over all of them.
     """
     results: dict[Name, list[float]] = {name: [] for name in work}
     for _ in range(repeats):

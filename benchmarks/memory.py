@@ -1,7 +1,7 @@
 """Peak memory of a thesis-sized generation: 10,000 genotypes, 20 rovers, 10 epochs.
 
-A whole run of one generation, with its checkpoint. Iterations are cut, because nothing that is
-allocated depends on their number: a world's state is overwritten in place. Each method has its own
+A whole run of one generation, with its checkpoint. It has fewer iterations, because memory does
+not depend on their number: a world's state is overwritten in place. Each method has its own
 process, so that its peak is its own.
 """
 

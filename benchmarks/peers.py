@@ -1,11 +1,11 @@
-"""Robot-steps per second of VMAS and MPE2, on this machine in the same hour, ours beside them.
+"""Robot-steps per second of VMAS, MPE2 and conevo, on the same machine in the same hour.
 
-Random actions, drawn before the clock starts; no network, no learning. Their worlds are simpler
-than ours (a few discs with momentum), so this shows an order of magnitude and not who is better.
-Robot-steps = environment steps x agents. Their ``simple_tag`` has the composition of our
-``pursuit/team-3``: four predators and one prey, all five counted; ours have random networks.
-Runs in an environment of its own (README.md beside this file); without conevo there, only the
-others are measured.
+Random actions, drawn before the clock starts; no network, no learning. Worlds of VMAS and MPE2 are
+simpler than conevo's (a few discs with momentum), so this shows an order of magnitude, not which is
+better. Robot-steps = environment steps x agents. ``simple_tag`` has the composition of
+``pursuit/team-3``: four predators and one prey, all five counted; conevo's have random networks.
+The script needs a separate environment (README.md in this folder). If conevo is not installed
+there, only the others are measured.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ OURS, N_PREY = "pursuit/team-3", 1
 
 
 def vmas(scenario: str, extra: dict[str, int], batch: int, threads: int, seconds: float) -> Work:
-    """Return a measurement of one VMAS scenario with ``batch`` environments side by side."""
+    """Return a measurement of one VMAS scenario with ``batch`` parallel environments."""
     import torch
     from vmas import make_env
 
@@ -64,7 +64,7 @@ def mpe2(scenario: str, extra: dict[str, int], seconds: float) -> Work:
 
 
 def ours(batch: int, threads: int) -> Work:
-    """Return a measurement of our predators with random networks: whole epochs of a batch."""
+    """Return a measurement of conevo's predators with random networks: whole epochs of a batch."""
     from conevo.worlds.registry import world
     from conevo.worlds.rollout import Rollout
     from simulator import workload

@@ -1,7 +1,7 @@
-"""Time and memory of ``conevo report`` on a thousand finished runs that nobody ran.
+"""Time and memory of ``conevo report`` on a thousand finished runs, which are made up.
 
 Their tables have the form of a campaign's (tests/report/finished_runs.py): 100 generations a run,
-20 scenarios for each of its teams, all studies. Each report is written by a process of its own.
+20 scenarios for each of its teams, all studies. Each report is written by a separate process.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ print(json.dumps({
 def measure(
     folder: Path, environments: list[str], seeds: int, generations: int
 ) -> dict[str, float]:
-    """Make the runs, write their report and return what that took."""
+    """Make the runs, write their report and return its times, memory and sizes."""
     sys.path.insert(0, str(ROOT / "tests"))
     from report.finished_runs import cells, write_campaign
 

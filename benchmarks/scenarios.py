@@ -16,12 +16,12 @@ TASKS = (
 
 
 def drawing(task: str, n: int) -> Callable[[], float]:
-    """Return what draws n scenarios and returns the seconds that it took."""
+    """Return a function that draws n scenarios and returns the seconds that it took."""
     from conevo.rng import fold
     from conevo.worlds.registry import world
 
     a_world, keys = world(task), [fold(1, "epoch", 0, e) for e in range(n)]
-    a_world.scenarios(keys[:1])  # what is read once
+    a_world.scenarios(keys[:1])  # reads files, which happens only once
 
     def draw() -> float:
         begin = time.perf_counter()

@@ -1,9 +1,9 @@
 """Team-steps per second of the simulator.
 
-A team-step is one iteration of one world with all its robots. Teams of random genotypes (uniform in
-[-1, 1], every robot different); scenarios are drawn before the clock starts; decoding the
-genotypes, resetting the world and scoring are inside it. Robot-steps count the team's robots only:
-in pursuit-evasion the prey is simulated too and not counted.
+A team-step is one iteration of one world with all its robots. Teams have random genotypes (uniform
+in [-1, 1], every robot different). Scenarios are drawn before the clock starts; decoding the
+genotypes, resetting the world and scoring are measured. Robot-steps count the team's robots only:
+in pursuit-evasion the prey is simulated, too, but not counted.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ def random_teams(rollout: Rollout, batch: int) -> tuple[Genes, Rows]:
 
 
 def workload(world: World, rollout: Rollout, batch: int) -> Callable[[], float]:
-    """Return a function that evaluates ``batch`` teams once and gives team-steps per second."""
+    """Return a function that evaluates ``batch`` teams once and returns team-steps per second."""
     genes, teams = random_teams(rollout, batch)
     scenarios = world.scenarios([fold(SEED, "epoch", 0, 0)])
 
@@ -60,7 +60,7 @@ def workload(world: World, rollout: Rollout, batch: int) -> Callable[[], float]:
 
 
 def label(world: World) -> str:
-    """Return what was simulated: world, robots, their networks, iterations."""
+    """Return the simulated world in words: robots, their networks, iterations."""
     mind = controller(world=world)
     assert isinstance(mind, Srn)
     name = f"{world.name.rpartition('-v')[0]}/{world.environment}"

@@ -1,10 +1,10 @@
-"""Frames per second of the replay page, and how soon it is usable, in headless chromium.
+"""Frames per second of the replay page, and its time until usable, in headless chromium.
 
 Needs playwright (``pip install playwright``) and chromium on the path. The crowd is made up: 30
 robots among 2,000 rocks for 2,500 iterations, half of the rocks detected. It is played at 480
 iterations per second in a window of 1280 x 800. Chromium draws at most 60 frames per second, so
-"full redraw" tells how much time is left. The rover epoch is real, of random networks or of the
-champion of a run; "usable" is from the start of navigation to ``body[data-ready=yes]``.
+"full redraw" shows how much time is left. The rover epoch is real, of random networks or of the
+champion of a run. "usable" is from the start of navigation to ``body[data-ready=yes]``.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from machine import machine, spread, table
 
 ROOT = Path(__file__).resolve().parent.parent
 WINDOW = {"width": 1280, "height": 800}
-SPEED = 480  # iterations per second: five seconds of it are the whole epoch
+SPEED = 480  # iterations per second: the whole epoch takes five seconds
 SHOWS = {"as it opens": (), "trails, ranges, a robot selected": ("#trails", "#ranges")}
 WHEN_READY = """
 new MutationObserver(() => {

@@ -58,7 +58,7 @@ def formula_tools(folder):
 
 
 def build(folder, tools, version):
-    """Build the pages in an empty folder and return where the site is."""
+    """Build the pages in an empty folder and return the site's folder."""
     pages = folder / "pages"
     site_pages.write_pages(pages)
     site_pages.write_sources(folder / "src")
@@ -80,7 +80,7 @@ def build(folder, tools, version):
 
 
 def finish(built, tools):
-    """Render the formulas of all pages, and mark cells of much text; return how many formulas."""
+    """Render the formulas of all pages, and mark cells of much text; return their number."""
     texts = {page: page.read_text(encoding="utf-8") for page in sorted(built.rglob("*.html"))}
     found = [
         {"tex": html.unescape(m["tex"]), "display": m["kind"] == "["}
@@ -103,7 +103,7 @@ def finish(built, tools):
 
 
 def order(version):
-    """Return the key by which versions are sorted: releases after their development versions."""
+    """Return the sort key of a version: releases come after their development versions."""
     numbers, _, rest = version.partition(".dev")
     return [int(n) for n in numbers.split(".")], not rest, int(rest or 0)
 
@@ -121,7 +121,7 @@ def foreign(out, version):
 
 
 def publish(built, out, version):
-    """Put a built site into its folder, and make the list of versions and ``latest`` again."""
+    """Put a built site into its folder, and update the list of versions and ``latest``."""
     target = out / version
     shutil.rmtree(target, ignore_errors=True)
     shutil.copytree(built, target)

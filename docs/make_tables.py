@@ -1,7 +1,7 @@
 """Write the tables of the pages that the package itself can fill: ``python docs/make_tables.py``.
 
-A table stands between ``<!-- table: NAME -->`` and ``<!-- end -->``; everything between the two is
-replaced. ``tests/test_docs.py`` fails while a page is behind the package.
+A table lies between ``<!-- table: NAME -->`` and ``<!-- end -->``; everything between the two is
+replaced. ``tests/test_docs.py`` fails while a page is out of date.
 """
 
 import re
@@ -33,7 +33,7 @@ def table(head, rows):
 
 
 def worlds_by_methods():
-    """Return which presets hold sizes for each method in each world."""
+    """Return the presets that have sizes for each method in each world."""
     rows = []
     for name, entry in METHODS.items():
         cells = []
@@ -46,7 +46,7 @@ def worlds_by_methods():
 
 
 def _has_sizes(preset, world, method):
-    """Whether a preset says anything about a method, or its family, in a world or in any."""
+    """Return whether a preset has sizes for a method, or its family, in a world or in any."""
     tables = tomllib.loads(_preset_text(preset))
     methods = {name for part in (world, "any") for name in tables.get(part, {}).get("method", {})}
     return method in methods or METHODS[method].family in methods
@@ -57,7 +57,7 @@ def _preset_text(preset):
 
 
 def presets(task, has_purpose=True):
-    """Return what each preset means for CONE in a task."""
+    """Return the sizes of each preset for CONE in a task."""
     rows = []
     for preset in PRESETS:
         config = resolve(task, "cone", preset)
@@ -97,7 +97,7 @@ def card(module):
 
 
 def construction_environments():
-    """Return the objects, the obstacles and what is built in every environment of gathering."""
+    """Return objects, obstacles and complex objects of every environment of gathering."""
     rows = []
     for name in WORLDS["gacc-v2"].environments:
         plan = GaccWorld(name).plan
@@ -161,7 +161,7 @@ def team_types():
 
 
 def shaping_experiments():
-    """Return what is in the arena of every shaping experiment (section 4.3)."""
+    """Return the contents of the arena of every shaping experiment (section 4.3)."""
     rows = []
     for name in WORLDS["prey-v2"].environments:
         scenarios = PreyWorld(name).scenarios(range(200))
@@ -230,7 +230,7 @@ TABLES = {
 
 
 def updated(text):
-    """Return a page with all its tables as the package has them now."""
+    """Return a page with all its tables brought up to date."""
     return MARKED.sub(lambda m: f"{m[1]}{TABLES[m[2]]()}{m[3]}", text)
 
 

@@ -1,14 +1,13 @@
 """Execute the examples of a page: ``python docs/run_page.py [--write] PAGE...``.
 
-Blocks are executed from top to bottom in one empty folder, as a reader would:
+Blocks are executed from top to bottom in one empty folder, as a reader would do:
 
 - ``sh`` by bash, ``python`` by Python; a ``text`` block right after one is its output;
 - a block below ``<!-- file: NAME -->`` is written to that file;
-- a block below ``<!-- not run: REASON -->`` is left alone, and so is its output.
+- a block below ``<!-- not run: REASON -->`` is skipped, and so is its output.
 
-Output is compared word by word; numbers, sizes of castes and times may differ. An output that
-has "conevo: error" in it belongs to a command that must fail. ``--write`` puts the output of
-today into the page.
+Output is compared word by word; numbers, sizes of castes and times may differ. A command must fail
+if its output contains "conevo: error". ``--write`` puts today's output into the page.
 """
 
 import os
@@ -38,7 +37,7 @@ REPLACED = ((CASTES, "CASTES"), (CASTES_JSON, "CASTES"), (NUMBER, "#"), (SPAN, "
 
 @dataclass(frozen=True)
 class Block:
-    """One example: what it is, what it prints, and where in the page that stands."""
+    """One example: its kind and text, its output, and the output's place in the page."""
 
     kind: str
     text: str
@@ -59,7 +58,7 @@ def blocks(page):
 
 
 def shape(text):
-    """Return what must be the same on every machine and in every run."""
+    """Return the part of an output that must be the same on every machine and in every run."""
     for pattern, word in REPLACED:
         text = re.sub(pattern, word, text)
     lines = [line.strip() for line in text.strip().splitlines()]
@@ -70,10 +69,10 @@ def execute(page, folder):
     """Execute a page's examples in a folder.
 
     Yields:
-        Each executed block with the output it had.
+        Each executed block with its output.
 
     Raises:
-        RuntimeError: a command failed that should not, or the other way round.
+        RuntimeError: a command failed that should not fail, or succeeded although it should fail.
     """
     bin_folder = folder / ".bin"
     bin_folder.mkdir()
@@ -114,7 +113,7 @@ def differences(path):
     with tempfile.TemporaryDirectory() as folder:
         for block, output in execute(path.read_text(encoding="utf-8"), Path(folder)):
             if block.output is not None and shape(output) != shape(block.output):
-                found.append(f"{block.text}printed\n{output}but the page says\n{block.output}")
+                found.append(f"{block.text}printed\n{output}but the page shows\n{block.output}")
     return found
 
 

@@ -12,7 +12,7 @@ HEAD = ["setting", "meaning", "allowed", "default", *PRESETS]
 
 
 def shown(value):
-    """Return a value as a configuration file has it."""
+    """Return a value as in a configuration file."""
     if value is None:
         return "left out"
     if value == "":
@@ -36,7 +36,7 @@ def allowed(one):
 
 @cache
 def settled(task, method, preset):
-    """Return (section, setting, value) of everything that decides a run."""
+    """Return (section, setting, value) for everything that affects a run's results."""
     return settings_of(resolve(task, method, preset))
 
 

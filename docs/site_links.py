@@ -1,4 +1,4 @@
-"""Whether the links of a built site lead somewhere, and whether it loads things from elsewhere."""
+"""Checks of a built site: links must lead somewhere, and nothing may be loaded from elsewhere."""
 
 from html.parser import HTMLParser
 from pathlib import Path
@@ -31,7 +31,7 @@ class Page(HTMLParser):
 
 
 def faults(site):
-    """Return what is wrong with the links of a site, one line each; ``site`` is its folder."""
+    """Return the faults in the links of a site, one line each; ``site`` is its folder."""
     pages = {
         path.resolve(): Page(path.read_text(encoding="utf-8")) for path in site.rglob("*.html")
     }

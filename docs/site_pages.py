@@ -1,4 +1,4 @@
-"""The pages of the documentation site: where each comes from, in Markdown that Zensical reads."""
+"""The pages of the documentation site: the source of each, in Markdown for Zensical."""
 
 import json
 import os
@@ -7,7 +7,7 @@ import shutil
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-# Pages outside docs/, and folders for which a page stands.
+# Pages outside docs/, and folders that a page represents.
 OTHERS = {
     "README.md": "overview.md",
     "CONTRIBUTING.md": "contributing.md",
@@ -43,7 +43,7 @@ def sources():
 
 
 def place_of(path, pages):
-    """Return where a file of the repository is on the site, None for a folder without a page."""
+    """Return the place of a repository's file on the site, None for a folder without a page."""
     if path in pages:
         return pages[path]
     if path in FOLDERS:
@@ -56,7 +56,7 @@ def place_of(path, pages):
 
 
 def dialect(text):
-    """Return GitHub's Markdown as Python-Markdown reads it: lists apart, with four spaces."""
+    """Return GitHub's Markdown in the form for Python-Markdown: lists apart, with four spaces."""
     fences = []
 
     def put_away(match):
@@ -79,7 +79,7 @@ def dialect(text):
 
 
 def linked(text, source, pages):
-    """Return a page with its links as they are on the site, and the files that they lead to."""
+    """Return a page with its links changed for the site, and the files that they lead to."""
     files = set()
 
     def moved(match):

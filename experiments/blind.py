@@ -1,10 +1,10 @@
-"""Blind rovers: a controller that sees nothing, for what teams can reach without looking.
+"""Blind rovers: a controller without sensing, to measure the value that blind teams reach.
 
-In every iteration a blind rover draws one of its actions by their shares; if it moves, it goes on
+In every iteration a blind rover draws one of its actions by their shares. If it moves, it continues
 straight ahead or, once in ``stretch`` moves, turns to a new direction. The heuristic rovers of
-table 5.3 are the same with a stretch of 1. A genotype is one kind of rover, and a team may hold any
-kinds. It is a controller like those of the package, so that blind and seeing teams are played by
-the same kernels.
+table 5.3 are the same with a stretch of 1. A genotype is one kind of rover, and a team may have
+several kinds. It is a controller like those of the package, so that blind and seeing teams are
+played by the same kernels.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ def kind(shares: Sequence[float], stretch: float, draw: int = 0) -> npt.NDArray[
     Args:
         shares: of low, med, hi and move; any sum.
         stretch: moves in one direction, on average.
-        draw: which random numbers it has, 0 to 999.
+        draw: number of its random sequence, 0 to 999.
     """
     parts = np.array([*(np.array(shares) / sum(shares)), 1 / stretch, draw / 1000])
     return (2 * parts - 1).astype(np.float32)
@@ -42,7 +42,7 @@ def kind(shares: Sequence[float], stretch: float, draw: int = 0) -> npt.NDArray[
 
 @wp.struct
 class BlindShape:
-    """Nothing but what a struct must have: outputs of the world."""
+    """The number of outputs of the world, since a struct must have a field."""
 
     n_outputs: int
 
@@ -82,7 +82,7 @@ def load(
 
 @wp.func
 def clear(memory: BlindMemory, shape: BlindShape, i: int) -> None:
-    """Let robot ``i`` remember nothing."""
+    """Reset robot ``i``'s memory."""
     memory.age[i] = 0.0
     memory.ahead[2 * i] = 0.0
     memory.ahead[2 * i + 1] = 0.0
@@ -130,7 +130,7 @@ class Blind:
     n_memory: ClassVar[int] = 1
 
     def genome(self, n_inputs: int, n_outputs: int) -> Genome:
-        """Return what a controller is built from: one part, which is all of it."""
+        """Return the parts of a controller: one, the whole controller."""
         return Genome(n_parts=1, max_parts=1, n_genes=int(N_GENES))
 
     def mind(self, n_inputs: int, n_outputs: int) -> Mind:
@@ -152,5 +152,5 @@ class Blind:
     def forward(
         self, genes: Floats, active: Bools, memory: Floats, inputs: Floats, n_outputs: int
     ) -> tuple[Floats, Floats]:
-        """Blind rovers are played by the kernels only."""
+        """Refuse: blind rovers are played by the kernels only."""
         raise NotImplementedError

@@ -1,14 +1,14 @@
-"""Measure, without evolution, which reading of the multi-rover world may be called the thesis'.
+"""Measure, without evolution, which readings of the multi-rover world agree with the thesis.
 
     python experiments/calibration.py [--scenarios N] [--write docs/results/calibration.md]
 
 plays heuristic, blind and random teams in the rover worlds: types mixed and starts anywhere, or
 types apart and starts by robot; four ranges; all rocks in range or one for an activation; high and
-low accuracies. Of every reading it asks what the thesis' results ask for (``CRITERIA``). Then
-castes by place are compared with switchers, over segregation, accuracies and ranges, in five times
-as many scenarios. With ``--write`` the numbers go to two CSV files next to the page, and the tables
-between its markers; ``--again`` makes the tables from the files. One thread; the same arguments
-give the same numbers.
+low accuracies. Every reading is tested for the thesis' results (``CRITERIA``). Then castes by place
+are compared with switchers, over segregation, accuracies and ranges, in five times the number of
+scenarios. With ``--write`` the numbers go to two CSV files next to the page, and the tables between
+its markers; ``--again`` makes the tables from the files. One thread; the same arguments give the
+same numbers.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from teams import Teams, controlled, error, keys_of, random_networks
 LENGTHS = (1250, 2500)
 MOVES = (0.25, 0.5, 0.75)  # share of a blind rover's iterations
 STRETCHES = (1, 10, 30)
-STRAIGHT = STRETCHES[1:]  # where the best is looked for: never among random walkers
+STRAIGHT = STRETCHES[1:]  # candidates for the best: never random walkers
 N_RANDOM = 3
 
 
@@ -68,7 +68,7 @@ class Reading:
 
 
 def by_place(n_robots: int) -> npt.NDArray[np.int_]:
-    """Return the setting of each robot: one that its region's type asks for."""
+    """Return the setting of each robot: one that the type of its region requires."""
     return np.array([OF_REGION[i % 4][i // 4 % 2] for i in range(n_robots)])
 
 
@@ -90,7 +90,7 @@ def others(world: Any) -> Teams:
 
 @dataclass(frozen=True)
 class BlindTeams:
-    """Blind teams: kinds of rover [K, G], which of them every robot is [N, R], and names."""
+    """Blind teams: kinds of rover [K, G], the kind of every robot [N, R], and names."""
 
     genes: npt.NDArray[np.float32]
     who: npt.NDArray[np.int32]
@@ -129,7 +129,7 @@ def blind_teams(
 
 
 class Field:
-    """One environment under one reading, and the clock of all that is played.
+    """One environment under one reading, and a count of all simulated steps.
 
     Attributes:
         team_steps: teams times iterations, of all fields so far.
@@ -158,7 +158,7 @@ class Field:
         return found.performance["value"].astype(np.float64)
 
 
-# --- what is measured -----------------------------------------------------------------------------
+# --- measurements ---------------------------------------------------------------------------------
 
 
 def best_of(values: dict[str, Any], prefix: str = "") -> str:
@@ -183,7 +183,7 @@ def simple_values(reading: Reading, iterations: int, keys: Sequence[int]) -> dic
 
 
 def judged(reading: Reading, iterations: int, keys: Sequence[int], simple: dict[int, float]) -> Row:
-    """Return everything that is measured of a reading at one length of epochs."""
+    """Return all measurements of a reading at one length of epochs."""
     field = Field("complex-5", iterations, reading.params())
     every = blind_teams(field.world.n_robots, ("switchers", "castes"), STRAIGHT)
     found = field.seeing(clones(field.world) + others(field.world), keys)
@@ -228,7 +228,7 @@ def readings() -> Iterator[Reading]:
 def measure_readings(n_scenarios: int) -> Iterator[Row]:
     """Yield a row of numbers for every reading and length."""
     every = keys_of(1, n_scenarios, "calibration")
-    simple: dict[Any, dict[int, float]] = {}  # there are no types there that could lie apart
+    simple: dict[Any, dict[int, float]] = {}  # these have one type only, so nothing to segregate
     for reading in readings():
         is_large = reading.ranges in ("R*", "area")  # slower, and alike in all scenarios
         keys = every[: max(2, n_scenarios // 2)] if is_large else every
@@ -242,8 +242,8 @@ def measure_readings(n_scenarios: int) -> Iterator[Row]:
 def measure_incentives(n_scenarios: int) -> Iterator[Row]:
     """Yield castes by place against switchers in every cell of segregation, starts and settings.
 
-    Of blind teams the best of each family is chosen in one half of the scenarios and measured in
-    the other.
+    The best blind team of each family is chosen in one half of the scenarios and measured in the
+    other.
     """
     keys = keys_of(1, 5 * n_scenarios, "incentives")
     half = len(keys) // 2
@@ -279,7 +279,7 @@ def of_pair(castes: Any, switchers: Any, prefix: str) -> Row:
 
 
 def measured(rows: Iterator[Row], title: str, path: Path | None) -> list[Row]:
-    """Return all rows; say how far they are, and keep those that there are in a CSV file."""
+    """Return all rows; print the progress, and write the rows so far to a CSV file."""
     found: list[Row] = []
     began = time.monotonic()
     for row in rows:
@@ -295,7 +295,7 @@ def measured(rows: Iterator[Row], title: str, path: Path | None) -> list[Row]:
 
 
 def made_with(part: str, seconds: float) -> str:
-    """Return with what, and in which time, a part of the numbers was measured."""
+    """Return versions, machine and time of the measurement of a part of the numbers."""
     import platform
 
     import warp as wp

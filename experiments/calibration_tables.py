@@ -1,4 +1,4 @@
-"""What ``calibration.py`` measured, as tables: criteria, readings, incentives and the rule."""
+"""Tables of the measurements of ``calibration.py``: criteria, readings, incentives, the rule."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from pages import Row, table
 
 __all__ = ["ACCURACIES", "CRITERIA", "PAGE_PARTS", "PARTS", "RANGES", "SETTINGS"]
 
-PARTS = {"readings": "", "incentives": "-incentives"}  # what the names of the CSV files end with
+PARTS = {"readings": "", "incentives": "-incentives"}  # suffixes of the names of the CSV files
 SETTINGS = ("low", "med", "hi")
 RANGES: dict[str, dict[str, Any]] = {
     "R0": {"low_range": 0.07, "med_range": 0.05, "hi_range": 0.03},
@@ -57,7 +57,7 @@ CRITERIA: dict[str, Callable[[Row], bool]] = {
 
 
 def criteria(readings: list[Row]) -> str:
-    """Return how many readings meet each criterion, by ranges, and how many meet several."""
+    """Return the number of readings that meet each criterion, by ranges, and that meet several."""
     by_ranges = {name: [row for row in readings if row["ranges"] == name] for name in RANGES}
     head = ["criterion", *(f"{name}, of {len(some)}" for name, some in by_ranges.items())]
     lines = [
@@ -71,12 +71,12 @@ def criteria(readings: list[Row]) -> str:
 
 
 def n_met(row: Row) -> int:
-    """Return how many criteria a reading meets."""
+    """Return the number of criteria that a reading meets."""
     return sum(is_met(row) for is_met in CRITERIA.values())
 
 
 def by_reading(readings: list[Row]) -> str:
-    """Return what is reached under every reading, and how many criteria it meets."""
+    """Return the values reached under every reading, and the number of criteria it meets."""
     head = [
         *("types and starts", "ranges", "accuracies", "rocks", "iterations", "random"),
         *("switchers", "best blind", "complex", "simple", "rank of 10"),
@@ -142,7 +142,7 @@ def three(row: Row) -> str:
 
 
 def rule(cells: list[Row]) -> str:
-    """Return how far the rule is from what was measured, in cells for finding and for testing."""
+    """Return the rule's deviation from the measurements, in cells for finding and for testing."""
     head = [
         "cells",
         "starts",

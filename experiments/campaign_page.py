@@ -1,10 +1,10 @@
-"""Put what a campaign says into its results page.
+"""Put the results of a campaign into its page.
 
     python experiments/campaign_page.py CAMPAIGN FOLDER
 
 writes the report of a finished campaign into ``FOLDER/report``, and tables between the markers of
-``FOLDER/README.md``: what was run and what it cost, performance, comparisons with CONE, castes and
-the claims of the thesis.
+``FOLDER/README.md``: runs and their cost, performance, comparisons with CONE, castes and the claims
+of the thesis.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ def p(value: float | None) -> str:
 
 
 def cost_table(tables: Tables) -> str:
-    """Return what was run: per task its runs, seeds, evaluations and cost."""
+    """Return runs, seeds, evaluations and cost of each task."""
     _, rows = tables.query(
         "SELECT task, count(*), count(DISTINCT method), min(seed), max(seed), min(evaluations), "
         "max(evaluations), sum(team_steps), sum(core_seconds) FROM runs GROUP BY task ORDER BY task"
@@ -140,7 +140,7 @@ def claims_table(tables: Tables) -> str:
 
 
 def made_with(campaign: Campaign) -> str:
-    """Return versions and machine of the runs, and how many failed."""
+    """Return versions and machine of the runs, and the number that failed."""
     about = [Run(campaign.paths.run(name)).provenance for name in campaign.planned]
     keys = ("conevo", "warp", "numpy", "python", "cpu")
     each = {key: sorted({str(one[key]) for one in about}) for key in keys}

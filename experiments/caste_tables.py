@@ -1,7 +1,7 @@
-"""Tables 4.4 and 4.5: what the fittest teams are made of, and what they lose without it.
+"""Tables 4.4 and 4.5: the composition of the fittest teams, and their losses in lesions.
 
-Nitschke 2009, sections 4.6.4 and 4.6.6. Both are plain data for any set of runs; of each method's
-runs the one with the fittest team is taken.
+Nitschke 2009, sections 4.6.4 and 4.6.6. Both are plain data for any set of runs. They take each
+method's run with the fittest team.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ def composition_table(
     threads: int | None = None,
     rules: Any = None,
 ) -> list[dict[str, Any]]:
-    """Return table 4.4: how many robots are specialized to which collective behaviour.
+    """Return table 4.4: the number of robots specialized to each collective behaviour.
 
     Plain data, a row per method: method, run, task, the number of robots (as the study calls them),
     a number for each collective behaviour (None, the thesis' NA, if the team never showed it),
@@ -59,9 +59,9 @@ def lesion_table(
 
     Plain data, a row per method: method, run, task, the world's main measure by its name
     (unlesioned), and for each individual behaviour the percentage of it that is left when all
-    robots specialized to the behaviour are replaced; None if there is no such robot, or the whole
-    team has 0. All teams of a row meet the same fresh scenarios, others than those they were
-    labelled in.
+    robots specialized to the behaviour are replaced; None if no robot is, or if the whole team has
+    0. All teams of a row meet the same fresh scenarios, which differ from those in which they were
+    labelled.
 
     Raises:
         UsageError: no runs, a run of another world, or one without a team.
@@ -88,10 +88,10 @@ def lesion_table(
 
 
 def fittest_runs(runs: Iterable[Run]) -> dict[str, Run]:
-    """Return each method's run with the fittest champion, the earlier given one if equal.
+    """Return each method's run with the fittest champion; ties go to the first given one.
 
-    Champions are compared by their validation, which did not make them finalists; if a run of the
-    method has none, by the fitness that selected them.
+    Champions are compared by their validation, which did not select them as finalists; if a run of
+    the method has none, by the fitness that selected them.
 
     Raises:
         UsageError: no runs, or one without a team.

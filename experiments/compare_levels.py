@@ -2,12 +2,12 @@
 
     python experiments/compare_levels.py CAMPAIGN --baseline credit=equation --write PAGE
 
-Runs whose FACTOR is the baseline's level are what the others are compared with, wherever all other
-factors agree that both have: with ``credit=equation`` each credit within each method and range,
-with ``method=mesp`` each form of exchange of CONE within each world. With ``--write`` a row per run
-goes to the CSV file next to the page and the tables between the page's markers; ``--again`` makes
-the tables from the CSV file. Several ``--baseline`` give a table each, ``<!-- BASELINE -->``, and
-where the page has the marker ``<!-- BASELINE pooled -->`` one over all cells.
+Runs with the baseline's level of FACTOR are compared with all others that agree in the factors that
+both have: with ``credit=equation`` each credit within each method and range, with ``method=mesp``
+each form of exchange of CONE within each world. With ``--write`` a row per run goes to the CSV file
+next to the page and the tables between the page's markers; ``--again`` makes the tables from the
+CSV file. Several ``--baseline`` give a table each, ``<!-- BASELINE -->``. If the page has the
+marker ``<!-- BASELINE pooled -->`` it also gets one over all cells.
 """
 
 from __future__ import annotations
@@ -35,10 +35,10 @@ FACTS = {"seed", "value", "first", *COST, *SIGNAL}
 
 
 def rows_and_cost(name: str) -> tuple[list[Row], str]:
-    """Return a row per finished run of a campaign: its levels, value and cost; and what was run.
+    """Return a row per finished run of a campaign (levels, value, cost), and their provenance.
 
     Raises:
-        UsageError: there is no such campaign, or none of its runs is finished.
+        UsageError: the campaign does not exist, or none of its runs is finished.
     """
     campaign = find_campaign(name)
     with sealed(campaign) as folder, Tables(folder) as tables:
@@ -67,7 +67,7 @@ def factors_of(row: Row) -> dict[str, str]:
 
 
 def groups(rows: Sequence[Row], factor: str, level: str) -> Iterator[tuple[Any, ...]]:
-    """Yield what is compared: shared levels, name of the rest, its runs, runs of the baseline."""
+    """Yield the comparisons: shared levels, name of the rest, its runs, runs of the baseline."""
     baseline = [row for row in rows if factors_of(row).get(factor) == level]
     if not baseline:
         levels = sorted({level_name(row[factor]) for row in rows if factor in row})
@@ -89,7 +89,7 @@ def groups(rows: Sequence[Row], factor: str, level: str) -> Iterator[tuple[Any, 
 
 
 def mean(runs: Sequence[Row], of: str) -> float | None:
-    """Return the mean of what runs have of a column, None if none has it."""
+    """Return the mean of a column over the runs that have it, None if none has it."""
     found = [float(row[of]) for row in runs if row.get(of) is not None]
     return float(np.mean(found)) if found else None
 
@@ -137,7 +137,7 @@ def comparison_table(rows: Sequence[Row], factor: str, level: str) -> str:
 
 
 def pooled_table(rows: Sequence[Row], factor: str, level: str) -> str:
-    """Return what the cells of a comparison have in common: the mean of their relative differences.
+    """Return the mean relative difference over the cells of a comparison.
 
     A row for each level over all cells, and one for each of its methods. The baseline's mean is
     taken as exact. Cells with a single run on either side do not count.

@@ -16,7 +16,7 @@ def contrast(weighted: Sequence[tuple[float, Comparison]]) -> Estimate:
     """Return a weighted sum of differences, with Welch's interval (Satterthwaite).
 
     Args:
-        weighted: weights and comparisons, each with two runs on both sides at least.
+        weighted: weights and comparisons, each with at least two runs on both sides.
     """
     value, parts = 0.0, []
     for weight, of in weighted:

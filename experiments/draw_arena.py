@@ -1,8 +1,8 @@
 """Draw a Khepera's sensors and an epoch of pursuit-evasion: ``python experiments/draw_arena.py``.
 
-Left: where the eight infrared (and, on predators, eight light) sensors sit and the cone each one
-sees. Right: the first iterations of an epoch of four heuristic predators and the default prey, up
-to a little after the first capture.
+Left: the places and cones of the eight infrared (and, on predators, eight light) sensors. Right:
+the first iterations of an epoch of four heuristic predators and the default prey, up to a little
+after the first capture.
 """
 
 import argparse
@@ -53,11 +53,11 @@ def draw_sensors(ax, params):
     span = params.sensor_range_cm + RADIUS + 4
     ax.set(xlim=(-span, span), ylim=(-span, span), aspect="equal", xlabel="cm", ylabel="cm")
     reach = f"{params.sensor_range_cm:g} cm, {2 * angle:g} degrees"
-    ax.set_title(f"What the sensors see: eight cones, {reach}", loc="left", fontsize=10)
+    ax.set_title(f"The sensors: eight cones, {reach}", loc="left", fontsize=10)
 
 
 def draw_epoch(ax, world, seed):
-    """Draw the ways of predators and prey up to a little after the first capture."""
+    """Draw the paths of predators and prey up to a little after the first capture."""
     scene = world.scenarios([fold(seed, "draw_arena")])
     teams = controlled(world, "heuristic", 0)
     rollout = conevo.Rollout(world, n_threads=1)

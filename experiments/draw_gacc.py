@@ -1,8 +1,8 @@
 """Draw a scenario of gathering and construction: ``python experiments/draw_gacc.py [--run RUN]``.
 
-Left: how an epoch begins: home area, construction zone, obstacles, objects, robots. Right: the same
-epoch at its end, with what was carried where and what was built; played by a mix of heuristic
-controllers, or by the champion of a run.
+Left: the start of an epoch: home area, construction zone, obstacles, objects, robots. Right: the
+same epoch at its end, with the paths of carried objects and the complex objects built. It is played
+by a mix of heuristic controllers, or by the champion of a run.
 """
 
 import argparse
@@ -32,7 +32,7 @@ MIX = (0, 0, 0, 15, 8, 6, 0, 0, 0, 1)  # robots of each heuristic: gatherers do 
 
 
 def draw_place(ax, world, scene):
-    """Draw what does not move: home area, construction zone, obstacles."""
+    """Draw the fixed things: home area, construction zone, obstacles."""
     p = world.params
     for side, face, name in ((p.home_side, "#F1E7D3", "home area"), (p.zone_side, "#FFFFFF", "")):
         corner = (0.5 - side / 2, 0.5 - side / 2)
@@ -59,7 +59,7 @@ def draw_objects(ax, types, x, y, which, **look):
 
 
 def draw_start(ax, world, scene):
-    """Draw how the epoch begins, and how far one of the robots senses."""
+    """Draw the start of the epoch, and the range of one robot's sensors."""
     draw_place(ax, world, scene)
     types = scene.object_type[0]
     draw_objects(ax, types, scene.object_x[0], scene.object_y[0], types >= 0)
@@ -72,7 +72,7 @@ def draw_start(ax, world, scene):
 
 
 def draw_legend(ax):
-    """Say what the signs mean."""
+    """Draw the legend."""
     shown = [
         Line2D([], [], marker=marker, color=colour, linestyle="", label=f"object {name}")
         for name, colour, marker in TYPES
@@ -85,7 +85,7 @@ def draw_legend(ax):
 
 
 def draw_end(ax, world, scene, seen, who):
-    """Draw the ways on which objects were carried, and where all is in the end."""
+    """Draw the paths of carried objects, and the final places of all things."""
     draw_place(ax, world, scene)
     types, life = scene.object_type[0], seen["life"]
     for k in np.flatnonzero((life[-1] >= WAITING) & (life[-1] <= DELIVERED)):
@@ -111,7 +111,7 @@ def draw_end(ax, world, scene, seen, who):
 
 
 def draw_built(ax, world, scene, seen):
-    """Draw the complex objects as rows of parts: those in place filled, those to come empty."""
+    """Draw the complex objects as rows of parts: filled if in place, empty if missing."""
     types, part = scene.object_type[0], seen["part"][-1]
     n_complex, n_parts = scene.plan.shape
     for c in range(n_complex):

@@ -2,10 +2,10 @@
 
     python experiments/draw_run.py RUN [--next-to OTHER] [--out PICTURE]
 
-Left: the task performance of each generation's fittest team, and which settings the champion's
-rovers use in the testing phase, by the region where they begin. Right: the champion in one
-scenario of that phase, the one whose value is nearest to the median: canals, rocks, the rovers'
-paths. The default place is ``docs/pictures/run-WORLD-METHOD-PRESET-sSEED.png``.
+Left: the task performance of each generation's fittest team, and the settings that the champion's
+rovers use in the testing phase, by the region in which they start. Right: the champion in the
+scenario of that phase with the value nearest to the median: canals, rocks, the rovers' paths. The
+default place is ``docs/pictures/run-WORLD-METHOD-PRESET-sSEED.png``.
 """
 
 import argparse
@@ -30,19 +30,19 @@ from conevo.worlds.rover.sites import N_REGIONS, rock_sites
 
 matplotlib.rcParams.update({"hatch.color": "white", "hatch.linewidth": 0.6})
 PICTURES = Path(__file__).parents[1] / "docs" / "pictures"
-# Setting by setting: colour (Okabe and Ito 2008), line, marker, hatch. Colours differ in lightness
-# too, so the picture can be read in grey and by readers who see few colours.
+# For each setting: colour (Okabe and Ito 2008), line, marker, hatch. Colours differ in lightness
+# too, so the picture can be read in grey and by readers with any kind of colour vision.
 STYLES = {
     "low": ("#E69F00", "-", "o", "..."),
     "med": ("#56B4E9", "-.", "^", "---"),
     "hi": ("#2B2B50", "--", "s", "///"),
     None: ("#9A9A9A", ":", "X", "xxx"),
 }
-PAIRS = ("low, low", "low, med", "med, hi", "hi, hi")  # what two rovers detect a type with
+PAIRS = ("low, low", "low, med", "med, hi", "hi, hi")  # settings of two rovers that detect a type
 
 
 def world_of(run):
-    """Return the world a run was made in."""
+    """Return the world of a run."""
     return run.config.build_world()
 
 
@@ -50,7 +50,7 @@ def champion_in(run, scenarios):
     """Play a run's champion once more in scenarios of its testing phase.
 
     Returns:
-        The scenarios object, its weights and teams, and what came out.
+        The scenarios object, its weights and teams, and the outcome.
     """
     world = world_of(run)
     rollout = Rollout(world, run.config.controller, n_threads=1)
@@ -70,8 +70,8 @@ def replay(run, scenario):
     """Play a run's champion once more in a scenario of its testing phase.
 
     Returns:
-        The scenarios object, paths x and y [T, R], the setting that each rover uses most [R], which
-        rocks were detected [K], and the value the lander recorded.
+        The scenarios object, paths x and y [T, R], the setting that each rover uses most [R],
+        whether each rock was detected [K], and the value that the lander recorded.
     """
     rollout, scene, genes, teams, outcome = champion_in(run, [scenario])
     seen = rollout.record(genes, teams[0], scene)
@@ -89,7 +89,7 @@ def median_scenario(run):
 
 
 def draw_learning(ax, runs):
-    """Draw the value of each generation's fittest team, and where the champion is from."""
+    """Draw the value of each generation's fittest team, and the champion's generation."""
     for run, look in zip(runs, ("-", ":"), strict=False):
         records = run.generations()
         spent = [record["team_evaluations"] for record in records]
@@ -107,7 +107,7 @@ def draw_learning(ax, runs):
 
 
 def draw_settings(ax, runs):
-    """Draw what share each setting has in what the champions' rovers use, region by region."""
+    """Draw the share of each setting among those used by the champions' rovers, by region."""
     ticks, places, at = [], [], 0.0
     for run in runs:
         world = world_of(run)
@@ -137,7 +137,7 @@ def draw_settings(ax, runs):
 
 
 def draw_regions(ax, run):
-    """Draw the lines between regions, and the type that has each, where types have regions."""
+    """Draw the lines between regions, and the type of each, if types have regions."""
     if not run.config.world_params.segregation:
         return
     sites = rock_sites(rocks.layout(run.config.environment))
@@ -158,7 +158,7 @@ def draw_regions(ax, run):
 
 
 def draw_world(ax, run):
-    """Draw the champion's paths in the world, and what it detected there."""
+    """Draw the champion's paths in the world, and its detected rocks."""
     scenario = median_scenario(run)
     scene, x, y, favourites, detected, value = replay(run, scenario)
     canal = np.where(scene.canal > 0, 0.16, 0.0)
@@ -186,7 +186,7 @@ def draw_world(ax, run):
 
 
 def title(runs):
-    """Return a line for each run: what was run at what cost, and what the testing phase found."""
+    """Return a line for each run: settings, cost and results of the testing phase."""
     lines = []
     for run in runs:
         config, last, tested = run.config, run.generations()[-1], run.test_result

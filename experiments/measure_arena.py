@@ -1,18 +1,18 @@
-"""Measure whether predators ever meet prey, in arenas of several sizes and at two speeds.
+"""Measure how often predators meet prey, in arenas of several sizes and at two speeds.
 
     python experiments/measure_arena.py [--prey heuristic shaped] [--run RUN_DIRECTORY] [--seed 1]
 
 plays teams of random networks, of heuristic predators and the champions of the given pursuit runs
 in arenas of 100 to the printed 1000 cm, at Khepera speed and at the largest that makes physical
 sense. ``evolved`` (``--evolve N``) also evolves a team in each of the four corners of that table.
-Writes ``docs/results/arena.csv`` (every number), the tables between the markers of
-``docs/results/arena.md`` and ``docs/results/arena.png``. The same seed gives the same numbers.
-About five minutes of one core for each kind of prey; ``--evolve 4000`` takes half an hour.
+It writes ``docs/results/arena.csv`` (every number), the tables between the markers of
+``docs/results/arena.md`` and ``docs/results/arena.png``. The same seed gives the same numbers. It
+takes about five minutes of one core for each kind of prey; ``--evolve 4000`` takes half an hour.
 
-How often predators are near is counted by the world's own kernel: where every prey counts as
-immobilized at once (``capture_window=1, capture_distance_cm=100``), capture time is the time with
-``capture_predators`` of them in light range. Capture has no influence on what moves, so the epochs
-are the same to the bit.
+The world's own kernel counts how often predators are near: if every prey counts as immobilized at
+once (``capture_window=1, capture_distance_cm=100``), capture time is the time with
+``capture_predators`` of them in light range. Captures do not influence motion, so the epochs are
+equal bit for bit.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ NAMES = {"random": "random networks", "heuristic": "heuristic predators"}
 
 
 def epochs(environment: str, params: Row, teams: Teams, seed: int) -> dict[str, Numbers]:
-    """Return capture time and first capture [N, E] under each of the three ways to count.
+    """Return capture time and first capture [N, E] for each of the three ways to count.
 
     Every team has its own share of the scenarios.
     """
@@ -118,7 +118,7 @@ def measure(prey: list[str], runs: list[str], seed: int) -> list[Row]:
 def evolved(
     environment: str, params: Row, evaluations: int, seed: int, method: str = "homcne"
 ) -> Row:
-    """Evolve a team in an arena (preset desk but for its budget) and measure it there.
+    """Evolve a team in an arena (preset desk with another budget) and measure it there.
 
     Returns:
         The numbers of ``row_of``, and capture time in the testing phase, champion and generation 0.

@@ -1,12 +1,12 @@
-"""Measure what the other reading of the demand signal in gathering and construction would change.
+"""Measure the effect of the other reading of the demand signal in gathering and construction.
 
     python experiments/measure_demand.py [--seeds 4]
 
-Equations 6.4 to 6.6 divide a type's demand by the parts of it that are missing. The world divides
-by their number; the other reading is their share of all planned parts of the type. This plays the
-same teams under both: every heuristic controller alone, random networks and their clones, and teams
-that HomCNE evolved under the world's own reading; then it evolves again under the other reading,
-with the same seeds. Prints a line for each kind of team. Five minutes of a core.
+Equations 6.4 to 6.6 divide a type's demand by its missing parts. The world divides by their number;
+the other reading is their share of all planned parts of the type. This script plays the same teams
+under both: every heuristic controller alone, random networks and their clones, and teams that
+HomCNE evolved under the world's own reading. Then it evolves again under the other reading, with
+the same seeds. It prints a line for each kind of team, and takes five minutes of a core.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ def share(team: Team, scene: Scene, p: Params) -> None:
 
 
 def read(signal: object) -> None:
-    """Let kernels that are made from now on use a reading."""
+    """Make all further kernels use a reading."""
     gacc_resolve.signal = signal
     episode._episode_kernel.cache_clear()
 

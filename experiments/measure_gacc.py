@@ -1,14 +1,15 @@
-"""Measure what gathering and construction is like for teams that do not learn, and why.
+"""Measure the performance of teams that do not learn in gathering and construction.
 
     python experiments/measure_gacc.py [--run RUN_DIRECTORY ...] [--seed 1]
 
-In each of ``CASES``: every heuristic controller alone, the best mix of them that a search finds,
-teams of random networks and of their clones, the champions of the given runs (of preset desk). In
-the first case then the same teams with one chosen parameter changed at a time. Writes
-``docs/results/gacc.csv`` (every number) and the tables between the markers of
-``docs/results/gacc.md``. The same seed and runs give the same numbers. Ten minutes of a core.
+In each of ``CASES`` it plays every heuristic controller alone, the best mix of them that a search
+finds, teams of random networks and of their clones, and the champions of the given runs (of preset
+desk). In the first case it also plays the same teams with one chosen parameter changed at a time.
+It writes ``docs/results/gacc.csv`` (every number) and the tables between the markers of
+``docs/results/gacc.md``. The same seed and runs give the same numbers. It takes ten minutes of a
+core.
 
-The numbers of the best mix (``mixes.py``) are from scenarios that the search for it has not met.
+The numbers of the best mix (``mixes.py``) come from scenarios that its search has not used.
 """
 
 from __future__ import annotations
@@ -48,7 +49,7 @@ CASES = (  # environment and iterations
 )
 N_SCENARIOS = 200  # of a heuristic team or a champion
 N_RANDOM, N_EPOCHS = 200, 5  # random teams of each kind, and scenarios of each
-N_WATCHED = 20  # epochs in which every object is watched
+N_WATCHED = 20  # epochs in which every object is tracked
 FATES = ("detected", "gripped", "brought home", "helped")
 HALVED_AND_DOUBLED = (
     *("home_side", "home_range", "home_sight", "object_accuracy", "object_cost"),
@@ -68,7 +69,7 @@ def world_of(environment: str, **params: Any) -> GaccWorld:
 
 
 def settings() -> dict[str, Row]:
-    """Return what is changed, the default first."""
+    """Return the changes of parameters, the default first."""
     types = get_type_hints(GaccParams, include_extras=True)
     found: dict[str, Row] = {"default": {}}
     for name in HALVED_AND_DOUBLED:
@@ -85,11 +86,11 @@ def settings() -> dict[str, Row]:
     return found | {f"all of {words}": dict(NARROW)}
 
 
-# --- what is measured -----------------------------------------------------------------------------
+# --- measurements ---------------------------------------------------------------------------------
 
 
 def watch(world: GaccWorld, teams: Teams, keys: list[int]) -> Row:
-    """Return how far objects get, in percent of all; one epoch of each of the first teams."""
+    """Return the fates of objects, in percent of all; one epoch of each of the first teams."""
     rollout = conevo.Rollout(world, n_threads=1)
     found = []
     for k, key in enumerate(keys):
@@ -105,7 +106,7 @@ def watch(world: GaccWorld, teams: Teams, keys: list[int]) -> Row:
 
 
 def summary(teams: Teams, delivered: npt.NDArray[Any], kind: str, n_objects: int) -> Row:
-    """Return what the teams of a kind deliver."""
+    """Return the deliveries of the teams of a kind."""
     some = teams.of(kind)
     means: Numbers = sample(delivered, some)
     any_at_all = sample(delivered > 0, some)
@@ -161,12 +162,12 @@ def measure(
 
 
 def percent(value: float) -> str:
-    """Return a percentage with at most two digits that count."""
+    """Return a percentage with at most two significant digits."""
     return f"{value:.0f} %" if value >= 10 else f"{value:.2g} %"
 
 
 def bars_table(rows: list[Row]) -> str:
-    """Return what teams deliver with all defaults: kinds that never deliver share a line."""
+    """Return deliveries with all defaults: kinds of teams without any share a line."""
     head = ["teams", "number", "delivered", "of the optimum", "epochs with any", "teams with any"]
     head += [f"objects {fate}" for fate in FATES]
     lines, nothing = [], []

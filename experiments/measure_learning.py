@@ -1,11 +1,11 @@
-"""Measure what type C fitness and scenarios per round do to how well methods learn.
+"""Measure the effect of type C fitness and of scenarios per round on learning.
 
     python experiments/measure_learning.py TASK [--part example] [--budget N] [--seeds 5]
         [--only NAME ...]
 
 evolves TASK with the preset ``desk`` in every variant of ``VARIANTS`` at the same number of team
 evaluations, and adds a row per run to ``docs/results/learning-PART.csv``: the champion's main task
-performance in 100 fresh scenarios, and what was spent. The table of that part on the page
+performance in 100 fresh scenarios, and the cost. The table of that part on the page
 ``docs/results/learning.md`` is made from all its rows. The same seeds give the same numbers.
 """
 

@@ -3,12 +3,12 @@
     python experiments/measure_prey.py --work runs/prey [--seeds 1 2 3] [--evolve 5000]
 
 makes, for every seed, a prey that was shaped (experiments 1 to 3 in turn) and one that evolved
-directly in experiment 3 from random genotypes, with the same method and as many team evaluations
-as the three together (and one with a third of them); and the same for less time. Then it sets two
-kinds of predators on them, on the prey that are shipped, on heuristic prey, on random walks and on
-random networks: heuristic teams, and teams that evolve against each for ``--evolve`` team
-evaluations. Everything made is kept in ``--work`` and used again. Writes ``docs/results/prey.csv``
-and the tables between the markers of ``docs/results/prey.md``. About two hours of one core.
+directly in experiment 3 from random genotypes, with the same method and the team evaluations of all
+three together (and one with a third of them); and the same for less time. Then it sets two kinds of
+predators on them, on the shipped prey, on heuristic prey, on random walks and on random networks:
+heuristic teams, and teams that evolve against each for ``--evolve`` team evaluations. All runs are
+kept in ``--work`` and used again. It writes ``docs/results/prey.csv`` and the tables between the
+markers of ``docs/results/prey.md``, and takes about two hours of one core.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ NAMES = {
     "random": "random walk",
     "networks": "random networks",
 }
-OTHERS = ("direct", "single", "heuristic", "random", "networks")  # what shaped prey are beside
+OTHERS = ("direct", "single", "heuristic", "random", "networks")  # compared with shaped prey
 Prey = tuple[str, int, str]  # kind, seed (0 if it has none), what ``world.prey`` is set to
 
 
@@ -51,8 +51,8 @@ Prey = tuple[str, int, str]  # kind, seed (0 if it has none), what ``world.prey`
 def family(work: Path, preset: str, seed: int, settings: Row) -> dict[str, conevo.Run]:
     """Return the runs of a shaped prey (its last experiment) and of two evolved directly.
 
-    They are made now unless they are there. Of the direct ones one has as many team evaluations as
-    the three experiments together, one as many as the last of them.
+    They are made now unless they exist. One of the direct ones has the number of team evaluations
+    of the three experiments together, the other that of the last one.
     """
     name = "".join(f"-{value}" for value in settings.values()) + f"-s{seed}"
     path = work / f"shaped{name}"
@@ -72,7 +72,7 @@ def family(work: Path, preset: str, seed: int, settings: Row) -> dict[str, conev
 
 
 def evolve(path: Path, task: str, method: str, preset: str, seed: int, settings: Row) -> conevo.Run:
-    """Return a run, made now unless it is there."""
+    """Return a run, made now unless it exists."""
     if not path.exists():
         return conevo.evolve(task, method, preset, seed, path, overrides=settings, threads=1)
     run = conevo.Run(path)
@@ -98,7 +98,7 @@ def keep(run: conevo.Run, path: Path) -> str:
 
 
 def make_prey(work: Path, preset: str, seeds: list[int]) -> tuple[list[Prey], list[Row]]:
-    """Return all prey but random networks, and what is known of those that evolved here."""
+    """Return all prey except random networks, and the facts about those that evolved here."""
     prey: list[Prey] = [("shipped", 0, "shaped")]
     rows = []
     for seed in seeds:
@@ -112,7 +112,7 @@ def make_prey(work: Path, preset: str, seeds: list[int]) -> tuple[list[Prey], li
 
 
 def shorter(work: Path, preset: str, generations: list[int], seeds: list[int]) -> list[Row]:
-    """Return what heuristic predators achieve against prey that evolved for less time."""
+    """Return the results of heuristic predators against prey that evolved for less time."""
     rows = []
     for n in generations:
         for seed in seeds:
@@ -148,7 +148,7 @@ Times = dict[tuple[str, int, str], Numbers]  # by kind, seed and environment: ca
 
 
 def hunt(prey: Prey, files: list[str], seed: int, kept: Times) -> list[Row]:
-    """Return what heuristic predators achieve against a prey (or several in turn).
+    """Return the results of heuristic predators against a prey (or several in turn).
 
     Capture times in every scenario are put into ``kept``.
     """
@@ -174,7 +174,7 @@ def hunt(prey: Prey, files: list[str], seed: int, kept: Times) -> list[Row]:
 
 
 def compare(kept: Times, seeds: list[int]) -> list[Row]:
-    """Return how much less time predators capture shaped prey than others, in the same scenarios.
+    """Return by how much capture times are shorter for shaped prey, in the same scenarios.
 
     Every seed's shaped prey against the same seed's direct ones, and against each of the others;
     then all seeds together.
@@ -217,9 +217,10 @@ def flee(prey: Prey, seed: int) -> list[Row]:
 
 
 def chase(prey: Prey, work: Path, method: str, evaluations: int, seeds: list[int]) -> list[Row]:
-    """Return what predators of team-3 achieve that evolve against a prey.
+    """Return the results of predators of team-3 that evolve against a prey.
 
-    A prey that was made with a seed meets predators of the same seed, others those of all seeds.
+    A prey that was made with a seed meets predators of the same seed; others meet those of all
+    seeds.
     """
     kind, number, name = prey
     rows = []
@@ -239,7 +240,7 @@ def chase(prey: Prey, work: Path, method: str, evaluations: int, seeds: list[int
             row[who], row[f"{who}_se"] = values.mean(), error(values)
         world = conevo.world("pursuit/team-3")
         keys = keys_of(1, N_SCENARIOS, "prey")
-        outcome = play(world, champion(run, kind), keys)  # against the prey that are shipped
+        outcome = play(world, champion(run, kind), keys)  # against the shipped prey
         against = outcome.performance["capture_time"][0].astype(np.float64)
         row["against_shipped"], row["against_shipped_se"] = against.mean(), error(against)
         rows.append(row | {"value": row["champion"], "n": 200, "evaluations": cost(run)})
@@ -251,7 +252,7 @@ def chase(prey: Prey, work: Path, method: str, evaluations: int, seeds: list[int
 
 
 def title(kind: str, seed: int) -> str:
-    """Return how a prey is written."""
+    """Return the name of a prey in tables."""
     return f"{NAMES[kind]}, seed {seed}" if seed else NAMES[kind]
 
 

@@ -1,12 +1,12 @@
-"""Measure what pursuit-evasion's chosen parameters change, for teams that stay the same.
+"""Measure the effect of pursuit-evasion's chosen parameters on fixed teams.
 
     python experiments/measure_pursuit.py --run RUN_DIRECTORY [--run RUN_DIRECTORY] [--seed 1]
 
 plays fixed teams (heuristic predators, random networks, the champions of the given runs of
-``pursuit/team-3``) in the same scenarios with one parameter changed at a time. Writes
+``pursuit/team-3``) in the same scenarios with one parameter changed at a time. It writes
 ``docs/results/sensitivity-pursuit.csv`` (every number) and the tables between the markers of
-``docs/results/sensitivity-pursuit.md``. The same seed and runs give the same numbers. About twenty
-minutes of one core.
+``docs/results/sensitivity-pursuit.md``. The same seed and runs give the same numbers. It takes
+about twenty minutes of one core.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ FACTORS = {
 
 
 def settings() -> dict[str, Row]:
-    """Return what is changed, the default first."""
+    """Return the changes of parameters, the default first."""
     found: dict[str, Row] = {"default": {}}
     for name, factors in FACTORS.items():
         before = getattr(DEFAULTS, name)
@@ -76,7 +76,7 @@ def measure(runs: list[str], seed: int) -> list[Row]:
 
 
 def cell(row: Row) -> str:
-    """Return how a ratio is written: bold if further than three standard errors from 1."""
+    """Return a ratio as text: bold if further than three standard errors from 1."""
     if np.isnan(row["ratio"]):
         return "–"
     if row["ratio"] == 1 and row["ratio_se"] == 0:

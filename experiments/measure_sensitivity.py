@@ -1,11 +1,11 @@
-"""Measure what the multi-rover world's chosen parameters change, for teams that stay the same.
+"""Measure the effect of the multi-rover world's chosen parameters on fixed teams.
 
     python experiments/measure_sensitivity.py --run RUN_DIRECTORY [--run RUN_DIRECTORY] [--seed 1]
 
 plays fixed teams (heuristic controllers, random networks, the champions of the given runs) in the
-same scenarios with one parameter changed at a time. Writes ``docs/results/sensitivity.csv`` (every
-number) and the tables between the markers of ``docs/results/sensitivity.md``. The same seed and
-runs give the same numbers. About five minutes of one core.
+same scenarios with one parameter changed at a time. It writes ``docs/results/sensitivity.csv``
+(every number) and the tables between the markers of ``docs/results/sensitivity.md``. The same seed
+and runs give the same numbers. It takes about five minutes of one core.
 """
 
 from __future__ import annotations
@@ -58,11 +58,11 @@ SCALES = ((0.07, 0.05, 0.03), (0.10, 0.08, 0.06), (0.20, 0.15, 0.10))
 Params = dict[str, Any]
 
 
-# --- what is varied -------------------------------------------------------------------------------
+# --- settings -------------------------------------------------------------------------------------
 
 
 def scaled(names: tuple[str, ...], factor: float) -> Params:
-    """Return the parameters times a factor, not above what ``RoverParams`` allows."""
+    """Return the parameters times a factor, up to the bounds of ``RoverParams``."""
     types = get_type_hints(RoverParams, include_extras=True)
     found = {}
     for name in names:
@@ -116,7 +116,7 @@ def make_teams(runs: list[str], seed: int) -> Teams:
 
 
 def ranks(values: Numbers) -> Numbers:
-    """Return the ranks of numbers, equal ones sharing their mean rank."""
+    """Return the ranks of numbers; ties share their mean rank."""
     _, inverse, counts = np.unique(values, return_inverse=True, return_counts=True)
     found: Numbers = (np.cumsum(counts) - (counts - 1) / 2)[inverse]
     return found
@@ -192,7 +192,7 @@ def grid(rows: list[Row], cell: Any, corner: str, kinds: list[str]) -> str:
 
 
 def ratio_cell(measured: str) -> Any:
-    """Return how a ratio is written: bold if further than three standard errors from 1."""
+    """Return the function that writes a ratio: bold if over three standard errors from 1."""
     digits = 2 if measured == "value" else 3
 
     def cell(row: Row) -> str:
@@ -215,7 +215,7 @@ def absolute(row: Row) -> str:
 
 
 def number(value: float) -> str:
-    """Return a correlation, or a dash where there is none."""
+    """Return a correlation, or a dash if it is not defined."""
     return "-" if np.isnan(value) else f"{value:.2f}"
 
 

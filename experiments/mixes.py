@@ -1,7 +1,8 @@
 """The best team of heuristic robots in gathering and construction, found by a search.
 
-The ten teams of one heuristic and 190 random mixes play a few scenarios; the ten that deliver most
-and ten neighbours of each play more and fresh ones, the best ten of these more again (``ROUNDS``).
+The ten teams of one heuristic and 190 random mixes play a few scenarios. The ten that deliver most
+and ten neighbours of each play more, new scenarios; the best ten of these play still more
+(``ROUNDS``).
 """
 
 from __future__ import annotations
@@ -15,12 +16,12 @@ from conevo.worlds.gacc.world import GaccWorld
 from teams import Teams, controlled, keys_of, play
 
 ROUNDS = ((200, 10), (110, 40), (10, 200))  # mixes and scenarios of each
-BRED, NEIGHBOURS = 10, 10  # mixes that have neighbours after the first round, and how many each
+BRED, NEIGHBOURS = 10, 10  # mixes with neighbours after the first round, and neighbours of each
 Mix = tuple[int, ...]  # robots of each heuristic
 
 
 def candidate(world: GaccWorld, seed: int, k: int) -> Mix:
-    """Return the teams of one heuristic first, then random shares of those that can be of use."""
+    """Return candidate k: first the teams of one heuristic, then random shares of useful ones."""
     if k < len(world.heuristics):
         return tuple(world.n_robots * (h == k) for h in range(len(world.heuristics)))
     rng, useful = stream(seed, "mixes", world.environment, k), useful_in(world)
@@ -30,13 +31,13 @@ def candidate(world: GaccWorld, seed: int, k: int) -> Mix:
 
 
 def useful_in(world: GaccWorld) -> list[int]:
-    """Return the heuristics of types that are built with, and the non-specialized one."""
+    """Return the heuristics for types in the plan, and the non-specialized one."""
     types = sorted(set(world.plan.parts.ravel().tolist()))
     return [3 * row + kind for row in range(3) for kind in types] + [9]
 
 
 def neighbour(world: GaccWorld, mix: Mix, seed: int, k: int) -> Mix:
-    """Return a mix in which up to eight robots follow another heuristic than before."""
+    """Return a mix in which up to eight robots follow a different heuristic."""
     rng = stream(seed, "mixes", world.environment, "neighbour", *map(str, mix), k)
     found = list(mix)
     loses = rng.choice(np.flatnonzero(mix))
@@ -58,7 +59,7 @@ def written(world: GaccWorld, mix: Mix) -> str:
 
 @cache
 def best(world: GaccWorld, seed: int = 1) -> Mix:
-    """Return the mix that delivers most."""
+    """Return the mix that delivers the most objects."""
     mixes = list(dict.fromkeys(candidate(world, seed, k) for k in range(ROUNDS[0][0])))
     for number, (n_mixes, n_scenarios) in enumerate(ROUNDS):
         if number == 1:

@@ -1,4 +1,4 @@
-"""Arguments and rows of scripts that make tables from a campaign, or again from its numbers."""
+"""Arguments and rows of scripts that make tables from a campaign, or from its CSV file."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class PageParser(argparse.ArgumentParser):
     """A parser for [CAMPAIGN] [--write PAGE] [--again], to which a script adds its own."""
 
     def __init__(self, doc: str | None) -> None:
-        """Take a script's docstring, whose first line says what it does."""
+        """Take a script's docstring, whose first line describes it."""
         super().__init__(description=(doc or "").partition("\n")[0])
         self.add_argument("campaign", nargs="?", help="directory, or name in campaigns/")
         self.add_argument("--write", type=Path, help="page whose tables are replaced")
@@ -37,7 +37,7 @@ def rows_for(
     """Return a row per run, rounded as in the page's CSV file, which is written unless read.
 
     Args:
-        args: of a `PageParser`. What the runs cost is printed, and put into the page.
+        args: of a `PageParser`. The cost of the runs is printed, and put into the page.
         rows_and_cost: makes both from a campaign's name.
 
     Raises:

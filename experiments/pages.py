@@ -1,4 +1,4 @@
-"""What the scripts that write results pages share: numbers as CSV, tables between markers."""
+"""Functions for scripts that write results pages: numbers as CSV, tables between markers."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ Row = dict[str, Any]
 
 
 def write(rows: list[Row], path: Path) -> None:
-    """Write rows of numbers as CSV; the first row's keys come first, what a row lacks is empty."""
+    """Write rows of numbers as CSV, the first row's keys first; missing values are empty."""
     names = list(dict.fromkeys(name for row in rows for name in row))
     with path.open("w", newline="") as file:
         writer = csv.DictWriter(file, fieldnames=names, lineterminator="\n")
@@ -43,7 +43,7 @@ def table(head: list[str], rows: list[list[Any]]) -> str:
 
 
 def read(path: Path) -> list[Row]:
-    """Return the rows that ``write`` wrote: numbers where they are numbers."""
+    """Return the rows written by ``write``, with numbers as numbers."""
     with path.open(newline="") as file:
         return [{k: _number(v) for k, v in row.items() if v != ""} for row in csv.DictReader(file)]
 

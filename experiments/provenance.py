@@ -1,4 +1,4 @@
-"""What a campaign's page says of its making: what was run, what it cost, with what."""
+"""Provenance of a campaign's results for its page: runs, cost, versions, machine."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ PROVENANCE = {
 
 
 def made_with(campaign: Campaign, rows: Sequence[Row]) -> str:
-    """Return what was run and what it cost: seeds, budget, versions, machine, time."""
+    """Return the provenance of the runs: seeds, budget, versions, machine, time."""
     standing = campaign.standings()
     done = [label for label, entry in standing.items() if entry.state == "finished"]
     about = [Run(campaign.paths.run(label)).provenance for label in done]

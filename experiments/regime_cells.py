@@ -1,4 +1,4 @@
-"""The cells of the regime map: runs of two methods in one regime, compared, and the rule's word."""
+"""The cells of the regime map: runs of two methods in one regime, and the rule's prediction."""
 
 from __future__ import annotations
 
@@ -33,13 +33,13 @@ __all__ = [
 ]
 
 INDIVIDUAL, CLONES = "cone-es", "hom-es"
-REGIONS = "ABCD"  # named by the type that lies there; robot i begins in the one of i mod 4
+REGIONS = "ABCD"  # named by the type that lies there; robot i starts in region i mod 4
 SETTINGS = ("low", "med", "hi")
 MARGIN = 0.02  # of the clones' value: a difference that matters
 
 
 def used(region: str, setting: str) -> str:
-    """Return the column with how often the robots of a region used a setting."""
+    """Return the column with the number of uses of a setting by the robots of a region."""
     return f"{region} {setting}"
 
 
@@ -49,7 +49,7 @@ class Cell:
 
     Attributes:
         ranges, accuracies: names of the levels.
-        regime: as the rule takes it.
+        regime: in the form for the rule.
         runs: rows of each method.
         value: of CONE-ES minus HomES, champions in the testing phase.
         p: Welch's, corrected by Holm for all cells.
@@ -69,7 +69,7 @@ class Cell:
 
     @property
     def is_for_finding(self) -> bool:
-        """Whether a threshold may be found with it."""
+        """Whether it may be used to find a threshold."""
         return self.regime.segregation in FINDING
 
     @property
@@ -85,7 +85,7 @@ class Cell:
 
     @property
     def verdict(self) -> str:
-        """What the interval says about +-2 % of the clones' value: decided, or "open"."""
+        """The interval compared with +-2 % of the clones' value: decided, or "open"."""
         low, high = self.share(self.value.low), self.share(self.value.high)
         if low is None or high is None:
             return "open"
@@ -96,15 +96,15 @@ class Cell:
         return "alike" if low > -MARGIN and high < MARGIN else "open"
 
     def mean(self, method: str, of: str | Callable[[Row], float]) -> float | None:
-        """Return the mean over a method's runs of a column, or of what a function makes of a run.
+        """Return the mean over a method's runs of a column, or of a function of a run.
 
-        None where no run has it.
+        None if no run has it.
         """
         found = self.each(method, of)
         return float(np.mean(found)) if found else None
 
     def each(self, method: str, of: str | Callable[[Row], float]) -> list[float]:
-        """Return the same of every run that has it."""
+        """Return the value of every run that has it."""
         if callable(of):
             found = [of(row) for row in self.runs[method] if used("A", "low") in row]
         else:
@@ -142,16 +142,16 @@ def _regime(row: Row) -> Regime:
 
 
 def of_region(row: Row, region: str) -> np.ndarray:
-    """Return the share of each setting in the detections of a region's robots [3]; NaN of none."""
+    """Return the share of each setting in the detections of a region's robots [3]; NaN if none."""
     counts = np.array([float(row[used(region, s)]) for s in SETTINGS])
     return counts / counts.sum() if counts.sum() else np.full(3, np.nan)
 
 
 def apart(row: Row) -> float:
-    """Return how different a run's robots of different regions are, from 0 (alike) to 0.62.
+    """Return how much a run's robots of different regions differ, from 0 (alike) to 0.62.
 
     Half the absolute difference between a region's shares of settings and the mean of the four,
-    averaged over regions: the portion of a region's activations that would have to be others.
+    averaged over regions: the portion of a region's activations that would have to change.
     """
     shares = np.array([of_region(row, region) for region in REGIONS])
     shares = shares[~np.isnan(shares).any(axis=1)]
@@ -162,13 +162,12 @@ def apart(row: Row) -> float:
 
 @dataclass(frozen=True)
 class Trend:
-    """What the cells of the same ranges and accuracies have in common.
+    """The trend over cells of the same ranges and accuracies.
 
     Attributes:
-        cells: with two runs of each method at least, mixed first.
+        cells: with at least two runs of each method, mixed first.
         mean: difference of the methods, mean over cells.
-        slope: how much it grows from segregation 0 to 1, on a line of least squares; None below
-            two cells.
+        slope: its growth from segregation 0 to 1, on a line of least squares; None below two cells.
     """
 
     cells: list[Cell]
@@ -195,7 +194,7 @@ def trends_of(cells: Sequence[Cell]) -> list[Trend]:
     return found
 
 
-# --- what the rule predicts -----------------------------------------------------------------------
+# --- predictions ----------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -203,11 +202,11 @@ class Judged:
     """A way to predict the sign of a difference, found with some cells and tested on others.
 
     Attributes:
-        name: what is compared with the threshold.
+        name: of the number that is compared with the threshold.
         threshold: above it individual controllers are predicted to be better.
-        found, tested: cells with the predicted sign, cells, of either kind.
+        found, tested: cells with the predicted sign and all cells, of each kind.
         right, wrong: cells for testing whose interval excludes 0, with the predicted sign and
-            with the other.
+            with the opposite one.
     """
 
     name: str
@@ -221,13 +220,13 @@ class Judged:
 def threshold(cells: Sequence[tuple[float, float]], near: float = 1.0) -> float:
     """Return the threshold with the fewest wrong signs.
 
-    Choice: halfway between two neighbours, below all (minus infinity) or above all (infinity); of
-    equally good ones that nearest to ``near``: for the rule 1, where it sees a gain by itself. NaN
+    Choice: halfway between two neighbours, below all (minus infinity) or above all (infinity). Ties
+    go to the one nearest to ``near``: 1 for the rule, above which it predicts a gain by itself. NaN
     without any cell.
 
     Args:
-        cells: of each the number that is compared with it, and the difference.
-        near: where it is expected.
+        cells: the number to compare and the difference, for each cell.
+        near: the expected threshold.
     """
     if not cells:
         return math.nan
@@ -250,11 +249,11 @@ def judge(
     """Return how well a number of a regime predicts the sign of the difference.
 
     Args:
-        cells: all of them; those without runs of both methods do not count.
+        cells: all cells; those without runs of both methods do not count.
         name: of the number.
         number: of a cell.
-        at: the threshold, if it is not to be found.
-        near: where it is expected, if it is.
+        at: a fixed threshold; None: it is found.
+        near: the expected threshold, if it is found.
     """
     counted = [(cell, cell.value.difference) for cell in cells if cell.value.difference is not None]
     known = [(number(cell), of) for cell, of in counted if cell.is_for_finding]

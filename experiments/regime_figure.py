@@ -16,10 +16,10 @@ from regime_tables import number, percent
 __all__ = ["draw"]
 
 WIDTH = 8.0  # inches
-MAP, SMALL_MAP = (0.55, 0.75), (0.42, 0.65)  # inches of a row, and of what is around the rows
+MAP, SMALL_MAP = (0.55, 0.75), (0.42, 0.65)  # inches of a row, and of the margins around the rows
 DPI = 150
 DARKEST = 0.6  # black can be read on it
-LEAST = 0.05  # share of the clones' value that has the full colour, or more if a cell has more
+LEAST = 0.05  # smallest share of the clones' value with the full colour
 Write = Callable[[Cell], tuple[str, str, bool]]  # colour, text, whether it is marked
 Numbers = Callable[[Cell], list[float | None]]
 
@@ -59,7 +59,7 @@ def draw(cells: Sequence[Cell]) -> bytes:
 
 
 def small() -> list[tuple[str, Numbers, float, float]]:
-    """Return what the panels below show: title, numbers, and those drawn white and darkest."""
+    """Return the lower panels: title, numbers, and the values drawn white and darkest."""
 
     def of_both(what: str | Callable[[Row], float]) -> Numbers:
         return lambda cell: [cell.mean(method, what) for method in (INDIVIDUAL, CLONES)]
@@ -87,7 +87,7 @@ def difference(cell: Cell, most: float) -> tuple[str, str, bool]:
 
 
 def shaded(of: Numbers, lightest: float, darkest: float) -> Write:
-    """Return what a grey cell shows of its numbers: as dark as the first, the next in brackets."""
+    """Return the writer of grey cells: shaded by the first number, the next one in brackets."""
 
     def write(cell: Cell) -> tuple[str, str, bool]:
         value, *others = of(cell)

@@ -1,8 +1,8 @@
-"""Make the map of regimes: where CONE-ES finds more than the same strategy over clones, HomES.
+"""Make the map of regimes: where CONE-ES is better than the same strategy over clones, HomES.
 
     python experiments/regime_map.py CAMPAIGN --write docs/results/regimes.md
 
-reads what is finished of a campaign of the plan `regimes`. With ``--write`` a row per run goes to
+reads the finished runs of a campaign of the plan `regimes`. With ``--write`` a row per run goes to
 the CSV file next to the page, the figure to the PNG file, and the tables between the page's
 markers; ``--again`` makes tables and figure from the CSV file.
 """
@@ -34,10 +34,10 @@ SETTINGS = ("low", "med", "hi")
 
 
 def regime_of(planned: PlannedRun) -> Row:
-    """Return the regime of a run: the names of its levels, and the numbers that the rule needs.
+    """Return the regime of a run: the names of its levels, and the numbers for the rule.
 
     Raises:
-        UsageError: the run is not of the plan.
+        UsageError: the run does not belong to the plan.
     """
     levels = dict(part.partition("=")[::2] for part in planned.variant.split(", "))
     if missing := {"segregation", "accuracies", "ranges"} - levels.keys():
@@ -61,7 +61,7 @@ def rows_of(tables: Tables, planned: Sequence[PlannedRun], own: Mapping[str, Row
     Args:
         tables: of the campaign.
         planned: its runs.
-        own: what the method says of each finished run, by label.
+        own: the method's own numbers of each finished run, by label.
     """
     regimes = {one.label: regime_of(one) for one in planned}
     first = {one.run: one.value for one in tables.values(team="generation 0")}
@@ -97,10 +97,10 @@ def _keyed(tables: Tables, sql: str) -> dict[str, tuple[Any, ...]]:
 
 
 def _castes(tables: Tables) -> dict[str, Row]:
-    """Return, of each run, how often each region's robots used each setting, and what of it fits.
+    """Return, for each run, how often each region's robots used each setting, and "in place".
 
-    "in place" is the portion of robots whose favourite is a setting that the type of their region
-    (robot i begins in region i mod 4) asks for; of robots that used any.
+    "in place" is the portion, of robots that used any setting, whose favourite is one that the type
+    of their region requires (robot i starts in region i mod 4).
     """
     counts: dict[str, Counter[str]] = {}
     for run, robot, action, n in tables.query("SELECT run, robot, action, count FROM actions")[1]:
@@ -133,10 +133,10 @@ def show(cells: Any) -> None:
 
 
 def rows_and_cost(name: str) -> tuple[list[Row], str]:
-    """Return the rows of a campaign's runs, and what they cost.
+    """Return the rows of a campaign's runs, and their cost.
 
     Raises:
-        UsageError: there is no such campaign, or none of its runs tells anything.
+        UsageError: the campaign does not exist, or has no finished run of the two methods.
     """
     campaign = find_campaign(name)
     planned: Mapping[str, PlannedRun] = campaign.planned

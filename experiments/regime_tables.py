@@ -1,4 +1,4 @@
-"""The regime map in tables: what every cell shows, castes, and how well the rule predicts it."""
+"""The regime map in tables: values of every cell, castes, and the rule's predictions."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def regime_words(cell: Cell) -> str:
 
 
 def number(value: float | None, form: str = ".2f") -> str:
-    """Return a number, or a dash where there is none; 0 has no sign."""
+    """Return a number, or a dash for None; 0 has no sign."""
     if value is None or math.isnan(value):
         return "–"
     text = f"{value:{form}}"
@@ -46,7 +46,7 @@ def number(value: float | None, form: str = ".2f") -> str:
 
 
 def interval(low: float | None, high: float | None, form: str) -> str:
-    """Return an interval, or a dash where there is none."""
+    """Return an interval, or a dash for None."""
     return "–" if low is None else f"{number(low, form)} to {number(high, form)}"
 
 
@@ -84,7 +84,7 @@ def values(cells: Sequence[Cell]) -> str:
 
 
 def trends(cells: Sequence[Cell]) -> str:
-    """Return what cells of the same ranges and accuracies have in common."""
+    """Return the trends over cells of the same ranges and accuracies."""
     head = ["ranges", "accuracies", "cells", "mean difference", "95 % interval"]
     head += ["from mixed to apart", "95 % interval"]
     lines = []
@@ -104,7 +104,7 @@ def estimated(of: Estimate) -> str:
 
 
 def deviations(cells: Sequence[Cell]) -> str:
-    """Return what CONE-ES says of its deviations in the last generation, mean over runs."""
+    """Return CONE-ES's own numbers on deviations in the last generation, mean over runs."""
     head = [*KEYS, "team over clones of its mean", "in runs", "signal", "share of pairs"]
     lines = []
     for cell in cells:
@@ -120,7 +120,7 @@ def deviations(cells: Sequence[Cell]) -> str:
 
 
 def castes(cells: Sequence[Cell]) -> str:
-    """Return what S cannot see, next to S: settings, regions, and places."""
+    """Return the measures that S does not cover, next to S: settings, regions and places."""
     head = [*KEYS, "favourite's share: HomES", "CONE-ES", "difference (95 %)"]
     head += ["between regions: HomES", "CONE-ES", "in place: HomES", "CONE-ES", "S: HomES"]
     head += ["CONE-ES"]
@@ -139,7 +139,7 @@ def castes(cells: Sequence[Cell]) -> str:
 
 
 def settings(cells: Sequence[Cell]) -> str:
-    """Return with which settings the robots of each region work: low / med / hi in percent."""
+    """Return the settings used by the robots of each region: low / med / hi in percent."""
     head = [*KEYS, "method", *(f"region {region}" for region in REGIONS)]
     lines = []
     for cell in cells:
@@ -159,7 +159,7 @@ def settings(cells: Sequence[Cell]) -> str:
 
 
 def judged(cells: Sequence[Cell]) -> list[Judged]:
-    """Return the rule, with the threshold that was found and with 1, and what it must beat."""
+    """Return the rule, with the threshold found and with 1, and the predictors it must beat."""
     return [
         judge(cells, "the rule", lambda cell: cell.incentive),
         judge(cells, "the rule, threshold 1", lambda cell: cell.incentive, at=1.0),
@@ -170,12 +170,12 @@ def judged(cells: Sequence[Cell]) -> list[Judged]:
 
 
 def detection_iterations(cell: Cell) -> float:
-    """Return how many iterations two rovers with the setting med need for a rock, on average."""
+    """Return the mean number of iterations that two rovers with setting med need for a rock."""
     return 1.0 / cell.regime.accuracies[1] ** 2
 
 
 def rule(cells: Sequence[Cell]) -> str:
-    """Return how many cells have the predicted sign, of those for finding and for testing."""
+    """Return the number of cells with the predicted sign, for finding and for testing."""
     head = [
         "predicted by",
         "threshold",
@@ -198,12 +198,12 @@ def rule(cells: Sequence[Cell]) -> str:
 
 
 def limit_words(threshold: float) -> str:
-    """Return a threshold in words where it is below or above everything."""
+    """Return a threshold as text, in words if it is below or above everything."""
     return {math.inf: "above all", -math.inf: "below all"}.get(threshold, number(threshold))
 
 
 def listed(cells: Sequence[Cell]) -> str:
-    """Return cells in words, and how many."""
+    """Return the number of cells, and the cells in words."""
     return f"{len(cells)}: " + "; ".join(map(regime_words, cells)) if cells else "none"
 
 
@@ -223,7 +223,7 @@ def likeness(cells: Sequence[Cell]) -> str:
 
 
 def predicted(cells: Sequence[Cell]) -> str:
-    """Return what the rule says about each cell, and what was seen."""
+    """Return the rule's prediction and the measured result for each cell."""
     limit = judged(cells)[0].threshold
     head = [*KEYS, "for", "castes / switchers by the rule", "predicted", "seen", "as predicted"]
     lines = []
@@ -240,7 +240,7 @@ def predicted(cells: Sequence[Cell]) -> str:
 
 
 def better(is_individual: bool | None) -> str:
-    """Return who is better, or a dash if that is not known."""
+    """Return the better method, or a dash if that is not known."""
     return {True: "CONE-ES", False: "HomES", None: "–"}[is_individual]
 
 

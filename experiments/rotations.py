@@ -1,14 +1,14 @@
-"""Ask who can take whose place: champions of a campaign whose controllers change robots.
+"""Test which robots can stand in for each other: champions with controllers moved between robots.
 
     python experiments/rotations.py CAMPAIGN --write docs/results/specialists.md
 
-Robot i begins in region i mod 4 (``world.starts=by_robot``). Moved on by 4, 8 or 12 robots, every
-controller gets to a robot that begins in the same region; by 1, 2 or 3 to one of another region.
-The controllers of two regions are also swapped, pair by pair. If the first costs nothing and each
-swap much, the robots of a region are a caste: they can stand in for each other, and for nobody
-else. Also: where robots are in the second half of an epoch, by the region where they begin. With
-``--write`` a row per run goes to PAGE-rotations.csv, and the tables between the page's markers
-``<!-- rotations -->``, ``<!-- swaps -->`` and ``<!-- places -->``.
+Robot i starts in region i mod 4 (``world.starts=by_robot``). Moved on by 4, 8 or 12 robots, every
+controller gets to a robot that starts in the same region; by 1, 2 or 3 to one of another region.
+The controllers of two regions are also swapped, pair by pair. If moves within regions cost nothing
+and every swap costs much, the robots of a region are a caste: they can stand in for each other, but
+for no others. The script also measures where robots are in the second half of an epoch, by the
+region of their start. With ``--write`` a row per run goes to PAGE-rotations.csv, and the tables
+between the page's markers ``<!-- rotations -->``, ``<!-- swaps -->`` and ``<!-- places -->``.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from regime_tables import number
 SAME = tuple(N_REGIONS * k for k in (1, 2, 3))
 OTHER = tuple(range(1, N_REGIONS))
 PAIRS = tuple(itertools.combinations(range(N_REGIONS), 2))
-FEW = 3  # scenarios in which robots are watched
+FEW = 3  # scenarios in which places of robots are recorded
 ABCD = "ABCD"  # regions, by the type that lies there
 
 
@@ -56,7 +56,7 @@ FACTS |= {place_name(a, b) for a, b in itertools.product(range(N_REGIONS), repea
 
 
 def orders(n_robots: int) -> dict[str, list[IntArray]]:
-    """Return whose controller each robot has, [R], for every kind of change."""
+    """Return the number of each robot's controller, [R], for every kind of change."""
     robots = np.arange(n_robots)
     swapped = {}
     for a, b in PAIRS:
@@ -71,10 +71,10 @@ def orders(n_robots: int) -> dict[str, list[IntArray]]:
 
 
 def rows_of(name: str, methods: Sequence[str]) -> list[Row]:
-    """Return the value of each finished champion, of the same team changed, and where robots are.
+    """Return the value of each champion and of its changed teams, and the places of robots.
 
     Raises:
-        UsageError: there is no such campaign, or no finished run in which robots begin by region.
+        UsageError: the campaign does not exist, or has no finished run with starts by region.
     """
     campaign = find_campaign(name)
     rows: list[Row] = []
@@ -130,13 +130,13 @@ def _cells(rows: Sequence[Row]) -> tuple[list[str], dict[tuple[str, ...], list[R
 
 
 def _left(runs: Sequence[Row], name: str) -> str:
-    """Return what is left of the value: mean over runs, and from the least to the most."""
+    """Return the remaining share of the value: mean over runs, smallest and largest."""
     left = [100 * float(run[name]) / float(run["own"]) for run in runs]
     return f"{np.mean(left):.0f} % ({min(left):.0f} to {max(left):.0f})"
 
 
 def rotation_table(rows: Sequence[Row]) -> str:
-    """Return what is left in each cell of the value of teams moved within regions and out."""
+    """Return the remaining value in each cell after moves within and between regions."""
     names, cells = _cells(rows)
     lines = [
         [
@@ -153,7 +153,7 @@ def rotation_table(rows: Sequence[Row]) -> str:
 
 
 def swap_table(rows: Sequence[Row]) -> str:
-    """Return what is left in each cell when the controllers of two regions are swapped."""
+    """Return the remaining value in each cell after swaps of the controllers of two regions."""
     names, cells = _cells(rows)
     swaps = [swap_name(pair) for pair in PAIRS]
     lines = [[*at, *(_left(runs, swap) for swap in swaps)] for at, runs in cells.items()]

@@ -42,7 +42,7 @@ class Teams:
         return Teams(self.genes, self.slots[some], self.heuristic[some], (kind,) * len(some))
 
     def without(self, numbers: Sequence[int]) -> Teams:
-        """Return all teams but those with these numbers."""
+        """Return all teams except those with these numbers."""
         some = [n for n in range(len(self.kinds)) if n not in numbers]
         kinds = tuple(self.kinds[n] for n in some)
         return Teams(self.genes, self.slots[some], self.heuristic[some], kinds)
@@ -81,7 +81,7 @@ def random_networks(world: World, n: int, seed: int, *where: str) -> Teams:
 
 
 def random_clones(world: World, n: int, seed: int, *where: str) -> Teams:
-    """Return teams of which all robots have the same random network of the initial size."""
+    """Return teams whose robots all have the same random network of the initial size."""
     genome, r = genome_of(conevo.controller(world=world), world), world.n_robots
     genes = random_genes(stream(seed, *where, "clones"), (n * genome.n_parts, genome.n_genes))
     slots = np.full((n, r, genome.max_parts), -1, dtype=np.int32)
@@ -116,7 +116,7 @@ def error(values: Numbers) -> float:
 
 
 def sample(values: npt.NDArray[Any], rows: list[int]) -> Numbers:
-    """Return what a standard error is taken over: scenarios of one team, or means of the teams."""
+    """Return the values for a standard error: scenarios of one team, or means of the teams."""
     some = values[rows].astype(np.float64)
     return some.mean(axis=1) if len(some) > 1 else some[0]
 
