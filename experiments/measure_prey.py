@@ -348,7 +348,7 @@ def less_evolution(rows: list[Row]) -> str:
 def main() -> None:
     """Measure and write everything."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("--work", type=Path, default=Path("runs/prey"), help="keeps what is made")
+    parser.add_argument("--work", type=Path, default=Path("runs/prey"), help="folder for the runs")
     parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3])
     parser.add_argument("--shorter", type=int, nargs="*", default=[5, 15], help="generations")
     parser.add_argument("--shorter-seeds", type=int, nargs="+", default=[1, 2, 3, 4, 5])

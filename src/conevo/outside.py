@@ -66,7 +66,7 @@ def _load(path: Path, kind: Literal["world", "method"], digest: str = "") -> Sou
     if digest not in ("", found):
         others = ", ".join(file.name for file in list(texts)[1:])
         raise UsageError(
-            f"{kind} file {path} has changed{f', or what it imports ({others})' * bool(others)}: "
+            f"{kind} file {path} has changed{f', or its imports have ({others})' * bool(others)}: "
             f"its digest is {found}, not {digest}; bring back the file as it was, or start another "
             f"run"
         )

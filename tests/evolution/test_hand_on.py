@@ -88,10 +88,10 @@ def test_thresholds_may_go_on_where_they_were(old: str, new: str, taken: set[str
 def test_thresholds_that_an_ancestor_does_not_have_are_refused() -> None:
     learner = method("cone", genotypes=6, thresholds_from="ancestor")
     for name, missing in (("mesp", "sst"), ("cone-1", "gst"), ("cone-2", "sst")):
-        with pytest.raises(UsageError, match=f"what this run begins with has no {missing}"):
+        with pytest.raises(UsageError, match=f"the origin of this run has no {missing}"):
             hand_on(learner, LAYOUT, 3, build(name).init(LAYOUT, 3))
     genes, active = np.zeros((2, 5, 4), dtype=np.float32), np.ones((2, 5), dtype=bool)
-    with pytest.raises(UsageError, match="what this run begins with has no sst"):
+    with pytest.raises(UsageError, match="the origin of this run has no sst"):
         breed_from(learner, LAYOUT, 3, genes, active)
 
 
@@ -288,8 +288,8 @@ def test_teams_that_do_not_fit_are_refused(name: str) -> None:
     learner = build(name)
     old = evolve(learner, learner.init(LAYOUT, 3), 1)
     for layout, words in (
-        (replace(LAYOUT, max_hidden=6), "ES cannot begin with this team: 5 slots became 6"),
-        (replace(LAYOUT, n_genes=9), "ES cannot begin with this team: 4 genes per neuron became 9"),
+        (replace(LAYOUT, max_hidden=6), "ES cannot start from this team: 5 slots became 6"),
+        (replace(LAYOUT, n_genes=9), "ES cannot start from this team: 4 genes per neuron became 9"),
     ):
         with pytest.raises(UsageError, match=words):
             hand_on(learner, layout, 3, old)
@@ -339,7 +339,7 @@ class Hermit:
 def test_a_method_without_populations_begins_with_nobody_elses() -> None:
     hermit, mesp = Hermit(), build("mesp")
     for learner, old, words in (
-        (hermit, mesp.init(LAYOUT, 3), "Hermit has none that another run could begin with"),
+        (hermit, mesp.init(LAYOUT, 3), "Hermit has none from which another run could start"),
         (mesp, hermit.init(LAYOUT, 3), "the method it is from has none"),
     ):
         with pytest.raises(UsageError, match=words) as caught:

@@ -110,7 +110,7 @@ def test_a_changed_copy_is_refused_before_anything_in_it_runs(mine: Path, tmp_pa
     copy, witness = path / "inputs" / "mine.py", tmp_path / "witness"
     text = copy.read_text()
     copy.write_text(f"{text}\nopen({str(witness)!r}, 'w')\n")
-    with pytest.raises(UsageError, match=rf"method file {copy} has changed, or what it imports"):
+    with pytest.raises(UsageError, match=rf"method file {copy} has changed, or its imports have"):
         conevo.Run(path).resume(threads=1)
     assert not witness.exists()
     copy.write_text(text)

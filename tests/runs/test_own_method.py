@@ -88,8 +88,8 @@ def test_another_state_is_refused_by_its_own_check(tmp_path: Path) -> None:
 def test_no_run_begins_with_its_populations_but_with_its_champion(tmp_path: Path) -> None:
     origin = evolved(tmp_path / "origin")
     for method, words in (
-        ("homcne", "the method it is from has none that another run could begin with"),
-        (ADDRESS, "Team ES has none that another run could begin with"),
+        ("homcne", "the method it is from has none from which another run could start"),
+        (ADDRESS, "Team ES has none from which another run could start"),
     ):
         with pytest.raises(UsageError, match=words) as caught:
             evolved(tmp_path / "run", method, origin=origin)

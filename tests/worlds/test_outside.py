@@ -207,7 +207,7 @@ def test_a_file_imports_its_neighbours_and_the_digest_covers_them(tmp_path: Path
     kept.write_text(found[0].to_toml())
     (tmp_path / "a" / "deeper.py").write_text("PACE = 0.04\n")
     with pytest.raises(
-        UsageError, match=r"has changed, or what it imports \(paces.py, deeper.py\)"
+        UsageError, match=r"has changed, or its imports have \(paces.py, deeper.py\)"
     ):
         resolve(file=kept)
 

@@ -52,8 +52,8 @@ def hand_on(method: Method, layout: Layout, root: int, state: State) -> State:
     if not (isinstance(fresh, Populations) and isinstance(state, Populations)):
         who = "the method it is from" if isinstance(fresh, Populations) else method.title
         raise UsageError(
-            f"these populations cannot be handed on: {who} has none that another run could begin "
-            f"with (its state is not a {Populations.__module__}.{Populations.__name__})"
+            f"these populations cannot be handed on: {who} has none from which another run could "
+            f"start (its state is not a {Populations.__module__}.{Populations.__name__})"
         )
     old, new = state.genes.shape, fresh.genes.shape
     different = [
@@ -99,8 +99,8 @@ def breed_from(
     fresh = method.init(layout, root)
     if not isinstance(fresh, Populations):
         raise UsageError(
-            f"no population can be bred from this team: {method.title} has none that a run could "
-            f"begin with (its state is not a {Populations.__module__}.{Populations.__name__})"
+            f"no population can be bred from this team: {method.title} has none from which a run "
+            f"could start (its state is not a {Populations.__module__}.{Populations.__name__})"
         )
     fresh = _with_thresholds(fresh, method, None)
     n_populations, n_slots, n_genotypes, n_genes = fresh.genes.shape
@@ -171,7 +171,7 @@ def _with_thresholds(fresh: Populations, method: Method, state: State | None) ->
     }
     if missing := [name for name, value in found.items() if math.isnan(value)]:
         raise UsageError(
-            f"method.thresholds_from = 'ancestor': what this run begins with has no {missing[0]} "
+            f"method.thresholds_from = 'ancestor': the origin of this run has no {missing[0]} "
             f"(populations of a method with that threshold have one, a champion has none)"
         )
     return replace(fresh, **found)
@@ -192,7 +192,7 @@ def _around(method: Any, layout: Layout, root: int, genes: FloatArray, active: B
         if found != right
     ]
     if different:
-        raise UsageError(f"{method.title} cannot begin with this team: {'; '.join(different)}")
+        raise UsageError(f"{method.title} cannot start from this team: {'; '.join(different)}")
     state: State = (
         method.begin_with(layout, root, genes, active)
         if active.any()

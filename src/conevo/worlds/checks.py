@@ -198,7 +198,7 @@ def _of_scenarios(a_world: World) -> Iterator[str]:
         if values.tobytes() != getattr(again, name).tobytes():
             yield f"{name} changes from call to call: draw it from stream(key, NAME)"
         elif name in own and values[-1:].tobytes() != getattr(last, name).tobytes():
-            yield f"{name} of a scenario changes with the other keys that are asked for"
+            yield f"{name} of a scenario changes with the other keys of the call"
     rows = {b"".join(getattr(three, name)[k].tobytes() for name in own) for k in range(len(KEYS))}
     places = [name for name in own if name != "seed"]
     drawn = {tuple(getattr(three, name)[k].tobytes() for name in places) for k in range(len(KEYS))}

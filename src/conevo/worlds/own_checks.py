@@ -36,7 +36,7 @@ def of_scenarios(a_world: World, keys: list[int]) -> Iterator[str]:
         elif values.tobytes() != getattr(again, name).tobytes():
             yield f"{name} changes from call to call: draw it from stream(key, NAME)"
         elif len(values) == len(keys) and values[-1:].tobytes() != getattr(last, name).tobytes():
-            yield f"{name} of a scenario changes with the other keys that are asked for"
+            yield f"{name} of a scenario changes with the other keys of the call"
 
 
 def of_play(a_world: World, teams: Teams, keys: list[int]) -> Iterator[str]:

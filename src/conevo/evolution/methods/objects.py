@@ -57,7 +57,7 @@ def _entry_of(method: object) -> MethodEntry:
     if kind.__module__ == "__main__" or not (file and file.endswith(".py")):
         raise UsageError(
             f"{what} is defined in {kind.__module__}, which a run cannot keep a copy of: put the "
-            f"class into a file of its own, with its ENTRY, and import it from there"
+            f"class into a separate file, with its ENTRY, and import it from there"
         )
     entry = load(Path(file))
     remember_title(entry.name, entry.title)

@@ -76,9 +76,9 @@ ENVIRONMENTS = tuple(_TABLE)
 # (docs/results/calibration.md). The gains of evolved teams are in docs/results/specialists.md.
 APART: dict[str, Any] = {
     "segregation": 1.0,  # each type has a place: where types are mixed, switchers gain more
-    "starts": "by_robot",  # a population has a place to learn for: from random starts, none
-    "low_range": 0.10,  # the only ranges at which the best blind castes pass the best switchers:
-    "med_range": 0.08,  # with smaller ones nobody finds more than a twentieth of the value, with
+    "starts": "by_robot",  # a population learns for one place: with random starts for none
+    "low_range": 0.10,  # the only ranges at which the best blind castes surpass the best switchers:
+    "med_range": 0.08,  # with smaller ones no team finds more than a twentieth of the value, with
     "hi_range": 0.06,  # larger ones a contact lasts so long that a switcher finds all types in it
     "low_accuracy": 0.1,  # a contact lasts no longer than a detection takes, so that a specialist
     "med_accuracy": 0.2,  # is never idle: time with a rock is worth something
