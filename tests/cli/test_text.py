@@ -1,4 +1,4 @@
-"""Numbers, spans, bars and tables as people read them; the live view from a few records."""
+"""Spreads, bars and tables as people read them; the live view from a few records."""
 
 from __future__ import annotations
 
@@ -11,35 +11,12 @@ from typing import Any
 import pytest
 from rich.console import Console
 
+from conevo.cli.format import bars, castes, neurons, progress, spread, table
 from conevo.cli.progress import Display, Pace
 from conevo.cli.run_text import exchange_text, run_text
 from conevo.cli.run_text import test_text as text_of_test
-from conevo.cli.text import bars, castes, duration, neurons, number, progress, spread, table
 from conevo.terms import counted
 from runs.tiny import TASK, evolve_tiny, tiny_settings
-
-
-@pytest.mark.parametrize(
-    ("value", "text"),
-    [
-        (None, "-"),
-        (0.0, "0"),
-        (0.123456, "0.1235"),
-        (-12.3456, "-12.35"),
-        (4321.4, "4321"),
-        (2.5e9, "2.5e+09"),
-    ],
-)
-def test_numbers_have_four_digits(value: float | None, text: str) -> None:
-    assert number(value) == text
-
-
-@pytest.mark.parametrize(
-    ("seconds", "text"),
-    [(0.4, "0 s"), (59, "59 s"), (59.6, "1 min 00 s"), (245, "4 min 05 s"), (12000, "3 h 20 min")],
-)
-def test_durations(seconds: float, text: str) -> None:
-    assert duration(seconds) == text
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,7 @@ from conevo.report.figures import curves, tiles
 from conevo.report.figures import style as drawing
 from conevo.report.figures.curves import Line
 from conevo.report.figures.lettering import drawable, fitted, labels_of, width_of
-from conevo.report.figures.style import DASHES, HATCHES, MARKERS, Drawing, hatches, short, ticks_of
+from conevo.report.figures.style import DASHES, HATCHES, MARKERS, Drawing, hatches, ticks_of
 from conevo.worlds.registry import colours_of
 
 pytestmark = pytest.mark.filterwarnings("error")
@@ -338,7 +338,3 @@ def test_ticks_are_round_and_inside() -> None:
     assert limits == (0.0, pytest.approx(636.48))
     assert ticks_of(0.0, 1.0, (0.0, 1.0))[0] == pytest.approx([0, 0.2, 0.4, 0.6, 0.8, 1.0])
     assert ticks_of(3.0, 3.0)[1] == (3.0, 4.0)
-
-
-def test_thousands_are_short() -> None:
-    assert [short(v) for v in (0, 0.25, 950, 20000, 1.5e6)] == ["0", "0.25", "950", "20k", "1.5M"]

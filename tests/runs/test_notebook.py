@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 import conevo
-from conevo.playback.words import number
+from conevo.numbers import number
 from conevo.runs.html import card
 from conevo.runs.run import start
 from runs.tiny import TASK, evolve_tiny, tiny_settings

@@ -59,7 +59,8 @@ def behaviours(
 
 
 def _text(found: dict[str, Any], study: WorldStudy) -> str:
-    from conevo.cli.text import number, table
+    from conevo.cli.format import table
+    from conevo.numbers import number
     from conevo.terms import counted
 
     measures, parts = study.account(found)

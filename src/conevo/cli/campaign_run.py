@@ -19,8 +19,8 @@ from conevo.campaigns.executors.registry import make_executor
 from conevo.campaigns.ledger import Entry
 from conevo.cli.campaign_text import counts, grid, heading, print_failed
 from conevo.cli.run_to_end import drop_output, style_of
-from conevo.cli.text import duration
 from conevo.errors import EnvironmentFailure, UsageError
+from conevo.numbers import duration
 from conevo.runs.time_limit import TimeLimit
 from conevo.terms import counted, quoted
 

@@ -18,10 +18,11 @@ from conevo.campaigns.ledger import Entry
 from conevo.campaigns.plan import Plan, PlannedRun
 from conevo.campaigns.plan_file import preset_names, read_preset
 from conevo.campaigns.progress import cell_text, cells, last_written, progress_of
+from conevo.cli.format import table
 from conevo.cli.lookup import campaigns_in
-from conevo.cli.text import duration, table
 from conevo.errors import ConevoError
 from conevo.kernels.threads import usable_cores
+from conevo.numbers import duration
 from conevo.terms import counted
 
 __all__ = [

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from conevo.cli.text import progress
+from conevo.cli.format import progress
 from conevo.errors import ConevoError, UsageError
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ def listing(
 
     Try: conevo list settings rover/complex-1 --method cone
     """
-    from conevo.cli.text import table
+    from conevo.cli.format import table
 
     if subject is not None and what in TABLES:
         raise UsageError(f"'conevo list {what}' takes no further argument, got {subject!r}")

@@ -10,8 +10,9 @@ from typing import Any
 
 import click
 
+from conevo.cli.format import bars, castes, favourites, neurons
 from conevo.cli.run_text import heading_of, measures_text
-from conevo.cli.text import bars, castes, count, duration, favourites, neurons, number
+from conevo.numbers import duration, number
 from conevo.runs.progress import RECENT, Done, seconds_left, share_of
 from conevo.runs.provenance import declared
 from conevo.runs.run import Run
@@ -94,7 +95,7 @@ class Pace:
         """Where the run stands: its generation, and the budget if that will end it."""
         budget, planned = self.outline.budget_evaluations, self.outline.generations
         if budget and self.spent / budget > len(self.records) / planned:
-            spent = f"{count(self.spent)}/{count(budget)} evaluations"
+            spent = f"{self.spent:,}/{budget:,} evaluations"
             return f"generation {len(self.records)}, {spent}"
         return f"generation {len(self.records)}/{planned}"
 
@@ -183,7 +184,7 @@ class Display:
                 f"{counted(last['recombinations'], 'recombination')} between populations",
             )
         yield "neurons", neurons(last["n_hidden"])
-        spent = f"{count(self.pace.spent)} spent"
+        spent = f"{self.pace.spent:,} spent"
         yield "speed", f"{number(self.pace.rate)} team evaluations/s, {spent}"
         if last["n_nonfinite"]:
             yield "not finite", f"{counted(last['n_nonfinite'], 'score')}, ranked last"

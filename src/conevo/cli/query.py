@@ -25,8 +25,8 @@ def query(arguments: tuple[str, ...], as_csv: bool, as_json: bool) -> None:
     Try: conevo query NAME "SELECT method, count(*) FROM runs GROUP BY ALL"
     """
     from conevo.campaigns.tables import Tables
+    from conevo.cli.format import table
     from conevo.cli.lookup import find_campaign, only_campaign, sealed
-    from conevo.cli.text import table
     from conevo.errors import UsageError
 
     if as_csv and as_json:

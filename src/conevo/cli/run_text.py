@@ -9,22 +9,19 @@ from typing import Any
 
 import click
 
-from conevo.cli.text import (
+from conevo.cli.format import (
     castes,
-    count,
-    duration,
     favourites,
-    generations,
     mean,
     n_finite,
     neurons,
-    number,
     progress,
     spread,
     table,
 )
 from conevo.controllers.registry import DEFAULT
 from conevo.evolution.methods.registry import title_of
+from conevo.numbers import duration, number
 from conevo.runs.code import changes_text, last_code, sessions_of
 from conevo.runs.outline import Outline
 from conevo.runs.provenance import declared
@@ -144,7 +141,7 @@ def generations_table(records: list[dict[str, Any]], *lead: str) -> str:
             str(record["recombinations"]),
             *(number(record.get(name)) for name in own),
             neurons(record["n_hidden"]),
-            count(record["team_evaluations"]),
+            number(record["team_evaluations"]),
             castes(record["castes"]),
         ]
         for record in records
@@ -294,7 +291,7 @@ def _twice_as_long(run: Run) -> str:
 def _former_ends(run: Run) -> list[str]:
     """Return a line for each time the run was given another length."""
     return [
-        f"Length changed {former['at']}: before, {generations(former['generations'])}, "
+        f"Length changed {former['at']}: before, {counted(former['generations'], 'generation')}, "
         + (
             f"finished {former['finished']} (stopped by: {former['stopped_by']})"
             if former["finished"]
@@ -311,7 +308,7 @@ def _former_test(run: Run) -> list[str]:
     ends = [former for former in about.get("extended", []) if former["finished"]]
     if not ends or "finished" in about:
         return []
-    length = generations(ends[-1]["generations"])
+    length = counted(ends[-1]["generations"], "generation")
     return [f"Of the former length, {length}; the new one is tested when it is finished:"]
 
 
@@ -329,5 +326,5 @@ def _state(run: Run) -> str:
     if records:
         seconds = sum(record["seconds"] for record in records)
         done += "" if "evaluations" in done else f", {counted(evaluations, 'team evaluation')}"
-        done += f", {count(records[-1]['team_steps'])} team-steps, {duration(seconds)}"
+        done += f", {records[-1]['team_steps']:,} team-steps, {duration(seconds)}"
     return f"{run.path}: {state}\n{done}"

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from conevo.errors import ConevoError, EnvironmentFailure, UsageError
-from conevo.terms import quoted
+from conevo.terms import counted, quoted
 
 if TYPE_CHECKING:
     from conevo.runs.run import Run
@@ -202,7 +202,5 @@ def carry_on(
 
 def _done(found: Run | Shaping) -> str:
     """Return how many generations are done."""
-    from conevo.cli.text import generations
-
     runs = found.stages if hasattr(found, "stages") else [found]
-    return generations(sum(len(run.generations()) for run in runs))
+    return counted(sum(len(run.generations()) for run in runs), "generation")

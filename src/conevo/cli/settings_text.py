@@ -13,9 +13,10 @@ from typing import Any
 
 import click
 
+from conevo.cli.format import table
 from conevo.cli.run_text import title
-from conevo.cli.text import count, table
 from conevo.errors import UsageError
+from conevo.numbers import number
 from conevo.runs.config import RunConfig, resolve
 from conevo.runs.lab import price_of
 from conevo.runs.layers import PRESETS
@@ -38,10 +39,10 @@ def preset_rows(task: str | None, method: str | None) -> list[dict[str, str]]:
         rows.append(
             {
                 "preset": preset,
-                "generations": count(run.generations),
-                "budget": count(run.budget_evaluations) if run.budget_evaluations else "none",
+                "generations": number(run.generations),
+                "budget": number(run.budget_evaluations) if run.budget_evaluations else "none",
                 "epochs": str(run.epochs),
-                "iterations": count(config.world_params.iterations),
+                "iterations": number(config.world_params.iterations),
                 "genotypes": str(getattr(config.method_config, "genotypes", "-")),
                 "tests": str(run.n_tests),
                 "for": preset_purpose(preset),

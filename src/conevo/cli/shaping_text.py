@@ -7,9 +7,10 @@ from typing import Any
 
 import click
 
+from conevo.cli.format import castes, progress, spread, table
 from conevo.cli.run_text import controlled, generations_table, spaced, title
-from conevo.cli.text import castes, count, duration, number, progress, spread, table
 from conevo.evolution.methods.registry import title_of
+from conevo.numbers import duration, number
 from conevo.runs.code import changes_text
 from conevo.runs.outline import span
 from conevo.runs.run import Run
@@ -134,7 +135,7 @@ def _table(stages: list[Run]) -> str:
                 *([title_of(outline.method)] if is_mixed else []),
                 run.status,
                 progress(len(records), outline.generations, spent, outline.budget_evaluations),
-                count(spent),
+                number(spent),
                 "-" if champion is None else str(champion.generation),
                 *("-" if s is None else spread(s, tested["scenarios"]) for s in spreads),
             ]

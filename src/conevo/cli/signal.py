@@ -126,8 +126,9 @@ def _order(
 
 
 def _text(found: dict[str, Any]) -> str:
-    from conevo.cli.text import number, table
+    from conevo.cli.format import table
     from conevo.evolution.methods.registry import title_of
+    from conevo.numbers import number, plus_minus
     from conevo.studies.repeatability import has_signal
     from conevo.terms import counted
 
@@ -136,12 +137,12 @@ def _text(found: dict[str, Any]) -> str:
     cells = [
         [
             str(row["number"]),
-            _plus_minus(row["icc"], row["standard_error"]),
+            plus_minus(row["icc"], row["standard_error"], "+-"),
             str(row["scheme"]),
-            _decimals(row["icc_of_scheme"]),
+            number(row["icc_of_scheme"], 3),
             "-"
             if row["low_of_scheme"] is None
-            else f"{_decimals(row['low_of_scheme'])} to {_decimals(row['high_of_scheme'])}",
+            else f"{row['low_of_scheme']:.3f} to {row['high_of_scheme']:.3f}",
             number(row["rounds_for_half"]),
         ]
         for row in rows
@@ -158,15 +159,3 @@ def _text(found: dict[str, Any]) -> str:
             left = counted(row["left_out"], "genotype")
             lines.append(f"Generation {row['number']}: {left} left out, with no finite fitness.")
     return "\n".join(lines)
-
-
-def _decimals(value: float | None) -> str:
-    return "-" if value is None else f"{value:.3f}"
-
-
-def _plus_minus(value: float | None, error: float | None) -> str:
-    """Return "0.055 +- 0.006", with as many decimals as the error has digits that matter."""
-    if value is None or error is None:
-        return "-" if value is None else f"{value:.4f}"
-    digits = 3 if error >= 0.0095 else 4 if error >= 0.00095 else 5
-    return f"{value:.{digits}f} +- {error:.{digits}f}"

@@ -1,17 +1,10 @@
-"""Numbers and names as people write them."""
+"""Names in a row as people write them."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-__all__ = ["enumerated", "listed", "number"]
-
-
-def number(value: float) -> str:
-    """Return a number as people write it: whole, or with three significant digits."""
-    if float(value).is_integer() or abs(value) >= 1000:
-        return f"{value:,.0f}"
-    return f"{value:.3g}"
+__all__ = ["enumerated", "listed"]
 
 
 def listed(words: Sequence[str]) -> str:

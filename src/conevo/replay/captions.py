@@ -6,8 +6,8 @@ from collections import Counter
 from collections.abc import Sequence
 
 from conevo.evolution.methods.registry import title_of
+from conevo.numbers import number
 from conevo.playback.about import About
-from conevo.playback.words import number
 
 __all__ = ["facts", "subtitle", "title"]
 

@@ -13,6 +13,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from conevo import numbers
+from conevo.numbers import decimals
 from conevo.report.figures.style import Drawing
 
 __all__ = [
@@ -35,26 +37,8 @@ MOST_OPEN = 12  # rows of a table that a page shows without being asked
 
 
 def number(value: Any, digits: int | None = None) -> str:
-    """Return a number as people read it: about four digits, or so many decimals.
-
-    "–" for None and NaN.
-    """
-    if value is None or (isinstance(value, float) and not math.isfinite(value)):
-        return NOTHING
-    if isinstance(value, int):
-        return f"{value:,}"
-    if digits is None:
-        if value == 0:
-            return "0"
-        digits = decimals(value)
-    text = f"{value:,.{digits}f}"
-    return text.removeprefix("-") if not text.strip("-0.,") else text
-
-
-def decimals(value: float) -> int:
-    """Return the decimals that leave about four digits of a number."""
-    size = abs(value)
-    return 0 if size >= 1000 else 1 if size >= 100 else 2 if size >= 1 else 3
+    """Return a number with about four digits or with ``digits`` decimals, "–" for None and NaN."""
+    return numbers.number(value, decimals(value or 0) if digits is None else digits, NOTHING)
 
 
 def p_value(value: float | None) -> str:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from conevo.errors import ConevoError
 from conevo.evolution.methods.registry import title_of
-from conevo.playback.words import number
+from conevo.numbers import number
 from conevo.terms import S_SCALE, counted
 from conevo.typing import Record
 
@@ -100,7 +100,7 @@ def team_card(team: Team) -> str:
     about = [
         counted(robots, "robot"),
         f"{counted(slots, 'slot')} of {counted(genes, 'gene')} each",
-        f"mean fitness {_number(team.mean_fitness)}",
+        f"mean fitness {number(team.mean_fitness)}",
         f"S: {S_SCALE}",
     ]
 
@@ -112,8 +112,8 @@ def team_card(team: Team) -> str:
                 [
                     str(k),
                     str(int(team.active[k].sum())),
-                    f"{_bar(fitness / best if best > 0 else 0.0)} {_number(fitness)}",
-                    f"{_bar(s)} {_number(s)}",
+                    f"{_bar(fitness / best if best > 0 else 0.0)} {number(fitness)}",
+                    f"{_bar(s)} {number(s)}",
                 ]
                 for k, (fitness, s) in enumerate(
                     zip(team.fitness, team.specialization, strict=True)
@@ -138,9 +138,9 @@ def _curve(records: Sequence[Record]) -> str:
     span, last = (high - low) or 1.0, records[-1]["generation"] or 1
     drawn = " ".join(f"{100 * x / last:.2f},{40 - 38 * (y - low) / span:.2f}" for x, y in points)
     label = (
-        f"{name} of the fittest team: generation {points[0][0]}: {_number(points[0][1])}, "
-        f"generation {points[-1][0]}: {_number(points[-1][1])}, "
-        f"from {_number(low)} to {_number(high)}"
+        f"{name} of the fittest team: generation {points[0][0]}: {number(points[0][1])}, "
+        f"generation {points[-1][0]}: {number(points[-1][1])}, "
+        f"from {number(low)} to {number(high)}"
     )
     return (
         f'<p class="faint">{escape(label)}</p>'
@@ -172,9 +172,5 @@ def _bar(share: float) -> str:
 
 
 def _spread(found: Record) -> str:
-    deviation = "" if found["sd"] is None else f" ± {_number(found['sd'])}"
-    return f"{_number(found['mean'])}{deviation}"
-
-
-def _number(value: float | None) -> str:
-    return "-" if value is None or not math.isfinite(value) else number(value)
+    deviation = "" if found["sd"] is None else f" ± {number(found['sd'])}"
+    return f"{number(found['mean'])}{deviation}"

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from conevo.playback.words import number
+from conevo.numbers import duration, number
 from conevo.runs.html import STYLE, escape
 from conevo.runs.progress import Done, seconds_left, share_of
 from conevo.typing import Record
@@ -66,7 +66,7 @@ def _print_line(run: Run, record: Record) -> None:
 def _value(record: Record) -> str:
     """Return the name and value of the main measure."""
     name, value = next(iter(record["performance"].items()))
-    return f"{name} {'-' if value is None else number(value)}"
+    return f"{name} {number(value)}"
 
 
 class _Bar:
@@ -84,7 +84,7 @@ class _Bar:
         is_last = len(self.records) == self.run.outline.generations
         if is_last or time.monotonic() >= self.shown_at + PAUSE:
             self.shown_at = time.monotonic()
-            self._show("testing" if is_last else f"{self._seconds_left():.0f} s left")
+            self._show("testing" if is_last else f"{duration(self._seconds_left())} left")
 
     def end(self) -> None:
         """Show the finished run, or how to continue it."""

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from conevo.numbers import short
 from conevo.palette import method_looks
 from conevo.report.figures.lettering import LINE, drawable, fitted, lines_in, width_of
 from conevo.report.figures.small_multiples import Panels
@@ -26,7 +27,6 @@ from conevo.report.figures.style import (
     part_handles,
     put_legend,
     saved,
-    short,
     style,
     ticks_of,
     width_for,

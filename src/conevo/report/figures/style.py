@@ -241,11 +241,3 @@ def ticks_of(
     found = MaxNLocator(n).tick_values(*limits)
     near = 1e-9 * (limits[1] - limits[0])
     return [v for v in map(float, found) if limits[0] - near <= v <= limits[1] + near], limits
-
-
-def short(value: float) -> str:
-    """Return 20000 as 20k, which is short enough for small panels."""
-    for size, letter in ((1e9, "G"), (1e6, "M"), (1e3, "k")):
-        if abs(value) >= size:
-            return f"{value / size:.3g}{letter}"
-    return f"{value:.3g}"

@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
+from conevo.numbers import plus_minus
 from conevo.report.comparison import Cell
 from conevo.report.exhibits import Column, Section, Table, plain
 from conevo.report.sections.scope import KEYS, Scope
@@ -92,7 +93,7 @@ def _row(scope: Scope, cell: Cell, own: dict[str, list[MeasuredSignal]]) -> dict
         errors = [one.error for one in runs if one.error is not None]
         error = math.sqrt(math.fsum(e * e for e in errors)) / len(errors) if errors else None
         row |= {
-            f"shown_{generation}": _plus_minus(icc, error),
+            f"shown_{generation}": None if icc is None else plus_minus(icc, error),
             f"icc_{generation}": icc,
             f"error_{generation}": error,
             f"reliability_{generation}": _reliability(runs),
@@ -109,11 +110,3 @@ def _reliability(runs: Sequence[MeasuredSignal]) -> float | None:
 
 def _mean(values: Sequence[float]) -> float | None:
     return math.fsum(values) / len(values) if values else None
-
-
-def _plus_minus(value: float | None, error: float | None) -> str | None:
-    """Return "0.055 ± 0.006", with two digits of the error."""
-    if value is None or not error:
-        return None if value is None else f"{value:.4f}"
-    digits = max(2, 1 - math.floor(math.log10(error)))
-    return f"{value:.{digits}f} ± {error:.{digits}f}"

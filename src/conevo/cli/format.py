@@ -1,4 +1,4 @@
-"""Numbers, tables and durations as plain text."""
+"""Tables, castes, spreads and series of numbers as plain text."""
 
 from __future__ import annotations
 
@@ -7,32 +7,22 @@ from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import Any
 
+from conevo.numbers import number
 from conevo.terms import counted
 
 __all__ = [
     "bars",
     "castes",
-    "count",
-    "duration",
     "favourites",
-    "generations",
     "neurons",
     "mean",
     "n_finite",
-    "number",
     "progress",
     "spread",
     "table",
 ]
 
 NUMBER = re.compile(r"[-+.,/\de]+( (\+-|\().*)?")
-
-
-def number(value: float | None) -> str:
-    """Return a number with four significant digits, "-" for none."""
-    if value is None:
-        return "-"
-    return f"{value:.0f}" if 1000 <= abs(value) < 1e7 else f"{value:.4g}"
 
 
 def spread(found: Mapping[str, Any], n_scenarios: int) -> str:
@@ -62,16 +52,6 @@ def n_finite(found: Mapping[str, Any]) -> int:
     return int(found.get("n", len(found["values"])))
 
 
-def count(value: int) -> str:
-    """Return a whole number with separated thousands."""
-    return f"{value:,}"
-
-
-def generations(number: int) -> str:
-    """Return so many generations in words: "1 generation", "5 generations"."""
-    return counted(number, "generation")
-
-
 def progress(done: int, planned: int, spent: int, budget: int) -> str:
     """Return how far a run is: of its generations, or of its budget if that ends it sooner.
 
@@ -84,18 +64,8 @@ def progress(done: int, planned: int, spent: int, budget: int) -> str:
         budget: team evaluations at most, 0 for any number.
     """
     if budget and spent / budget > done / planned:
-        return f"{generations(done)}, {count(spent)} of {count(budget)} evaluations"
-    return f"{count(done)} of {generations(planned)}"
-
-
-def duration(seconds: float) -> str:
-    """Return a time span: "42 s", "4 min 05 s", "3 h 20 min"."""
-    whole = round(seconds)
-    if whole < 60:
-        return f"{whole} s"
-    if whole < 3600:
-        return f"{whole // 60} min {whole % 60:02d} s"
-    return f"{whole // 3600} h {whole % 3600 // 60:02d} min"
+        return f"{counted(done, 'generation')}, {spent:,} of {budget:,} evaluations"
+    return f"{done:,} of {counted(planned, 'generation')}"
 
 
 def castes(sizes: Mapping[str, int]) -> str:
