@@ -26,6 +26,7 @@ CHECKED = (
     "examples/*.md",
     "examples/*.py",
     "src/conevo/*.py",
+    "src/conevo/cli/*.py",
     "src/conevo/controllers/*.py",
     "src/conevo/evolution/**/*.py",
     "src/conevo/kernels/*.py",
@@ -57,7 +58,13 @@ REFUSED = (
     (r"\b(thereof|whereof|therein|wherein|hereby)\b", "of it, in which"),
 )
 # Literal uses: an option, a table of terms, an idiom, a function's name.
-ALLOWED = (r"conevo says \| you may say", "ask and tell", "ask-and-tell", r'(``|\.|")tell\b')
+ALLOWED = (
+    r"conevo says \| you may say",
+    r"ask(, evaluate,| /| and) tell",
+    "ask-and-tell",
+    r"(``|\.|\"|\}: )tell\b",
+    r"[\"{-]beside\b",
+)
 SKIPPED = re.compile(
     r"<!-- (?:table|words to avoid)\b.*?<!-- end -->|<!--.*?-->|^```.*?^```"
     r"|`[^`]+`|\$[^$]+\$|\]\([^)]*\)",

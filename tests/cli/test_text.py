@@ -12,9 +12,10 @@ import pytest
 from rich.console import Console
 
 from conevo.cli.format import bars, castes, neurons, progress, spread, table
-from conevo.cli.progress import Display, Pace
+from conevo.cli.progress import Display, place
 from conevo.cli.run_text import exchange_text, run_text
-from conevo.cli.run_text import test_text as text_of_test
+from conevo.cli.testing_text import test_text as text_of_test
+from conevo.runs.progress import Pace
 from conevo.terms import counted
 from runs.tiny import TASK, evolve_tiny, tiny_settings
 
@@ -120,14 +121,14 @@ def test_pace_counts_down_to_the_last_generation_or_the_end_of_the_budget(tmp_pa
     pace = Pace(run)
     for k in range(2):  # made again
         pace.add({"generation": k, "team_evaluations": 100 * (k + 1), "seconds": 2.0})
-    assert (pace.rate, pace.place) == (50, "generation 2/2")
+    assert (pace.rate, place(pace)) == (50, "generation 2/2")
     pace.outline = replace(pace.outline, generations=250, budget_evaluations=1000)
-    assert pace.remaining == 16  # 800 evaluations left at 50 per second
-    assert pace.place == "generation 2, 200/1,000 evaluations"
+    assert pace.seconds_left == 16  # 800 evaluations left at 50 per second
+    assert place(pace) == "generation 2, 200/1,000 evaluations"
     pace.outline = replace(pace.outline, generations=5, budget_evaluations=1050)
-    assert pace.remaining == 6  # three generations of two seconds
+    assert pace.seconds_left == 6  # three generations of two seconds
     pace.outline = replace(pace.outline, generations=250, budget_evaluations=1050)
-    assert pace.remaining == 16  # the ninth generation cannot be paid
+    assert pace.seconds_left == 16  # the ninth generation cannot be paid
 
 
 def test_the_live_view_names_all_that_is_asked_of_it(tmp_path: Path) -> None:

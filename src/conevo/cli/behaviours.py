@@ -1,4 +1,4 @@
-"""``conevo behaviours``: what the robots of a run's fittest team do, each and together."""
+"""``conevo behaviours``: the behaviour of a run's fittest team, of each robot and collectively."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Opening a page in the reader's browser, if there is one that does not take the terminal."""
+"""Open a page in a browser that has a window, not in one for the terminal."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ TEXT = ("www-browser", "w3m", "lynx", "links", "links2", "elinks", "browsh")  # 
 
 
 def open_page(address: str) -> None:
-    """Open a page in the browser, or print that there is none and what to open.
+    """Open a page in the browser, or print its address if there is no browser.
 
-    Without a display only a browser that ``BROWSER`` names is opened, since whatever else is found
-    would be one for the terminal.
+    Without a display only a browser that ``BROWSER`` names is opened, since any other would be one
+    for the terminal.
     """
     if not (_has_browser() and webbrowser.open(address)):
         click.echo(f"conevo: note: no browser found here; open {address} in one", err=True)
 
 
 def open_while_serving(address: str) -> None:
-    """Do the same without waiting: a browser may not return before it has the page."""
+    """Open a page without waiting, since a browser may not return before it has the page."""
     threading.Thread(target=open_page, args=(address,), daemon=True).start()
 
 
 def _has_browser() -> bool:
-    """Whether a browser would open that has a window of its own."""
+    """Whether a browser with a window of its own would open."""
     named = os.environ.get("BROWSER", "")
     has_windows = sys.platform in ("darwin", "win32") or any(
         os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY")

@@ -1,4 +1,4 @@
-"""``conevo campaign``: plans of many runs, carried out to the end."""
+"""``conevo campaign``: plans of many runs, executed to the end."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ execution_options = all_of(
     click.option(
         "--device", metavar="DEVICES",
         help="cpu, cuda, several that workers use in turn (cuda:0,cuda:1), or auto: all CUDA "
-        "devices (default: cpu; runs that have begun go on where they were).",
+        "devices (default: cpu; runs that have begun stay on their device).",
     ),
     click.option("--address", metavar="ADDRESS", help="With ray: address of a cluster, or auto."),
     click.option(
@@ -44,7 +44,7 @@ execution_options = all_of(
     click.option("--json", "as_json", is_flag=True, help="Print one JSON object per ended run."),
     click.option("--quiet", is_flag=True, help="Print only the campaign's directory."),
 )  # fmt: skip
-"""Options that say where and how runs are carried out."""
+"""Options for where and how runs are executed."""
 plan_options = all_of(
     click.argument("name", metavar="NAME|FILE|DIR"),
     click.option("--preset", metavar="NAME", help="smoke, desk (default), night, thesis."),
@@ -55,7 +55,7 @@ plan_options = all_of(
     ),
     click.option("--out", metavar="DIR", help="Output directory (default: campaigns/NAME)."),
 )  # fmt: skip
-"""Options that say which campaign is meant, and at which scale."""
+"""Options that select a campaign and its scale."""
 
 
 @click.group("campaign", short_help="Start, monitor, stop and retry campaigns of many runs.")
@@ -239,9 +239,9 @@ def retry(name: str, accept_other_code: bool, **execution: Any) -> int:
 def _planned(
     name: str, preset: str | None, seeds: int | None, settings: tuple[str, ...], out: str | None
 ) -> tuple[Path, Plan | None]:
-    """Return where the campaign is or will be, and its plan; None if it goes on as it is planned.
+    """Return the campaign's directory, and its plan; None if an existing plan stays as it is.
 
-    A plan that is named is always the one that counts, whatever is in DIR.
+    The name of a plan always selects that plan, whatever is in DIR.
     """
     from conevo.campaigns.campaign import CAMPAIGNS
     from conevo.campaigns.plan_file import preset_names, read_plan, read_preset

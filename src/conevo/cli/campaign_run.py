@@ -1,4 +1,4 @@
-"""Carrying a campaign out while someone watches."""
+"""Execute a campaign and show its progress."""
 
 from __future__ import annotations
 
@@ -31,13 +31,13 @@ FAILED = 1
 
 @dataclass(frozen=True)
 class Execution:
-    """Where and how runs are carried out, and how that is reported."""
+    """Where and how runs are executed, and how progress is reported."""
 
     executor: Executor
     threads: int
     devices: tuple[str, ...]
     style: str
-    limit: TimeLimit
+    limit: TimeLimit | None
 
 
 def ready(
@@ -47,29 +47,29 @@ def ready(
     device: str | None,
     address: str | None,
     store: str | None,
-    limit: TimeLimit,
+    limit: TimeLimit | None,
     as_json: bool,
     quiet: bool,
 ) -> Execution:
-    """Return what the options ask for, before anything is written.
+    """Return the execution that the options select, before anything is written.
 
     Raises:
-        UsageError: options that do not go together, an unknown executor or one not installed.
-        EnvironmentFailure: there is no such device.
+        UsageError: incompatible options, an unknown executor or one not installed.
+        EnvironmentFailure: no such device.
     """
     devices = parse_devices(device) if device else ()
     made = make_executor(executor, cores, address, store, devices)
-    if executor != "ray":  # whose tasks may be on any machine
+    if executor != "ray":  # tasks of Ray may be on any machine
         devices = devices_here(devices)
     if threads > made.cores:
         raise UsageError(f"--threads {threads}: only {counted(made.cores, 'core')} to use")
     if executor == "serial":
-        threads = made.cores  # of the only run at work
+        threads = made.cores  # only one run at a time
     return Execution(made, threads, devices, style_of(as_json, quiet, False), limit)
 
 
 def carry_on(campaign: Campaign, execution: Execution) -> int:
-    """Finish what is missing, then say what can be done next; returns the exit code."""
+    """Finish the missing runs, then print the next commands; returns the exit code."""
     view = View(campaign, execution)
     advice = f"conevo campaign start {quoted(campaign.path)}"
     if execution.devices not in ((), (CPU,)):
@@ -102,7 +102,7 @@ def carry_on(campaign: Campaign, execution: Execution) -> int:
 
 
 class View:
-    """What is shown of a campaign that is being carried out."""
+    """The display of a campaign while it is executed."""
 
     def __init__(self, campaign: Campaign, execution: Execution) -> None:
         self.campaign, self.execution = campaign, execution
@@ -111,7 +111,7 @@ class View:
         self.looked = 0.0
 
     def showing(self) -> Any:
-        """Return the context in which the live table is on the screen."""
+        """Return a context that shows the live table, if the style has one."""
         if self.execution.style == "plain":
             found = self.campaign
             click.echo(f"{heading(found.plan)}\n{found.path}")
@@ -124,7 +124,7 @@ class View:
         return self.live
 
     def watch(self, campaign: Campaign, ending: Ending | None) -> None:
-        """Show how things stand; called after each ending, and now and then."""
+        """Update the display; called after each ending, and now and then."""
         if ending is None and (self.live is None or time.monotonic() < self.looked + 1):
             return
         self.looked = time.monotonic()
@@ -143,7 +143,7 @@ class View:
             click.echo(f"{entry.state} {entry.label}{why}  ({self.line(entries)})")
 
     def progress(self, entries: dict[str, Entry]) -> dict[str, Any]:
-        """Return how many runs are finished of how many, and the seconds left, None if unknown."""
+        """Return the numbers of finished and of all runs, and the seconds left, None if unknown."""
         done = sum(entry.state == "finished" for entry in entries.values())
         cores = self.execution.executor.cores
         left = remaining_seconds(self.campaign, entries, cores, time.time())
@@ -151,7 +151,7 @@ class View:
         return {"finished": done, "of": len(self.campaign.planned), "seconds_left": left}
 
     def line(self, entries: dict[str, Entry]) -> str:
-        """Return how many runs are finished, and the time left."""
+        """Return the number of finished runs and the time left as text."""
         found = self.progress(entries)
         left = found["seconds_left"]
         rest = "time left unknown" if left is None else f"about {duration(left)} left"
@@ -170,17 +170,17 @@ class View:
         table = Table(*head, box=None, padding=(0, 2, 0, 0))
         for row in rows:
             table.add_row(*row)
-        at_work = [entry.label for entry in entries.values() if entry.state == "running"]
+        running = [entry.label for entry in entries.values() if entry.state == "running"]
         return Group(
             f"[bold]{heading(self.campaign.plan)}[/bold]\n{self.campaign.path}",
             bar,
             f"{self.line(entries)}, {duration(time.monotonic() - self.began)} so far",
             table,
-            *(f"running: {label}" for label in at_work[:8]),
+            *(f"running: {label}" for label in running[:8]),
         )
 
     def print_end(self, entries: dict[str, Entry]) -> None:
-        """Say what there is now and what can be done with it."""
+        """Print the final state, and commands to use the results."""
         path = self.campaign.path
         click.echo(f"{counts(entries)}")
         failed = [entry for entry in entries.values() if entry.state == "failed"]

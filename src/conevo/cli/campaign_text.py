@@ -1,4 +1,4 @@
-"""Campaigns as text: experiments, plans, how runs stand."""
+"""Campaigns as text: experiments, plans, states of runs."""
 
 from __future__ import annotations
 
@@ -89,14 +89,14 @@ def print_plan(runs: Iterable[PlannedRun], as_json: bool) -> None:
 
 
 def print_status(campaign: Campaign, with_runs: bool, as_json: bool) -> bool:
-    """Print how a campaign stands; returns whether runs have failed."""
+    """Print the state of a campaign; returns whether runs have failed."""
     standings = campaign.standings()
     entries = {
         label: dataclasses.replace(entry, state="interrupted")
         if entry.state == "pending" and last_written(campaign.paths, label) is not None
         else entry
         for label, entry in standings.items()
-    }  # as the live page has it: a run with a generation does not wait for its first
+    }  # as on the live page: a run that has a generation is not pending
     failed = [entry for entry in entries.values() if entry.state == "failed"]
     left = None
     if campaign.is_running:
@@ -130,7 +130,7 @@ def print_status(campaign: Campaign, with_runs: bool, as_json: bool) -> bool:
 
 
 def print_failed(campaign: Campaign, failed: Iterable[Entry]) -> None:
-    """Print why runs failed, and what a correction of their world's file takes."""
+    """Print why runs failed, and how to use a corrected file of their world."""
     files = set()
     for entry in failed:
         click.echo(f"failed {entry.label}: {entry.reason}")
@@ -144,7 +144,7 @@ def print_failed(campaign: Campaign, failed: Iterable[Entry]) -> None:
 
 
 def _whose(campaign: Campaign, entries: Mapping[str, Entry]) -> str:
-    """Return who carries the campaign out, as far as can be seen from here."""
+    """Return whether the campaign is running, and with a coordinator, as far as files show it."""
     if campaign.is_running:
         return "running"
     if any(entry.state == "running" for entry in entries.values()):
@@ -153,7 +153,7 @@ def _whose(campaign: Campaign, entries: Mapping[str, Entry]) -> str:
 
 
 def _sign_of_life(campaign: Campaign, entries: Mapping[str, Entry]) -> str:
-    """Return when a run that is not finished was last written, whoever writes it and where."""
+    """Return when an unfinished run was last written, by any process on any machine."""
     labels = [e.label for e in entries.values() if e.state in ("pending", "interrupted", "running")]
     at = max(filter(None, (last_written(campaign.paths, label) for label in labels)), default=None)
     return "" if at is None else f"last generation written {_ago(at)}"
@@ -164,7 +164,7 @@ def _ago(at: float) -> str:
 
 
 def _progress(campaign: Campaign, entry: Entry) -> tuple[str, str]:
-    """Return how far a run is, and when it was last written, for a table."""
+    """Return a run's progress and the time since it was last written, for a table."""
     found = progress_of(campaign.paths, campaign.planned[entry.label])
     if found.written is None:
         return "", ""
@@ -179,7 +179,7 @@ def _progress(campaign: Campaign, entry: Entry) -> tuple[str, str]:
 
 
 def _how_far(campaign: Campaign, entry: Entry) -> dict[str, Any]:
-    """Return the same as JSON has it."""
+    """Return a run's progress as JSON has it."""
     found = progress_of(campaign.paths, campaign.planned[entry.label])
     return {
         "generations": found.generations,
@@ -196,7 +196,7 @@ def heading(plan: Plan) -> str:
 
 
 def counts(entries: Mapping[str, Entry]) -> str:
-    """Return how many runs are in each state: "12 finished, 2 running, 76 pending"."""
+    """Return the number of runs in each state: "12 finished, 2 running, 76 pending"."""
     found = Counter(entry.state for entry in entries.values())
     return ", ".join(f"{found[state]} {state}" for state in SHOWN if found[state])
 

@@ -1,4 +1,4 @@
-"""``conevo check``: whether a world keeps what worlds promise."""
+"""``conevo check``: whether a world meets the requirements of worlds."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ __all__ = ["check"]
 @click.argument("world", metavar="FILE.py[:ENVIRONMENT]")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON array.")
 def check(world: str, as_json: bool) -> int:
-    """Check the world in FILE.py, or one of the package, and print a line for each thing checked.
+    """Check the world in FILE.py, or one of the package, and print a line for each check.
 
     It checks parameters and their bounds, phases, fields, scenarios, sensors, outputs and counts;
     array indices, in a process of its own; whether robots visited in another order give the same

@@ -18,22 +18,22 @@ if TYPE_CHECKING:
 __all__ = ["compare", "plan_of"]
 
 
-# As many team evaluations for every method, as in the plans that come with conevo: a smoke run's
-# generations cost each method another number, and runs of different budgets are not compared.
+# The same budget for every method, as in the plans of the package: the generations of a smoke run
+# cost each method a different number of evaluations, and only equal budgets are compared.
 SMOKE = {"run.generations": 20, "run.budget_evaluations": 430}
 
 
 def plan_of(order: Order, config: RunConfig, n_seeds: int, shape: bool) -> Plan:
-    """Return the plan of every method with every seed; its name says what it compares.
+    """Return the plan of every method with every seed; its name lists what is compared.
 
     Args:
-        order: what the command line asks for; its method may be several, "cone,mesp".
+        order: options of the command line; several methods are separated by commas, "cone,mesp".
         config: of the first method.
-        n_seeds: runs of each method; the seeds count from the one asked for, or 1.
-        shape: whether every run learns the environments before this one first.
+        n_seeds: runs of each method; seeds count up from ``order.seed``, or from 1.
+        shape: whether every run learns the previous environments of the family first.
 
     Raises:
-        UsageError: --config, whose settings a campaign cannot take.
+        UsageError: --config, since a campaign cannot take its settings.
     """
     from conevo.campaigns.inputs import located
     from conevo.campaigns.plan import Plan
@@ -66,7 +66,7 @@ def plan_of(order: Order, config: RunConfig, n_seeds: int, shape: bool) -> Plan:
 
 
 def compare(order: Order, plan: Plan, dry_run: bool) -> int:
-    """Carry the campaign out on all cores, or print its runs; returns the exit code."""
+    """Execute the campaign on all cores, or print its runs; returns the exit code."""
     from conevo.campaigns.campaign import CAMPAIGNS, create
     from conevo.cli.campaign_run import carry_on, ready
     from conevo.cli.campaign_text import print_plan

@@ -1,4 +1,4 @@
-"""What the verbs that show a team share: which epoch of which team, and where the file goes."""
+"""Options of the commands that show a team: which epoch of which team, and the file's name."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 __all__ = ["REPLAYS", "bar", "epoch_options", "name_of", "playbacks", "trajectories"]
 
-REPLAYS = Path("replays")  # where pages and films are put unless told otherwise
+REPLAYS = Path("replays")  # default folder of pages and films
 epoch_options = all_of(
     click.option(
         "--beside", metavar="RUN|FILE", help="A second team, in the same scenario, side by side."
@@ -40,7 +40,7 @@ epoch_options = all_of(
     threads_option,
     device_option,
 )  # fmt: skip
-"""Options that say which epoch of which team is meant."""
+"""Options that select an epoch of a team."""
 
 
 def trajectories(
@@ -52,10 +52,10 @@ def trajectories(
     threads: int | None,
     device: str | None,
 ) -> list[Trajectory]:
-    """Return the trajectory that is asked for, or the two.
+    """Return the trajectory that the options select, or both of two teams.
 
     Raises:
-        UsageError: no such run or file, nothing to be seen in it, or two that do not go together.
+        UsageError: no such run or file, no team in it, or two of different tasks or scenarios.
     """
     if beside is None and beside_generation is not None:
         raise UsageError("--beside-generation needs --beside RUN")
@@ -93,10 +93,14 @@ def _trajectory(
 
 
 def playbacks(seen: list[Trajectory], *names: str | None) -> list[Playback]:
-    """Return what is to be drawn of trajectories; ``names`` are those that they were asked for by.
+    """Return the playbacks of trajectories.
+
+    Args:
+        seen: one or two trajectories.
+        names: their runs or files as typed.
 
     Raises:
-        UsageError: one is damaged; it is named.
+        UsageError: one is damaged; the message contains its name.
     """
     from conevo.replay.playback import playback_of
 
@@ -110,7 +114,7 @@ def playbacks(seen: list[Trajectory], *names: str | None) -> list[Playback]:
 
 
 def name_of(seen: list[Trajectory]) -> str:
-    """Return a file's name, without its ending, for what is shown."""
+    """Return a file name, without its ending, that identifies these trajectories."""
     names = [
         f"{t.about['label']}-generation-{t.about['generation']}-epoch-{t.about['epoch']}"
         for t in seen
@@ -121,9 +125,9 @@ def name_of(seen: list[Trajectory]) -> str:
 
 @contextmanager
 def bar(text: str) -> Iterator[Callable[[int, int], None]]:
-    """Yield a function that shows how much of something is done, and when all of it will be.
+    """Yield a function that shows progress and the time left.
 
-    On a terminal only, on stderr, and nothing before it is first called.
+    It prints on stderr, only if that is a terminal, and nothing before its first call.
     """
     if not sys.stderr.isatty():
         yield lambda done, total: None
@@ -131,7 +135,7 @@ def bar(text: str) -> Iterator[Callable[[int, int], None]]:
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-    name = TextColumn("{task.description}", markup=False)  # a file's name may hold brackets
+    name = TextColumn("{task.description}", markup=False)  # a file name may contain brackets
     done_of_all = TextColumn("{task.completed}/{task.total}")
     console = Console(stderr=True)
     progress = Progress(

@@ -25,13 +25,15 @@ __all__ = [
 NUMBER = re.compile(r"[-+.,/\de]+( (\+-|\().*)?")
 
 
-def spread(found: Mapping[str, Any], n_scenarios: int) -> str:
+def spread(found: Mapping[str, Any] | None, n_scenarios: int) -> str:
     """Return mean and standard deviation of a measure: "0.9 +- 0.1", "0.8 (1 of 5)" if 4 have none.
 
     Args:
-        found: "mean", "sd", "values".
+        found: "mean", "sd", "values"; None, shown as "-", if the world has no such measure.
         n_scenarios: of the test.
     """
+    if found is None:
+        return "-"
     deviation = f" +- {number(found['sd'])}" if n_finite(found) > 1 else ""
     return f"{number(found['mean'])}{deviation}{_share(found, n_scenarios)}"
 
@@ -42,18 +44,18 @@ def mean(found: Mapping[str, Any], n_scenarios: int) -> str:
 
 
 def _share(found: Mapping[str, Any], n_scenarios: int) -> str:
-    """Return how many scenarios have a finite value, nothing if all have."""
+    """Return the number of scenarios with a finite value as text, empty if all have one."""
     n = n_finite(found)
     return "" if n == n_scenarios else f" ({n} of {n_scenarios})"
 
 
 def n_finite(found: Mapping[str, Any]) -> int:
-    """Return how many values of a measure are finite; conevo 0.1.0 kept no others."""
+    """Return the number of finite values of a measure; conevo 0.1.0 recorded no others."""
     return int(found.get("n", len(found["values"])))
 
 
 def progress(done: int, planned: int, spent: int, budget: int) -> str:
-    """Return how far a run is: of its generations, or of its budget if that ends it sooner.
+    """Return a run's progress in generations, or in its budget if that ends it sooner.
 
     "5 of 30 generations", "13 generations, 49,920 of 50,000 evaluations".
 

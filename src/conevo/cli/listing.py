@@ -90,7 +90,7 @@ def _worlds() -> Rows:
 
 
 def _own_defaults(rows: Rows) -> Iterator[str]:
-    """Take the defaults out of the rows of worlds; yield a line for environments alike in them."""
+    """Remove the defaults from the rows of worlds; yield a line for each set of equal ones."""
     for row in rows:
         alike: dict[str, list[str]] = {}
         for environment, values in row.pop("defaults").items():
@@ -148,7 +148,7 @@ def _runs(folder: str | None) -> Rows:
 
 
 def _progress(runs: Sequence[Run], outlines: Sequence[Outline]) -> str:
-    """Return how far a run, or all stages of a shaping are."""
+    """Return the progress of a run, or of all stages of a shaping."""
     budgets = [outline.budget_evaluations for outline in outlines]
     done = [run.done() for run in runs]
     return progress(

@@ -1,4 +1,4 @@
-"""Which run is meant, which shaping, or which campaign."""
+"""Find the run, shaping or campaign that a name or a path selects."""
 
 from __future__ import annotations
 
@@ -35,10 +35,10 @@ __all__ = [
 
 
 def find(text: str) -> Run | Shaping:
-    """Return what is at a path, or the only thing in runs/ whose name begins with ``text``.
+    """Return the run or shaping at a path, or the only one in runs/ with this beginning of a name.
 
     Raises:
-        UsageError: there is no such run or shaping, or more than one.
+        UsageError: no such run or shaping, or more than one.
     """
     if Path(text).exists():
         return open_directory(Path(text))
@@ -52,10 +52,10 @@ def find(text: str) -> Run | Shaping:
 
 
 def find_run(text: str) -> Run:
-    """Return the run that is meant; of a shaping its last stage that has a team.
+    """Return a run by name or path; of a shaping, its last stage that has a team.
 
     Raises:
-        UsageError: there is no such run, more than one, or no stage that has begun.
+        UsageError: no such run, more than one, or no stage that has begun.
     """
     found = find(text)
     if isinstance(found, Run):
@@ -67,10 +67,10 @@ def find_run(text: str) -> Run:
 
 
 def find_last(text: str) -> Run:
-    """Return the run that is meant; of a shaping its last stage.
+    """Return a run by name or path; of a shaping, its last stage.
 
     Raises:
-        UsageError: there is no such run, more than one, or the shaping is not finished.
+        UsageError: no such run, more than one, or the shaping is not finished.
     """
     found = find(text)
     if isinstance(found, Run):
@@ -84,10 +84,10 @@ def find_last(text: str) -> Run:
 
 
 def find_shaping(text: str) -> Shaping:
-    """Return the shaping that is meant.
+    """Return a shaping by name or path.
 
     Raises:
-        UsageError: there is no such shaping, more than one, or it is a run.
+        UsageError: no such shaping, more than one, or it is a run.
     """
     found = find(text)
     if isinstance(found, Run):
@@ -96,12 +96,12 @@ def find_shaping(text: str) -> Shaping:
 
 
 def directories(folder: Path) -> list[Path]:
-    """Return the directories in ``folder`` that hold a run or a shaping, by name."""
+    """Return the directories of runs and shapings in ``folder``, sorted by name."""
     return _holding(folder, "run", "shaping")
 
 
 def campaigns_in(folder: Path) -> list[Path]:
-    """Return the directories in ``folder`` that hold a campaign, by name."""
+    """Return the directories of campaigns in ``folder``, sorted by name."""
     return _holding(folder, "campaign")
 
 
@@ -126,10 +126,10 @@ def campaign_at(text: str) -> Campaign | None:
 
 
 def find_campaign(text: str) -> Campaign:
-    """Return the campaign that is meant.
+    """Return a campaign by path, or by its name in campaigns/.
 
     Raises:
-        UsageError: there is none at this path, nor of this name in campaigns/.
+        UsageError: no such campaign.
     """
     from conevo.campaigns.campaign import CAMPAIGNS
 
@@ -141,10 +141,10 @@ def find_campaign(text: str) -> Campaign:
 
 
 def only_campaign() -> Campaign:
-    """Return the campaign in campaigns/.
+    """Return the only campaign in campaigns/.
 
     Raises:
-        UsageError: there is none, or more than one.
+        UsageError: none, or more than one.
     """
     from conevo.campaigns.campaign import CAMPAIGNS, Campaign
 
@@ -159,11 +159,11 @@ def only_campaign() -> Campaign:
 
 @contextmanager
 def sealed(campaign: Campaign) -> Iterator[Path]:
-    """Yield the folder with the tables of all that is finished.
+    """Yield the folder with the tables of all finished runs.
 
     Raises:
         UsageError: no run is finished yet.
-        EnvironmentFailure: they cannot be made anywhere.
+        EnvironmentFailure: the tables cannot be written anywhere.
     """
     from conevo.campaigns.sealing import sealed_tables
 
@@ -182,7 +182,7 @@ def open_directory(path: Path) -> Run | Shaping:
     """Return the run or shaping in a directory.
 
     Raises:
-        UsageError: it holds none, or it is damaged.
+        UsageError: neither is there, or it is damaged.
     """
     if kind_of(path) == "campaign":
         raise UsageError(

@@ -1,4 +1,4 @@
-"""The command table. A verb's module is loaded when the verb is used, so that help is instant."""
+"""The table of commands. The module of a command is loaded when it is used: help is instant."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ VERBS = {
     "film": "Make a film of a run's fittest team (GIF, MP4).",
     "watch": "Follow runs live in the browser.",
     "behaviours": "Classify what robots do, each and together.",
-    "signal": "Measure how well trials tell genotypes apart.",
+    "signal": "Measure how well trials distinguish genotypes.",
     "campaign": "Start, monitor, stop and retry campaigns of many runs.",
     "report": "Write a campaign's report: page, tables, figures, data.",
     "query": "Query a campaign's tables with SQL.",
@@ -45,7 +45,7 @@ MODULES = {"list": "listing", "shape-prey": "shape_prey"}
 
 
 class Text(click.types.StringParamType):
-    """A text that is not empty: what is given as "$RUN", of no such variable, is a mistake."""
+    """A text that is not empty, since "$RUN" without such a variable is a mistake."""
 
     def convert(
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
@@ -57,7 +57,7 @@ class Text(click.types.StringParamType):
 
 
 def _refuse_empty(command: click.Command) -> None:
-    """Let every option of a verb that takes a text refuse an empty one."""
+    """Let all text options of a command refuse an empty text."""
     for parameter in command.params:
         if isinstance(parameter, click.Option) and parameter.type is click.STRING:
             parameter.type = Text()
@@ -66,14 +66,14 @@ def _refuse_empty(command: click.Command) -> None:
 
 
 class Verbs(click.Group):
-    """A group that knows its verbs without loading them."""
+    """A group that lists its commands without loading them."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        """Return the verbs in the order of their use."""
+        """Return the commands in the order of their use."""
         return list(VERBS)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command:
-        """Load a verb."""
+        """Load a command."""
         if cmd_name not in VERBS:
             raise unknown_name("command", cmd_name, VERBS)
         module = import_module(f"conevo.cli.{MODULES.get(cmd_name, cmd_name)}")
@@ -82,16 +82,16 @@ class Verbs(click.Group):
         return command
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """Write the table without loading the verbs."""
+        """Write the table without loading the commands."""
         with formatter.section("Commands"):
             formatter.write_dl(list(VERBS.items()))
 
 
 class Notes(logging.Handler):
-    """Prints what the library has to say, a line each."""
+    """Prints log messages of the library, one line each."""
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Print one."""
+        """Print a message."""
         click.echo(f"conevo: note: {' '.join(record.getMessage().split())}", err=True)
 
 
@@ -130,10 +130,10 @@ def cli() -> None:
 
 
 def _ready_streams() -> None:
-    """Let every text be printed: closed streams lead nowhere, unprintable letters are escaped."""
+    """Make all texts printable: closed streams become null devices, other letters are escaped."""
     for name in ("stdin", "stdout", "stderr"):
         stream = getattr(sys, name)
-        if stream is None:  # closed by whoever started this process, as by >&-
+        if stream is None:  # closed by the parent process, as by >&-
             stream = Path(os.devnull).open("r" if name == "stdin" else "w")  # noqa: SIM115
             setattr(sys, name, stream)
         if name != "stdin" and isinstance(stream, io.TextIOWrapper):
@@ -141,11 +141,11 @@ def _ready_streams() -> None:
 
 
 def _count_interrupts_once() -> None:
-    """Let Ctrl-C that is pressed several times in a row interrupt once.
+    """Count Ctrl-C as one interrupt if it is pressed several times in a row.
 
-    A second one would interrupt what the first has begun: checkpoints and the last message. One
-    that comes later is another. Where interrupts are ignored, as in a shell's background jobs, they
-    still are.
+    A second interrupt would end the handling of the first: writing a checkpoint and the last
+    message. A later one counts again. Ignored interrupts, as in background jobs of a shell, stay
+    ignored.
     """
     if signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
         return
@@ -178,7 +178,7 @@ def _refuse_undecoded(word: str) -> None:
 
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
-    """Run a command line; every error is one line, every ending has its exit code.
+    """Execute a command line; every error is one line, and has an exit code.
 
     2: the request cannot be carried out as written; 3: the machine refused; 130: interrupted.
     """
@@ -210,7 +210,7 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
             3,
         )
     except OSError as error:
-        if error.errno == errno.EPIPE:  # the reader of our output has gone
+        if error.errno == errno.EPIPE:  # the reader of our output has ended
             from conevo.cli.run_to_end import drop_output
 
             drop_output()

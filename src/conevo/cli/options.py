@@ -1,4 +1,4 @@
-"""What the verbs that start something share: their options, and what these ask for."""
+"""Options of the commands that start runs, and the actions that they ask for."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ settings_only = all_of(
         "--config", metavar="FILE", help="TOML file with settings, such as a run's config.toml."
     ),
 )  # fmt: skip
-"""Options that say what a run would be, for a command that starts none."""
+"""Settings of a run, for a command that starts none."""
 setting_options = all_of(
     settings_only,
     click.option(
@@ -55,15 +55,15 @@ setting_options = all_of(
     click.option("--out", metavar="DIR", help="Output directory (default: a new one under runs/)."),
     time_limit_option,
 )  # fmt: skip
-"""Options that say what to start, and where."""
+"""Settings of a run, and where to execute it."""
 
 
 @dataclass
 class Order:
-    """What a command line asks for; the fields are named as the options are.
+    """The options of a command line; fields have the options' names.
 
     Raises:
-        UsageError: options that are mutually exclusive, or a device that cannot be.
+        UsageError: options that are mutually exclusive, or an unknown device.
     """
 
     method: str | None
@@ -71,14 +71,14 @@ class Order:
     seed: int | None
     settings: tuple[str, ...]
     config: str | None
-    budget_evaluations: int | None
-    threads: int | None
-    device: str
-    out: str | None
-    limit: TimeLimit
-    as_json: bool
-    quiet: bool
-    verbose: bool
+    budget_evaluations: int | None = None
+    threads: int | None = None
+    device: str = "cpu"
+    out: str | None = None
+    limit: TimeLimit | None = None
+    as_json: bool = False
+    quiet: bool = False
+    verbose: bool = False
     comparing: bool = False
 
     def __post_init__(self) -> None:
@@ -95,10 +95,10 @@ class Order:
         self.command = shlex.join(["conevo", *sys.argv[1:]])
 
     def take(self, key: str, option: str, value: Any) -> None:
-        """Add what an option sets to the settings, if it is given.
+        """Add an option to the settings, if it is given.
 
         Raises:
-            UsageError: --set has it, too.
+            UsageError: --set gives the same setting.
         """
         self._refuse_twice(key, option, value)
         if value is not None:
@@ -111,10 +111,10 @@ class Order:
 
     @property
     def methods(self) -> tuple[str, ...]:
-        """The methods asked for, "cone" unless there are any.
+        """The methods of --method, "cone" by default.
 
         Raises:
-            UsageError: several, though they are not to be compared.
+            UsageError: several methods without --seeds.
         """
         found = tuple(dict.fromkeys((self.method or "cone").split(",")))
         if len(found) > 1 and not self.comparing:
@@ -124,9 +124,9 @@ class Order:
         return found
 
     def resolve(self, world: str | None) -> RunConfig:
-        """Return the configuration for a world, or for the one that the file names.
+        """Return the configuration for a world, or for the world of --config.
 
-        Of several methods it is the first one's.
+        With several methods, it has the first one.
         """
         from conevo.runs.config import resolve
 
@@ -144,12 +144,11 @@ class Order:
     def print_only(
         self, configs: Sequence[RunConfig], origin: str | None = None, of_champion: bool = False
     ) -> None:
-        """Print what would be started, stage by stage; writes and starts nothing.
+        """Print the settings and costs of a run, or of every stage; writes and starts nothing.
 
         Args:
             configs: of the run, or of every stage.
-            origin: as for ``run``, as the next.
-            of_champion: whether the populations are bred from its champion.
+            origin, of_champion: as for ``run``.
         """
         from conevo.cli.lookup import find_last
         from conevo.cli.settings_text import print_dry_run
@@ -168,12 +167,13 @@ class Order:
         print_dry_run(configs, path, self.as_json, ancestors, ancestry)
 
     def run(self, config: RunConfig, origin: str | None = None, of_champion: bool = False) -> None:
-        """Start a run and carry it on to its end.
+        """Start a run and continue it to its end.
 
         Args:
-            config: what to run.
-            origin: names the run whose populations it begins with, or a shaping whose last stage's.
-            of_champion: they are bred from its champion.
+            config: of the run.
+            origin: name of another run that has the initial populations; of a shaping, its last
+                stage has them.
+            of_champion: breed the populations from the champion of ``origin`` instead.
         """
         from conevo.cli.lookup import find_last
         from conevo.runs.run import start
@@ -190,9 +190,9 @@ class Order:
         carry_on(begun, self.threads, self.style, self.limit)
 
     def resolve_both(self, world: str | None, first: str) -> list[RunConfig]:
-        """Return the configurations of a run's two stages, the first of which ``first`` evolves.
+        """Return the configurations of two stages; method ``first`` evolves the first one.
 
-        Settings of the method are the second stage's; ``first_share`` may be among the settings.
+        Settings of the method apply to the second stage. ``first_share`` may be among the settings.
         """
         from conevo.runs.first import FIRST, SHARE, resolve_stages, without_method
 
@@ -211,7 +211,7 @@ class Order:
         )
 
     def shape(self, configs: Sequence[RunConfig]) -> None:
-        """Start a shaping and carry it on to its end."""
+        """Start a shaping and continue it to its end."""
         from conevo.runs.shaping import start_stages
 
         how: dict[str, Any] = {"threads": self.threads, "device": self.device}

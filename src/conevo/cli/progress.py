@@ -1,4 +1,4 @@
-"""Watching a run: live on a terminal, else one line or one JSON object per generation."""
+"""The display of a running run: live on a terminal, else a line or a JSON object per generation."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import click
 from conevo.cli.format import bars, castes, favourites, neurons
 from conevo.cli.run_text import heading_of, measures_text
 from conevo.numbers import duration, number
-from conevo.runs.progress import RECENT, Done, seconds_left, share_of
+from conevo.runs.progress import Pace
 from conevo.runs.provenance import declared
 from conevo.runs.run import Run
 from conevo.terms import S_MEANS, SHARE_SCALE, counted
@@ -29,14 +29,14 @@ PAUSE = 2.0  # seconds between two plain lines
 def watching(
     run: Run, style: str, stage: int = 0, n_stages: int = 0, before: int = 0
 ) -> Iterator[Callable[[Run, Record], None]]:
-    """Yield the function that is called after each generation.
+    """Yield a function that is called after each generation.
 
     Args:
-        run: the run to be watched.
+        run: the run to show.
         style: "live", "plain", "verbose", "json" or "quiet".
-        stage: the number of a shaping's stage, 0 if the run is none.
-        n_stages: the stages of that shaping.
-        before: generations of its stages before this one.
+        stage: the number of a shaping's stage, 0 for any other run.
+        n_stages: number of stages of that shaping.
+        before: number of generations in its previous stages.
     """
     heading = (f"stage {stage} of {n_stages}: " if stage else "") + heading_of(run)
     if style == "live":
@@ -51,81 +51,40 @@ def watching(
     else:
 
         def add(run: Run, record: Record) -> None:
-            place = {"number": before + record["generation"], "stage": stage}
-            place["task"] = run.outline.task
-            click.echo(json.dumps((place if stage else {}) | record))
+            number, task = before + record["generation"], run.outline.task
+            lead = {"number": number, "stage": stage, "task": task} if stage else {}
+            click.echo(json.dumps(lead | record))
 
         yield add if style == "json" else lambda run, record: None
 
 
-class Pace:
-    """How fast a run goes: team evaluations per second and the time to its end."""
-
-    def __init__(self, run: Run) -> None:
-        self.outline, self.records = run.outline, run.generations()
-
-    def add(self, record: Record) -> None:
-        """Note a finished generation; one that was there before it was made again."""
-        self.records[record["generation"] :] = [record]
-
-    @property
-    def spent(self) -> int:
-        """Team evaluations so far."""
-        return int(self.records[-1]["team_evaluations"]) if self.records else 0
-
-    @property
-    def done(self) -> Done:
-        """What is finished."""
-        return Done(len(self.records), self.spent)
-
-    @property
-    def share(self) -> float:
-        """The share of the run that is over, by generations or by budget."""
-        return share_of([self.outline], [self.done])
-
-    @property
-    def rate(self) -> float:
-        """Team evaluations per second over the last generations."""
-        seconds = sum(record["seconds"] for record in self.records[-RECENT:])
-        before = self.records[-RECENT - 1]["team_evaluations"] if self.records[RECENT:] else 0
-        return (self.spent - before) / seconds if seconds else 0.0
-
-    @property
-    def place(self) -> str:
-        """Where the run stands: its generation, and the budget if that will end it."""
-        budget, planned = self.outline.budget_evaluations, self.outline.generations
-        if budget and self.spent / budget > len(self.records) / planned:
-            spent = f"{self.spent:,}/{budget:,} evaluations"
-            return f"generation {len(self.records)}, {spent}"
-        return f"generation {len(self.records)}/{planned}"
-
-    @property
-    def remaining(self) -> float:
-        """The seconds until the last generation, or until the budget is spent."""
-        columns = zip(*((r["seconds"], r["team_evaluations"]) for r in self.records), strict=True)
-        seconds, evaluations = columns if self.records else ((), ())
-        return seconds_left([self.outline], [self.done], seconds, evaluations)
+def place(pace: Pace) -> str:
+    """Return the generation that a run has reached, and its budget if that will end it."""
+    done, planned, budget = pace.done, pace.outline.generations, pace.outline.budget_evaluations
+    if budget and done.evaluations / budget > done.generations / planned:
+        return f"generation {done.generations}, {done.evaluations:,}/{budget:,} evaluations"
+    return f"generation {done.generations}/{planned}"
 
 
 class Lines:
-    """One plain line per generation, at most one every ``pause`` seconds; the first always."""
+    """Prints one line per generation, at most one every ``pause`` seconds, and always the first."""
 
     def __init__(self, run: Run, pause: float) -> None:
         self.pace, self.pause, self.next = Pace(run), pause, 0.0
 
     def add(self, run: Run, record: Record) -> None:
-        """Print a generation if it is time to."""
+        """Print a generation, unless the last line is too recent."""
         self.pace.add(record)
         if time.monotonic() < self.next and record["generation"] + 1 < run.outline.generations:
             return
         self.next = time.monotonic() + self.pause
         measures = "  ".join(f"{k} {number(v)}" for k, v in record["performance"].items())
         click.echo(
-            f"{self.pace.place}  {measures}  "
+            f"{place(self.pace)}  {measures}  "
             f"fitness best {number(record['best_fitness'])} mean {number(record['mean_fitness'])}  "
             f"S {number(record['specialization'])}  {castes(record['castes'])}  "
             f"{number(self.pace.rate)} evaluations/s  "
-            f"{duration(self.pace.remaining)} left"
+            f"{duration(self.pace.seconds_left)} left"
         )
 
 
@@ -155,8 +114,8 @@ class Display:
         return Group(
             f"[bold]{self.heading}[/bold]\n{self.run.path}",
             bar,
-            f"{self.pace.place}, {duration(time.monotonic() - self.started)} so far, "
-            f"{duration(self.pace.remaining)} left",
+            f"{place(self.pace)}, {duration(time.monotonic() - self.started)} so far, "
+            f"{duration(self.pace.seconds_left)} left",
             grid,
         )
 
@@ -173,7 +132,7 @@ class Display:
             f"fittest team {number(last['team_fitness'])}",
         )
         yield "castes", castes(last["castes"])
-        if "favourites" in last:  # not in the log of a run that an earlier version began
+        if "favourites" in last:  # runs of earlier versions have none
             liked = favourites(last["favourites"], last.get("favourite_share"))
             yield "settings", f"{liked}; {SHARE_SCALE}"
         yield "S", f"{number(last['specialization'])} (mean {S_MEANS})"
@@ -184,7 +143,7 @@ class Display:
                 f"{counted(last['recombinations'], 'recombination')} between populations",
             )
         yield "neurons", neurons(last["n_hidden"])
-        spent = f"{self.pace.spent:,} spent"
+        spent = f"{self.pace.done.evaluations:,} spent"
         yield "speed", f"{number(self.pace.rate)} team evaluations/s, {spent}"
         if last["n_nonfinite"]:
             yield "not finite", f"{counted(last['n_nonfinite'], 'score')}, ranked last"

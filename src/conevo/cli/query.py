@@ -50,7 +50,7 @@ def query(arguments: tuple[str, ...], as_csv: bool, as_json: bool) -> None:
 
 
 def _is_no_json(value: object) -> bool:
-    """Whether a value is a number that JSON cannot hold: not-a-number or infinite."""
+    """Whether a value is a number that JSON does not have: not-a-number or infinite."""
     return isinstance(value, float) and not math.isfinite(value)
 
 

@@ -1,4 +1,4 @@
-"""What the verbs that evolve share: carry on while someone watches, and end clearly."""
+"""Common parts of the commands that evolve: options, execution to the end, messages."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 
 def all_of(*options: Callable[[Any], Any]) -> Callable[[Function], Function]:
-    """Return what adds all of these options to a command, in their order."""
+    """Return a decorator that adds these options to a command, in their order."""
 
     def add(function: Function) -> Function:
         for option in reversed(options):
@@ -51,7 +51,7 @@ output_options = all_of(
 
 
 def accept_option(function: Function) -> Function:
-    """Add --accept-other-code to a command that continues something."""
+    """Add --accept-other-code to a command that continues runs."""
     return click.option(
         "--accept-other-code",
         is_flag=True,
@@ -67,7 +67,7 @@ threads_option = click.option(
 
 
 def device_option(function: Function) -> Function:
-    """Add --device to a command that plays what a run has evolved; None if it is not given."""
+    """Add --device to a command that uses a run's team; None if it is not given."""
 
     def known(ctx: click.Context, parameter: click.Parameter, name: str | None) -> str | None:
         from conevo.kernels.devices import refuse_unknown_device
@@ -84,12 +84,12 @@ def device_option(function: Function) -> Function:
 
 
 def drop_output() -> None:
-    """Send standard output nowhere from now on, since its reader has gone."""
+    """Redirect standard output to the null device, since its reader has ended."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def style_of(as_json: bool, quiet: bool, verbose: bool) -> str:
-    """Return how to report: "json", "quiet", "verbose", "live" (a terminal) or "plain"."""
+    """Return the style of reports: "json", "quiet", "verbose", "live" (a terminal) or "plain"."""
     if as_json + quiet + verbose > 1:
         raise UsageError("--json, --quiet and --verbose are mutually exclusive")
     if as_json or quiet or verbose:
@@ -115,25 +115,24 @@ def carry_on(
     found: Run | Shaping,
     threads: int | None,
     style: str,
-    limit: TimeLimit,
+    limit: TimeLimit | None,
     length: dict[str, Any] | None = None,
     accept_other_code: bool = False,
     device: str | None = None,
 ) -> None:
-    """Carry a run or a shaping on to its end, then print a summary and what can be done next.
+    """Continue a run or a shaping to its end, then print a summary and the next commands.
 
     Args:
-        found: what to carry on.
+        found: the run or shaping.
         threads: CPU threads, all by default.
-        style: how to report.
+        style: as ``style_of`` returns it.
         limit: the time that is left.
-        length: of a run, where it is to end instead: arguments of ``Run.extend``.
-        accept_other_code: go on although another conevo made it so far.
+        length: new length of a run: arguments of ``Run.extend``.
+        accept_other_code: continue results of another version.
         device: by default the one of its last session.
     """
+    from conevo.cli.ending import print_end
     from conevo.cli.progress import watching
-    from conevo.cli.run_text import print_end
-    from conevo.cli.shaping_text import print_shaping_end
     from conevo.outside import line_of
     from conevo.runs.run import Run
 
@@ -194,13 +193,10 @@ def carry_on(
         ) from error
     if found.status != "finished":
         click.echo(f"time limit reached after {_done(found)}; continue with: {advice}", err=True)
-    if isinstance(found, Run):
-        print_end(found, style)
-    else:
-        print_shaping_end(found, style)
+    print_end(found, style)
 
 
 def _done(found: Run | Shaping) -> str:
-    """Return how many generations are done."""
+    """Return the number of finished generations as text."""
     runs = found.stages if hasattr(found, "stages") else [found]
     return counted(sum(len(run.generations()) for run in runs), "generation")

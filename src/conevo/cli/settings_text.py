@@ -1,4 +1,4 @@
-"""Presets and settings as tables, and what a run would be as a configuration file."""
+"""Presets and settings as tables, and a planned run as a configuration file."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ from conevo.terms import counted
 
 __all__ = ["preset_rows", "print_dry_run", "print_settings", "setting_rows"]
 
-TASK = "rover/complex-1"  # whose sizes are listed unless another is named
+TASK = "rover/complex-1"  # its sizes are listed by default
 SENTENCE = re.compile(r"\. (?=[A-Z])")
-NARROWEST = 30  # columns for meanings, however narrow the terminal is
+NARROWEST = 30  # characters for meanings, even on a narrower terminal
 
 
 def preset_rows(task: str | None, method: str | None) -> list[dict[str, str]]:
-    """Return what each preset is for, and how much it evolves in a task."""
+    """Return the purpose of each preset, and its sizes in a task."""
     rows = []
     for preset in PRESETS:
         config = resolve(task or TASK, method, preset)
@@ -100,17 +100,17 @@ def print_dry_run(
     ancestors: Sequence[Any],
     ancestry: Any,
 ) -> None:
-    """Print what a run, or every stage of a shaping, would be.
+    """Print the settings and costs of a run, or of every stage of a shaping.
 
-    As text it is a configuration file that ``conevo run --config`` takes (of a shaping: that of the
-    last stage), below comments on where it would be written and what it would cost.
+    The text is a configuration file for ``conevo run --config`` (of a shaping: that of the last
+    stage). Comments at its top show the directory and the costs.
 
     Args:
         configs: of the run, or of every stage.
-        path: where it would be.
+        path: directory of the run.
         as_json: whether to print JSON.
-        ancestors: what the run, or each stage, would begin with, None for random populations.
-        ancestry: what its provenance would say of that.
+        ancestors: initial populations of the run, or of each stage; None for random ones.
+        ancestry: the provenance's entry for them.
     """
     prices = [price_of(*one) for one in zip(configs, ancestors, strict=True)]
     if as_json:

@@ -16,7 +16,7 @@ __all__ = ["shape_prey"]
 @setting_options
 @output_options
 def shape_prey(**options: Any) -> None:
-    """Run the six prey experiments in turn, each beginning with the populations of the one before.
+    """Run the six prey experiments in turn, each starting from the previous one's populations.
 
     Everything is written to one directory; prey.npz there holds the evolved prey. After Ctrl-C,
     continue with conevo resume.

@@ -1,4 +1,4 @@
-"""``conevo signal``: how well a method's trials tell the genotypes apart that it selects from."""
+"""``conevo signal``: how well the trials of a method distinguish its genotypes."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 __all__ = ["signal"]
 
 
-@click.command(short_help="Measure how well trials tell genotypes apart.")
+@click.command(short_help="Measure how well trials distinguish genotypes.")
 @click.argument("what", metavar="RUN|WORLD/ENVIRONMENT", required=False)
 @settings_only
 @click.option(
@@ -44,19 +44,19 @@ def signal(
 ) -> None:
     """Measure the signal of a method: the share of a fitness that is the genotype's own.
 
-    Of WORLD/ENVIRONMENT, it measures the populations that a run with these settings would begin
-    with; of RUN (finished or not), those that it began with and its last ones. Nothing is written.
+    With WORLD/ENVIRONMENT, it measures the initial populations of a run with these settings; with
+    RUN (finished or not), its initial and its last populations. Nothing is written.
 
     The same genotypes (neurons of MESP and CONE, networks of CCGA and HetCNE, clone teams of
-    HomCNE) are tried again and again, with other partners and in other scenarios. Printed is the
-    intra-class correlation with its standard error: 0 if trials say nothing about genotypes, 1 if
-    one trial says all. The reliability is that of the mean of the trials that the method gives each
-    genotype, by Spearman-Brown.
+    HomCNE) are tried repeatedly, with different partners and in different scenarios. The output is
+    the intra-class correlation with its standard error: 0 if a trial contains no information about
+    genotypes, 1 if one trial is enough. The reliability is that of a genotype's mean over the
+    trials that the method gives it, by Spearman-Brown.
 
-    Each trial of all genotypes takes N team evaluations (--units), with a single population as
-    with many: usually 1,000 to 3,000 in all, and twice that of a RUN. Where partners come from an
-    elite (method.partners), it takes N for each population or sub-population: up to 50,000. The
-    number is printed first.
+    Each trial of all genotypes takes N team evaluations (--units), for one population or many:
+    usually 1,000 to 3,000 in all, and twice that for a RUN. Where partners come from an elite
+    (method.partners), it takes N for each population or sub-population: up to 50,000. The number is
+    printed first.
 
     Try: conevo signal rover/complex-5 --method ccga
     """
@@ -70,16 +70,14 @@ def signal(
         how: dict[str, Any] = {"threads": threads, "device": device, "announce": announce}
         found = {"run": str(run.path)} | signal_of_run(run, units, trials, **how)
     else:
-        order = _order(settings, threads, device, as_json)
-        found = measure_signal(
-            order.resolve(what), units, trials, threads=threads, device=order.device,
-            announce=announce,
-        )  # fmt: skip
+        order = Order(**settings, device=device or "cpu")
+        how = {"threads": threads, "device": order.device, "announce": announce}
+        found = measure_signal(order.resolve(what), units, trials, **how)
     click.echo(json.dumps(found) if as_json else _text(found))
 
 
 def _is_run(what: str) -> bool:
-    """Whether a run is meant: a directory, or a name without a slash that is not a world's."""
+    """Whether this is a run: a directory, or a name without a slash that is not a world's."""
     from conevo.runs.run import RUNS
     from conevo.worlds.registry import WORLDS
 
@@ -90,7 +88,7 @@ def _is_run(what: str) -> bool:
 
 
 def _found(what: str, settings: dict[str, Any]) -> Run:
-    """Return a run, for which there are no settings."""
+    """Return a run; options with settings are refused."""
     from conevo.cli.lookup import find_run
     from conevo.cli.test import note_other_code
 
@@ -104,25 +102,6 @@ def _found(what: str, settings: dict[str, Any]) -> Run:
     run = find_run(what)
     note_other_code(run)
     return run
-
-
-def _order(
-    settings: dict[str, Any], threads: int | None, device: str | None, as_json: bool
-) -> Order:
-    """Return what the options ask for of a run that is not started."""
-    from conevo.runs.time_limit import TimeLimit
-
-    return Order(
-        **settings,
-        budget_evaluations=None,
-        threads=threads,
-        device=device or "cpu",
-        out=None,
-        limit=TimeLimit(None),
-        as_json=as_json,
-        quiet=False,
-        verbose=False,
-    )
 
 
 def _text(found: dict[str, Any]) -> str:

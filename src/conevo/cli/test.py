@@ -70,8 +70,7 @@ def test(
     Try: conevo test runs/first --set world.iterations=500 --robots 10
     """
     from conevo.cli.lookup import find_run, find_shaping
-    from conevo.cli.run_text import test_text
-    from conevo.cli.shaping_text import stages_test_text
+    from conevo.cli.testing_text import conditions_text, stages_test_text, test_text
 
     is_changed = on is not None or bool(settings) or robots is not None or rotate is not None
     if stages:
@@ -86,7 +85,6 @@ def test(
     found = find_run(run)
     note_other_code(found)
     if is_changed:
-        from conevo.cli.run_text import conditions_text
         from conevo.runs.assignments import parse_assignments
 
         world = parse_assignments(settings)
@@ -100,7 +98,7 @@ def test(
 
 
 def note_other_code(run: Run) -> None:
-    """Print that other code than this made a run, if it did; refuse a world no longer played."""
+    """Print a note if other code made a run; refuse a world of an earlier version."""
     from conevo.runs.code import last_code, other_code
     from conevo.worlds.registry import refuse_earlier
 

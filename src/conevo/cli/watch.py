@@ -1,4 +1,4 @@
-"""``conevo watch``: a page that follows runs live."""
+"""``conevo watch``: serve a page that follows runs live."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def watch(what: str | None, port: int, device: str | None, no_browser: bool) -> 
 
 
 def _watched(what: str | None) -> Watched:
-    """Return what is to be followed."""
+    """Return the runs and campaigns to follow."""
     from conevo.campaigns.campaign import CAMPAIGNS
     from conevo.cli.lookup import campaign_at, find
     from conevo.runs.run import RUNS
@@ -63,7 +63,7 @@ def _watched(what: str | None) -> Watched:
 
 @lru_cache(maxsize=8)
 def _champion_page(path: Path, generation: int, device: str | None) -> str:
-    """Return the replay of a run's champion; made again when ``generation`` is another one."""
+    """Return the replay of a run's champion; a new ``generation`` makes a new one."""
     from conevo.replay.page import replay_page
     from conevo.replay.playback import playback_of
     from conevo.replay.recording import record

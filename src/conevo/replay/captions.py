@@ -66,5 +66,4 @@ def _method(about: About) -> str:
 
 def _tally(names: Sequence[str]) -> str:
     """Return how many there are of each, most first, equals by name: "7 move, 3 low"."""
-    found = sorted(Counter(names).items(), key=lambda one: (-one[1], one[0]))
-    return ", ".join(f"{n} {name}" for name, n in found)
+    return ", ".join(f"{n} {name}" for name, n in Counter(sorted(names)).most_common())

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from conevo.numbers import duration, number
 from conevo.runs.html import STYLE, escape
-from conevo.runs.progress import Done, seconds_left, share_of
+from conevo.runs.progress import Pace
 from conevo.typing import Record
 
 if TYPE_CHECKING:
@@ -75,16 +75,16 @@ class _Bar:
     def __init__(self, run: Run) -> None:
         from IPython.display import display
 
-        self.run, self.records, self.shown_at = run, run.generations(), time.monotonic()
+        self.run, self.pace, self.shown_at = run, Pace(run), time.monotonic()
         self.handle = display(self._bundle("starts"), raw=True, display_id=True)
 
     def add(self, record: Record) -> None:
         """Show a finished generation, if it is time to; one that was there is made again."""
-        self.records[record["generation"] :] = [record]
-        is_last = len(self.records) == self.run.outline.generations
+        self.pace.add(record)
+        is_last = self.pace.done.generations == self.pace.outline.generations
         if is_last or time.monotonic() >= self.shown_at + PAUSE:
             self.shown_at = time.monotonic()
-            self._show("testing" if is_last else f"{duration(self._seconds_left())} left")
+            self._show("testing" if is_last else f"{duration(self.pace.seconds_left)} left")
 
     def end(self) -> None:
         """Show the finished run, or how to continue it."""
@@ -95,21 +95,13 @@ class _Bar:
     def _show(self, state: str, share: float | None = None) -> None:
         self.handle.update(self._bundle(state, share), raw=True)
 
-    def _seconds_left(self) -> float:
-        seconds = [record["seconds"] for record in self.records]
-        evaluations = [record["team_evaluations"] for record in self.records]
-        return seconds_left([self.run.outline], [self._done], seconds, evaluations)
-
-    @property
-    def _done(self) -> Done:
-        spent = self.records[-1]["team_evaluations"] if self.records else 0
-        return Done(len(self.records), spent)
-
     def _bundle(self, state: str, share: float | None = None) -> dict[str, str]:
         """Return the bar as HTML, and what it says as text."""
-        done, planned = len(self.records), self.run.outline.generations
-        value = [_value(self.records[-1])] if self.records else []
-        text = " · ".join([f"generation {done} of {planned}", *value, state, str(self.run.path)])
-        over = share_of([self.run.outline], [self._done]) if share is None else share
+        records, planned = self.pace.records, self.pace.outline.generations
+        value = [_value(records[-1])] if records else []
+        text = " · ".join(
+            [f"generation {len(records)} of {planned}", *value, state, str(self.run.path)]
+        )
+        over = self.pace.share if share is None else share
         bar = f'<progress value="{over:.4f}" max="1"></progress> {escape(text)}'
         return {"text/plain": text, "text/html": f'{STYLE}<div class="conevo">{bar}</div>'}

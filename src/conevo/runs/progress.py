@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from statistics import fmean
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from conevo.runs.outline import Outline
+from conevo.typing import Record
 
-__all__ = ["RECENT", "Done", "seconds_left", "share_of"]
+if TYPE_CHECKING:
+    from conevo.runs.run import Run
+
+__all__ = ["Done", "Pace", "seconds_left", "share_of"]
 
 RECENT = 10  # generations by which the pace is judged
 
@@ -64,3 +68,39 @@ def seconds_left(
             more = min(more, (planned[k].budget_evaluations - spent) // cost)
         left += max(more, 0.0)
     return left * fmean(recent)
+
+
+class Pace:
+    """How far a run is while it evolves, how fast it is, and how long it will still take."""
+
+    def __init__(self, run: Run) -> None:
+        self.outline, self.records = run.outline, run.generations()
+
+    def add(self, record: Record) -> None:
+        """Add a finished generation; one that was there before it was made again."""
+        self.records[record["generation"] :] = [record]
+
+    @property
+    def done(self) -> Done:
+        """Generations and team evaluations so far."""
+        spent = self.records[-1]["team_evaluations"] if self.records else 0
+        return Done(len(self.records), spent)
+
+    @property
+    def share(self) -> float:
+        """The share of the run that is over, by generations or by budget."""
+        return share_of([self.outline], [self.done])
+
+    @property
+    def rate(self) -> float:
+        """Team evaluations per second over the last generations."""
+        seconds = sum(record["seconds"] for record in self.records[-RECENT:])
+        before = self.records[-RECENT - 1]["team_evaluations"] if self.records[RECENT:] else 0
+        return (self.done.evaluations - before) / seconds if seconds else 0.0
+
+    @property
+    def seconds_left(self) -> float:
+        """The seconds until the last generation, or until the budget is spent."""
+        seconds = [record["seconds"] for record in self.records]
+        evaluations = [record["team_evaluations"] for record in self.records]
+        return seconds_left([self.outline], [self.done], seconds, evaluations)
