@@ -30,6 +30,7 @@ CHECKED = (
     "src/conevo/controllers/*.py",
     "src/conevo/evolution/**/*.py",
     "src/conevo/kernels/*.py",
+    "src/conevo/runs/*.py",
     "src/conevo/specialization/*.py",
     "src/conevo/worlds/**/*.py",
 )

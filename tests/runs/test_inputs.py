@@ -134,7 +134,7 @@ def test_a_shaping_holds_what_its_stages_need(tmp_path: Path, light: Path) -> No
 def test_a_preset_that_would_be_a_label_only_is_refused(tmp_path: Path) -> None:
     run = evolve_tiny(tmp_path / "run")
     file = run.path / "config.toml"
-    refused = r"'thesis' would change nothing but the run's label.*already set in .*config\.toml"
+    refused = r"'thesis' would change only the run's label.*already set in .*config\.toml"
     with pytest.raises(UsageError, match=refused):
         resolve(file=file, preset="thesis")
     with pytest.raises(UsageError, match=refused):

@@ -182,7 +182,7 @@ def test_every_tested_robot_has_a_favourite_and_its_share(
     found["champion"].pop(key)
     found["champion"] |= {key: value} if value else {}
     (run.path / "test.json").write_text(json.dumps(found))
-    with pytest.raises(UsageError, match="champion has not as many favourites, and shares of th"):
+    with pytest.raises(UsageError, match="champion has a different number of favourites, or of th"):
         _ = conevo.Run(run.path).test_result
 
 

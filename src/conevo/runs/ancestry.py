@@ -1,4 +1,4 @@
-"""What a run begins with that begins with another one: its last populations, or its champion."""
+"""The start of a run from another one: from its last populations, or from its champion."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ __all__ = ["ancestor_of", "refuse_other_controllers"]
 def ancestor_of(
     store: Store, config: Callable[[], RunConfig], of_champion: bool = False
 ) -> tuple[State | Team, dict[str, Any]]:
-    """Return what a finished run hands on, and what its descendants say about it.
+    """Return the state or champion of a finished run, and the provenance entry of descendants.
 
     Args:
         store: of the run.
-        config: called for its settings if its state is wanted; this loads its world and method.
-        of_champion: its champion instead of the state that it ended with.
+        config: returns its settings; called only for a state, since this loads world and method.
+        of_champion: return its champion instead of its last state.
 
     Raises:
-        UsageError: it is not finished, or not as it was when it was sealed.
+        UsageError: it is not finished, or was changed since it was sealed.
     """
     path = store.path
     if not store.is_finished:
@@ -60,14 +60,14 @@ def ancestor_of(
 
 
 def refuse_other_controllers(what: str, old: RunConfig, new: RunConfig) -> None:
-    """Raise UsageError if controllers of one configuration are not those that another has.
+    """Raise UsageError if genotypes of one configuration mean something else in another.
 
-    They may have another number of hidden neurons at the start, as long as genotypes mean the same.
+    The initial number of hidden neurons may differ.
 
     Args:
-        what: has the controllers, for the message.
+        what: the owner of the controllers, for the message.
         old: their configuration.
-        new: of the world that they are to play in.
+        new: the configuration of the world in which they are to be evaluated.
     """
     there, here = old.build_world(), new.build_world()
     a, b = genome_of(old.controller, there), genome_of(new.controller, here)

@@ -1,4 +1,4 @@
-"""Teams worth keeping: the fittest of the run so far, its finalists, those of some generations."""
+"""The teams that a run keeps: the fittest so far, the finalists, those of some generations."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Team:
     Attributes:
         generation: in which it was the fittest team.
         genes: [R, U, G] float32, neuron genotypes; zero in empty slots.
-        active: [R, U] bool, whether a slot holds a neuron.
+        active: [R, U] bool, whether a slot contains a neuron.
         fitness: [R] float64, credit of each robot when the team was evaluated.
         specialization: [R] float64, degree of specialization S of each robot then.
     """
@@ -33,7 +33,7 @@ class Team:
 
     @property
     def problem(self) -> str:
-        """What makes this no team, nothing if it is one; for teams that were read from a file."""
+        """Why this is not a valid team, empty if it is; for teams read from a file."""
         genes, active = self.genes, self.active
         n = (len(genes),)
         if genes.ndim != 3 or active.shape != genes.shape[:2] or not genes.size:
@@ -60,7 +60,7 @@ class Team:
 
     @property
     def rank(self) -> float:
-        """What sorts teams: the fittest first, those whose fitness is not finite last.
+        """The sort key of teams: the fittest first, those without a finite fitness last.
 
         Choice: by the robots' mean credit, what methods select on; task performance is never
         selected on. Of equal teams the earlier is first.
@@ -84,7 +84,7 @@ class Team:
 
 @dataclass(frozen=True)
 class Finalists:
-    """Teams as rows of arrays, the fittest first: what is kept of them in a file.
+    """Teams as rows of arrays, the fittest first, as they are kept in a file.
 
     Attributes:
         generation: [F] int64.
@@ -113,7 +113,7 @@ class Finalists:
 
     @property
     def problem(self) -> str:
-        """What makes these no teams, nothing if they are; for those that were read from a file."""
+        """Why these are not valid teams, empty if they are; for teams read from a file."""
         columns = (self.genes, self.active, self.fitness, self.specialization)
         n = self.generation.size
         if self.generation.shape != (n,) or self.generation.dtype != np.int64 or n == 0:
@@ -140,8 +140,8 @@ class Finalists:
 def finalists(teams: Sequence[Team], newest: Team, most: int) -> list[Team]:
     """Return the fittest of some teams and one more, at most ``most``, the fittest first.
 
-    Which they are in the end depends on the generations alone, in whatever order and however often
-    each was added, so that a resumed run and the beginning of a longer one have the same.
+    The result depends only on the generations, not on the order or the number of times in which
+    they were added. So a resumed run and the beginning of a longer run have the same finalists.
     """
     by_generation = {newest.generation: newest} | {team.generation: team for team in teams}
     ranked = sorted(by_generation.values(), key=lambda team: (team.rank, team.generation))
@@ -149,7 +149,7 @@ def finalists(teams: Sequence[Team], newest: Team, most: int) -> list[Team]:
 
 
 def fittest_team(progress: Progress, generation: int) -> Team:
-    """Return the fittest team of the generation that has just been finished."""
+    """Return the fittest team of the generation that has just finished."""
     active = np.asarray(progress.fittest_active, dtype=np.bool_)
     genes = np.where(active[..., None], progress.fittest_genes, 0).astype(np.float32)
     return Team(
@@ -164,8 +164,8 @@ def fittest_team(progress: Progress, generation: int) -> Team:
 def sampled_generations(n_generations: int) -> set[int]:
     """Return evenly spaced generations of ``n_generations``: all up to 16, then 9 to 16 of them.
 
-    The distance is a power of two, so that the generations kept of a long run are among those kept
-    of each of its beginnings: a run that is continued keeps what one planned that long keeps.
+    The distance is a power of two, so the generations kept of a long run are among those kept of a
+    shorter one: an extended run keeps the same teams as a run planned that long.
     """
     distance = 1
     while -(-n_generations // distance) > 16:

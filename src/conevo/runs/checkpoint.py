@@ -3,8 +3,8 @@
 Its fields are arrays, plain values (int, float, bool, str), mappings from names to plain values and
 further dataclasses of all these, whose fields are named with dots ("progress.generation"). Arrays
 go into an uncompressed npz (never pickled), everything else as JSON next to them, with a digest
-over all of it: a flipped bit anywhere is noticed, not only where zip's CRC looks. The file says
-what it is (``identity``), so that another method's or another run's file is refused.
+over all of it: a flipped bit is noticed anywhere, also where zip has no CRC. The file contains an
+``identity``, so that a file of another method or another run is refused.
 """
 
 from __future__ import annotations
@@ -46,10 +46,10 @@ def save(path: Path, record: Any, identity: Mapping[str, str]) -> None:
     Args:
         path: the file; it is replaced at once.
         record: a dataclass instance.
-        identity: what the file belongs to; ``load`` asks for the same.
+        identity: the run and method of the file; ``load`` requires the same.
 
     Raises:
-        UsageError: a field holds what cannot be kept.
+        UsageError: a field has a value that cannot be kept.
         EnvironmentFailure: the file cannot be written.
     """
     import numpy as np
@@ -67,11 +67,11 @@ def save(path: Path, record: Any, identity: Mapping[str, str]) -> None:
 
 
 def refuse_unkept(record: Any, owner: str) -> None:
-    """Raise UsageError if this is no dataclass, or one with a field that a file cannot hold.
+    """Raise UsageError if this is not a dataclass, or has a field that a file cannot contain.
 
     Args:
         record: the dataclass.
-        owner: whose it is, for the message.
+        owner: its owner, for the message.
     """
     import numpy as np
 
@@ -88,7 +88,7 @@ def refuse_unkept(record: Any, owner: str) -> None:
 
 
 def _leaves(record: Any, prefix: str = "") -> dict[str, Any]:
-    """Return what a dataclass holds, by name; fields of fields have names with dots."""
+    """Return the values of a dataclass by name; fields of fields have names with dots."""
     found: dict[str, Any] = {}
     for field in _stored(record):
         name, value = f"{prefix}{field.name}", getattr(record, field.name)
@@ -102,7 +102,7 @@ def _leaves(record: Any, prefix: str = "") -> dict[str, Any]:
 
 
 def _stored(record: Any) -> list[dataclasses.Field[Any]]:
-    """Return the fields that make a dataclass; others follow from them."""
+    """Return the fields that ``__init__`` takes; others follow from them."""
     return [field for field in dataclasses.fields(record) if field.init]
 
 
@@ -114,10 +114,10 @@ def _plain(value: Any) -> Any:
 
 
 def load(path: Path, record_class: type[Record], identity: Mapping[str, str]) -> Record:
-    """Return the dataclass written by ``save``, bit for bit; one without others in it.
+    """Return the dataclass written by ``save``, bit for bit; it must not contain others.
 
     Raises:
-        UnusableFile: the file is damaged, or belongs to something else than ``identity``.
+        UnusableFile: the file is damaged, or has another identity.
         EnvironmentFailure: the file cannot be read.
     """
     import numpy as np
@@ -133,13 +133,13 @@ def load(path: Path, record_class: type[Record], identity: Mapping[str, str]) ->
 
 
 def load_like(example: Record, path: Path, identity: Mapping[str, str]) -> Record:
-    """Return the dataclass written by ``save``, bit for bit: one of an example's kind.
+    """Return the dataclass written by ``save``, bit for bit, with the types of an example.
 
-    Its fields have the types of the example's; dimensions of arrays are not looked at, see
-    ``difference``. A mapping may have other names than the example's.
+    Dimensions of arrays are not checked, see ``difference``. A mapping may have other names than
+    the example's.
 
     Raises:
-        UnusableFile: the file is damaged, or belongs to something else than ``identity``.
+        UnusableFile: the file is damaged, or has another identity.
         EnvironmentFailure: the file cannot be read.
     """
     leaves = _read(path, identity)
@@ -153,7 +153,7 @@ def load_like(example: Record, path: Path, identity: Mapping[str, str]) -> Recor
 
 
 def _rebuilt(example: Any, leaves: dict[str, Any], path: Path, prefix: str = "") -> Any:
-    """Return a dataclass like an example, made of what a file holds; that is taken from it."""
+    """Return a dataclass like an example, and remove its values from ``leaves``."""
     values: dict[str, Any] = {}
     for field in _stored(example):
         name, like = f"{prefix}{field.name}", getattr(example, field.name)
@@ -175,10 +175,10 @@ def difference(record: Any, example: Any) -> str:
 
     Args:
         record: as ``load_like`` returns it.
-        example: the one that it was read for.
+        example: passed to ``load_like``.
 
     Returns:
-        The name of a field, nothing if all are alike.
+        The name of a field, empty if all are alike.
     """
     import numpy as np
 
@@ -195,7 +195,7 @@ def difference(record: Any, example: Any) -> str:
 
 
 def _read(path: Path, identity: Mapping[str, str]) -> dict[str, Any]:
-    """Return what the dataclass in a file holds, by name.
+    """Return the values of the dataclass in a file, by name.
 
     Raises:
         UnusableFile: as ``load``.
@@ -213,7 +213,7 @@ def _read(path: Path, identity: Mapping[str, str]) -> dict[str, Any]:
         is_whole = about.pop("digest") == _digest(about, arrays)
         check(about, FileText, "its text")
         version, found, fields = about["format"], about["identity"], about["fields"]
-    except Exception as error:  # whatever a damaged file makes its readers say
+    except Exception as error:  # readers of damaged files raise anything
         reason = " ".join(str(error).split()) or type(error).__name__
         raise UnusableFile(f"{path} is damaged or not a file of conevo ({reason})") from error
     if not is_whole:
@@ -229,7 +229,7 @@ def _read(path: Path, identity: Mapping[str, str]) -> dict[str, Any]:
 
 
 def content_digest(path: Path) -> str:
-    """Return the digest that a whole file holds of its content, whichever way the zip was laid."""
+    """Return the digest of a file's content, which does not depend on the layout of the zip."""
     return str(json.loads(read_arrays(path)["about"].tobytes())["digest"])
 
 

@@ -44,14 +44,14 @@ DECIDING = (
     "runs/session.py",
     "runs/testing.py",
 )
-"""Files and folders of the package, but for what worlds only draw (``drawn*.py``).
+"""Files and folders of the package, without the drawing of worlds (``drawn*.py``).
 
-A world in a file of its own has a digest of its own.
+A world in a file has its own digest.
 """
 
-MAKING = ("numpy", "warp", "device")  # what else makes results, and is shown if it changed
+MAKING = ("numpy", "warp", "device")  # they affect results too; changes are shown
 Record = Mapping[str, Any]
-Span = tuple[str, int, int | None]  # of what, first generation, last (None: the newest)
+Span = tuple[str, int, int | None]  # version or device, first generation, last (None: the newest)
 
 
 @functools.cache
@@ -90,12 +90,12 @@ def current_code() -> str:
 
 
 def last_code(provenance: Record) -> str:
-    """Return the version with its code that carried a run on last."""
+    """Return the version with its code that last continued a run."""
     return _code_of([provenance, *provenance["sessions"]][-1])
 
 
 def sessions_of(provenance: Record, before: int = 0) -> list[Record]:
-    """Return the sessions of a run, each with what made it.
+    """Return the sessions of a run, each with its versions and device.
 
     Args:
         provenance: of the run; conevo 0.1.0 recorded versions there only.
@@ -109,13 +109,13 @@ def sessions_of(provenance: Record, before: int = 0) -> list[Record]:
 
 
 def refuse_other_code(path: Path, task: str, code: str, is_accepted: bool) -> None:
-    """Raise UsageError unless this conevo may carry on what another one made.
+    """Raise UsageError unless this conevo may continue the results of another one.
 
     Args:
         path: of the run or shaping.
-        task: what it is a run of, in a world that is still played.
-        code: what made it so far: this conevo's, or accepted.
-        is_accepted: whether other code is.
+        task: world and environment; worlds of earlier versions are refused.
+        code: version and code that made it so far.
+        is_accepted: whether other code is allowed.
     """
     refuse_earlier(task, path)
     if not is_accepted and (problem := other_code(path, code)):
@@ -143,7 +143,7 @@ def refuse_other_kernels(path: Path, provenance: Record, fingerprint: str) -> No
 
 
 def other_code(path: Path, code: str) -> str:
-    """Return that ``code``, of the run at ``path``, is not this conevo's; nothing if it is."""
+    """Return a message if ``code``, of the run at ``path``, is not this conevo's, else nothing."""
     here = current_code()
     if code == here:
         return ""
@@ -151,12 +151,12 @@ def other_code(path: Path, code: str) -> str:
 
 
 def code_spans(sessions: Sequence[Record]) -> list[Span]:
-    """Return which code made which generations, given the sessions that made them."""
+    """Return the generations made by each code, given the sessions of a run."""
     return _spans(sessions, _code_of)
 
 
 def changes_text(sessions: Sequence[Record]) -> list[str]:
-    """Return a line for each thing that makes results and was another one in a later session.
+    """Return a line for each version or device that changed between sessions.
 
     For example "made by 2 versions: 0.1.0 (0f3e5a7712bc) generations 0-11, 0.2.0 (5d11c0ffee00)
     from 12".
@@ -173,10 +173,10 @@ def changes_text(sessions: Sequence[Record]) -> list[str]:
 
 
 def _spans(sessions: Sequence[Record], thing: Callable[[Record], str]) -> list[Span]:
-    """Return of what which generations are, in their order.
+    """Return the generations made with each value of ``thing``, in order.
 
-    A session begins at a checkpoint, and what was newer than that is made again: so a session's
-    generations end where the next one begins.
+    A session begins at a checkpoint, and newer generations are made again. So a session's
+    generations end where those of the next one begin.
     """
     starts = [session["from_generation"] for session in sessions]
     found: list[Span] = []

@@ -1,8 +1,8 @@
 """A champion under other conditions: another environment, other settings, more or fewer robots.
 
-Or with each controller in another robot: robots of one caste can take each other's place, those of
-different castes cannot. This also finds castes that do the same actions at different places, which
-the degree of specialization does not.
+Or with each controller in another robot: robots of one caste can replace each other, those of
+different castes cannot. This also finds castes with the same actions at different places, which the
+degree of specialization does not.
 """
 
 from __future__ import annotations
@@ -44,8 +44,8 @@ def test_under(
     Choice: in the same world the run's settings hold unless they are changed; another environment
     has its own where the defaults of the two differ, and another world all of the run's preset. The
     controllers are the run's. A smaller team is of the first
-    controllers, a larger one repeats them from the first on. After that robot r has the
-    controller of robot r - ``rotate``, the first ones those of the last.
+    controllers, a larger one repeats them from the first on. Then robot r gets the
+    controller of robot r - ``rotate``, and the first robots those of the last ones.
 
     Returns:
         The results of both, "own" and "changed", as ``Run.test`` gives them; "conditions": the
@@ -117,7 +117,7 @@ def _changed(
         given.add(name)
         settings[f"world.{name}"] = value
         if f"{name}_digest" in known:
-            settings[f"world.{name}_digest"] = ""  # of what it was
+            settings[f"world.{name}_digest"] = ""  # of the former value
     if robots is not None:
         if "n_robots" in known:
             settings["world.n_robots"] = robots
@@ -147,7 +147,7 @@ def _refuse_rotation(rotate: int, n_robots: int) -> None:
 
 
 def _placed(team: Team, n_robots: int, rotate: int) -> Team:
-    """Return a team of so many robots: the first controllers, or all again and again, moved on."""
+    """Return a team of another size: the first controllers, or all of them repeated, rotated."""
     robot = np.roll(np.arange(n_robots) % len(team.genes), rotate)
     return replace(
         team,

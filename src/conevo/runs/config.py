@@ -1,10 +1,10 @@
-"""What a run is, settled before it starts: defaults, preset, TOML file, single settings.
+"""The configuration of a run: defaults, preset, TOML file, single settings.
 
-Each layer overrides the one before. A default lives in one place only: the field of its component,
-or the world's entry for an environment with another one. Presets and files hold overrides; every
-value remembers its place, which errors name.
+Each layer overrides the previous one. A default lives in one place only: the field of its
+component, or the world's entry for an environment with another one. Presets and files contain
+overrides; every value has a place, which errors name.
 
-A configuration file has four tables. ``[run]`` also holds three names::
+A configuration file has four tables. ``[run]`` also has three names::
 
     [run]
     world = "rover-v2/complex-1"
@@ -22,11 +22,11 @@ A configuration file has four tables. ``[run]`` also holds three names::
     [method]
     genotypes = 20
 
-What ``[controller]`` leaves open is as the world suggests, then as the controller's defaults are.
-The world may be one in a file of its own, ``world = "FILE.py:ENVIRONMENT"``, and so may the method,
-``method = "FILE.py:NAME"``; ``world_digest`` and ``method_digest`` next to them are checked when
-they are given. A file is named from the folder of the configuration file; a run has copies of its
-own (``runs.inputs``). No preset has sizes for a method in a file: its own defaults hold.
+Settings missing in ``[controller]`` are those that the world suggests, else the controller's
+defaults. The world may be in a file, ``world = "FILE.py:ENVIRONMENT"``, and so may the method,
+``method = "FILE.py:NAME"``; ``world_digest`` and ``method_digest`` next to them are checked if they
+are given. Paths are relative to the folder of the configuration file; a run has copies of the files
+(``runs.inputs``). No preset has sizes for a method in a file: its own defaults apply.
 """
 
 from __future__ import annotations
@@ -74,7 +74,7 @@ NAMES = {
     "method_digest": "",
     "preset": "desk",
 }  # the keys of [run] that choose components
-IN_FILES = ("world", "method")  # of NAMES, what may be in a file outside the package
+IN_FILES = ("world", "method")  # of NAMES, those that may be in a file outside the package
 
 
 @dataclass(frozen=True)
@@ -83,8 +83,8 @@ class RunConfig:
 
     ``world_params``, ``controller`` and ``method_config`` are the world's, the controller's and the
     method's own frozen dataclasses.
-    ``changed`` names the settings that are not as the preset and the environment have them,
-    "run.generations"; the seed is none of them.
+    ``changed`` lists the settings that differ from those of the preset and the environment, such as
+    "run.generations", without the seed.
     """
 
     entry: WorldEntry
@@ -114,14 +114,14 @@ class RunConfig:
 
     @property
     def address(self) -> str:
-        """What ``resolve`` finds the same world by: the task, or "FILE.py:ENVIRONMENT"."""
+        """The name with which ``resolve`` finds the same world: task, or "FILE.py:ENVIRONMENT"."""
         return self.entry.address(self.environment)
 
     def build_world(self) -> World:
         """Return the world of this run, which is built once.
 
         Raises:
-            UsageError: it cannot have these parameters.
+            UsageError: the world refuses these parameters.
         """
         return self._world
 
@@ -140,23 +140,23 @@ class RunConfig:
     def run_id(self) -> str:
         """Twelve hex digits that change with any value but the preset's name.
 
-        A file counts by its content: where a value has a digest beside it ("prey_digest"), the
-        path does not count. Neither does that of a world's or a method's file.
+        A file counts by its content: if a value has a digest next to it ("prey_digest"), the path
+        does not count. Neither does the path of a world's or a method's file.
         """
         return identify(self.tables(), self.task)
 
     @functools.cached_property
     def stem_id(self) -> str:
-        """As ``run_id``, but for the length: runs that share it are alike while both go on."""
+        """As ``run_id``, without the length: runs that share it are equal while both continue."""
         return identify(self.tables(), self.task, without=("preset", *LENGTH))
 
     @property
     def outline(self) -> Outline:
-        """What names the run."""
+        """Its task, method, preset, seed and length."""
         return outline_of(self.tables(), self.task)
 
     def of_length(self, length: Mapping[str, Any]) -> RunConfig:
-        """Return the configuration of a run that is the same but for values of ``LENGTH``.
+        """Return the configuration of the same run with other values of ``LENGTH``.
 
         Raises:
             UsageError: a value that is not allowed; None is allowed for a target.
@@ -182,7 +182,7 @@ class RunConfig:
         """Return the tables of the configuration file, every value spelt out.
 
         Args:
-            folder: of that file; files in it are named from there, others by their whole path.
+            folder: of that file; paths in it are relative, all others are absolute.
         """
         names = {"world": self.address}
         if self.entry.digest:
@@ -206,10 +206,10 @@ class RunConfig:
         return tables
 
     def to_toml(self, folder: Path | None = None) -> str:
-        """Return the text that ``resolve(file=...)`` turns back into this configuration.
+        """Return the text of a file from which ``resolve(file=...)`` makes this configuration.
 
         Args:
-            folder: of the file that it is written to.
+            folder: of that file.
         """
         return tomli_w.dumps(self.tables(folder))
 
@@ -229,25 +229,25 @@ def resolve(
     place: str = "in overrides",
     folder: Path | None = None,
 ) -> RunConfig:
-    """Return the one configuration that all layers together describe.
+    """Return the configuration that results from all layers.
 
     Args:
-        world: "rover/complex-1", or "FILE.py:ENVIRONMENT" for a world in a file of its own; may be
-            left out if the configuration file names it.
-        method: "cone", or "FILE.py:NAME" for a method in a file of its own; wins over the file's,
-            as the next two do.
-        preset: whose overrides to begin with.
+        world: "rover/complex-1", or "FILE.py:ENVIRONMENT" for a world in a file; optional if the
+            configuration file names one.
+        method: "cone", or "FILE.py:NAME" for a method in a file; takes precedence over the
+            configuration file, like ``preset`` and ``seed``.
+        preset: name of the initial overrides.
         seed: root of all randomness.
         file: a configuration file, for example the ``config.toml`` of a run.
         overrides: single settings, "run.generations" -> 5; a key that only one section has may be
             written without its section.
         place: where ``overrides`` came from, for error messages.
-        folder: from which ``world`` and ``overrides`` name files, by default the working directory.
+        folder: of relative paths in ``world`` and ``overrides``, by default the working directory.
 
     Raises:
         UsageError: an unknown name or a value that is not allowed; a world, method, preset or
-            seed that ``overrides`` has, too; a preset that would change nothing, as the file sets
-            all that it does; nothing has been written.
+            seed that ``overrides`` also has; a preset without effect, since the file has all its
+            settings; nothing has been written.
         EnvironmentFailure: the file cannot be read.
     """
     from conevo.controllers.registry import find, refuse_misfit
@@ -308,7 +308,7 @@ def resolve(
         method_config=built["method"],
         changed=tuple(_changed(parts, built, base)),
     )
-    built_world = config.build_world()  # refuses what this world cannot have
+    built_world = config.build_world()  # refuses parameters that do not fit together
     refuse_misfit(config.controller, built_world)
     refuse_contradiction(config.run, config.method_config, built_world.n_robots)
     return config
@@ -317,7 +317,7 @@ def resolve(
 def _take_names(
     layers: list[Layer], asked: Mapping[str, str | None]
 ) -> tuple[dict[str, str], dict[str, str]]:
-    """Remove the names from the layers' [run] tables; return those that hold, and their places."""
+    """Remove the names from the layers' [run] tables; return the last of each and their places."""
     names, places = dict(NAMES), {}
     for layer in layers:
         given = {name: layer.get("run", {}).pop(name, None) for name in NAMES}
@@ -325,7 +325,7 @@ def _take_names(
             key = f"{name}_digest"
             if (digest := given[key]) is not None and given[name] is None:
                 raise UsageError(f"run.{key} {digest.place}: it needs run.{name} next to it")
-            names[key] = names[key] if given[name] is None else ""  # of another one
+            names[key] = names[key] if given[name] is None else ""  # it belongs to another file
         for name, found in given.items():
             if found is not None and not isinstance(found.value, str):
                 raise UsageError(f"run.{name} = {shown(found.value)} {found.place}: must be a name")
@@ -338,7 +338,7 @@ def _take_names(
 
 
 def _take_controller(layers: list[Layer]) -> tuple[str, str]:
-    """Remove the name from the layers' [controller] tables; return what holds, and its place."""
+    """Remove the name from the layers' [controller] tables; return the last one and its place."""
     name, place = DEFAULT, ""
     for layer in layers:
         found = layer.get("controller", {}).pop("name", None)
@@ -352,16 +352,16 @@ def _take_controller(layers: list[Layer]) -> tuple[str, str]:
 
 
 def _refuse_label(preset: str, base: Layer, file: Layer, place: str) -> None:
-    """Raise UsageError if a preset would set nothing that the configuration file does not set."""
+    """Raise UsageError if the configuration file has all settings of a preset."""
     if all(key in file.get(section, {}) for section in base for key in base[section]):
         raise UsageError(
-            f"preset {preset!r} would change nothing but the run's label: every value that it sets "
+            f"preset {preset!r} would change only the run's label: every value that it sets "
             f"is already set {place}; leave the preset out, or remove those values from the file"
         )
 
 
 def _changed(parts: Mapping[str, type], built: Mapping[str, Any], base: Layer) -> Iterator[str]:
-    """Yield the settings that are not as the preset has them, without the seed and digests."""
+    """Yield the settings that differ from the preset's, without the seed and digests."""
     for section, part in parts.items():
         preset = base.get(section, {})
         if section == "controller" and built[section].name != DEFAULT:

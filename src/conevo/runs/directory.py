@@ -2,10 +2,10 @@
 
 ::
 
-    config.toml, shaping.toml      says what it holds: a run, a shaping with a run per stage,
-      or plan.toml                   or a campaign with many runs
-    lock                           held (flock) by the process that is at work here
-    DONE                           the seal of what is finished: digests of all files
+    config.toml, shaping.toml      shows its kind: a run, a shaping with a run per stage, or a
+      or plan.toml                   campaign with many runs
+    lock                           locked (flock) by the process that writes here
+    DONE                           the seal of finished results: digests of all files
 """
 
 from __future__ import annotations
@@ -43,9 +43,9 @@ KINDS = {CONFIG: "run", SHAPING: "shaping", CAMPAIGN: "campaign"}
 
 
 def kind_of(path: Path) -> str:
-    """Return what a directory holds: "run", "shaping", "campaign" or nothing ("").
+    """Return the kind of a directory: "run", "shaping", "campaign" or none ("").
 
-    The name of its file decides: whether it can be read is said where it is read.
+    Only the name of its file counts; readers report damage.
     """
     return next((kind for name, kind in KINDS.items() if is_there(path / name)), "")
 
@@ -55,7 +55,7 @@ def appearing(path: Path) -> Iterator[Path]:
     """Yield a hidden directory to be filled; it then takes the name ``path``, all at once.
 
     Raises:
-        UsageError: something is there already; it is left as it is.
+        UsageError: the path exists; it is left unchanged.
         EnvironmentFailure: the directory cannot be written, or its file system has no locks.
     """
     refuse_existing(path)
@@ -81,11 +81,11 @@ def _appear(draft: Path, path: Path) -> None:
 
 
 def refuse_existing(path: Path, *, is_new: bool = False) -> None:
-    """Say what is at ``path`` and what can be done with it, if anything is.
+    """Raise UsageError, with advice, if a path exists and is not an empty directory.
 
     Args:
-        path: a directory's.
-        is_new: whether nothing was there a moment ago, so that another process makes it now.
+        path: of a directory.
+        is_new: whether it did not exist a moment ago, so that another process is creating it.
     """
     if not is_there(path) or (path.is_dir() and not any(path.iterdir())):
         return
@@ -115,14 +115,14 @@ def refuse_existing(path: Path, *, is_new: bool = False) -> None:
 
 
 class Directory:
-    """What all directories of results have: one writer at a time, and a seal in the end.
+    """A directory of results, with one writer at a time, and a seal when it is finished.
 
     Args:
         path: the directory.
-        kind: what it must hold, "run", "shaping" or "campaign".
+        kind: "run", "shaping" or "campaign".
 
     Raises:
-        UsageError: it does not.
+        UsageError: it is not of this kind.
     """
 
     def __init__(self, path: Path, kind: str) -> None:
@@ -133,10 +133,10 @@ class Directory:
 
     @contextmanager
     def locked(self) -> Iterator[None]:
-        """Keep every other process from writing here; what killed ones have left is removed.
+        """Keep other processes from writing here, and remove the remains of killed ones.
 
         Raises:
-            UsageError: another process is at work in this directory.
+            UsageError: another process is writing in this directory.
             EnvironmentFailure: it cannot be written, or its file system has no locks.
         """
         path = self.path / LOCK
@@ -159,11 +159,11 @@ class Directory:
 
     @property
     def is_in_use(self) -> bool:
-        """Whether a process is at work here now."""
+        """Whether a process is writing here now."""
         return locks.is_held(self.path / LOCK)
 
     def _tidy(self) -> None:
-        """Remove what killed processes have left here; a campaign's runs are their workers'."""
+        """Remove the remains of killed processes; in a campaign's runs their workers do so."""
         remove_abandoned(self.path.resolve().parent)  # of one killed just when this had appeared
         remove_abandoned(self.path)
         for folder in (self.path, self.path / "teams", self.path / "inputs"):
@@ -174,14 +174,14 @@ class Directory:
 
     @property
     def user(self) -> str:
-        """The process that is or was last at work here."""
+        """The process that is writing here, or was the last to do so."""
         path = self.path / LOCK
         return (read_text(path) if path.is_file() else "") or "another process"
 
     @property
     def is_finished(self) -> bool:
         """Whether it is sealed."""
-        return is_there(self.path / SEAL)  # whatever is in its place is looked at when it is read
+        return is_there(self.path / SEAL)  # its content is checked when it is read
 
     def seal(self) -> None:
         """Close the directory: write the digests of all files."""
@@ -204,7 +204,7 @@ class Directory:
         """Return the names of files that are not as they were when the directory was sealed.
 
         Args:
-            names: those that are looked at, all by default.
+            names: files to check, all by default.
         """
         sealed = self.read_seal()
         asked = sealed if names is None else sealed.keys() & names
@@ -212,7 +212,7 @@ class Directory:
         return sorted(name for name in asked if found.get(name) != sealed[name])
 
     def _digests(self, names: Collection[str] | None = None) -> dict[str, str]:
-        """Return the digests of the files of these names that there are; by default of all."""
+        """Return the digests of the existing files with these names; by default of all."""
         if names is None:
             names = [
                 p.relative_to(self.path).as_posix()

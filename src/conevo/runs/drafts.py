@@ -1,12 +1,12 @@
-"""Drafts: what is written under a hidden name until it is complete, and what a kill leaves of it.
+"""Drafts: results are written under a hidden name until they are complete.
 
 A draft of NAME is in a hidden folder next to it::
 
-    .NAME.xxxxxxxx/owner    locked by the process that writes the draft; holds the folder's name
+    .NAME.xxxxxxxx/owner    locked by the process that writes the draft; contains the folder's name
     .NAME.xxxxxxxx/NAME     the draft, a file or a directory
 
-A folder whose owner has gone is removed by the next process that makes a draft next to it, or that
-takes the lock of the directory it is in. What is in use, or may be somebody else's, is left alone.
+If the owner has ended, its folder is removed by the next process that makes a draft next to it, or
+that takes the lock of the parent directory. Folders in use, or of other programs, are left alone.
 """
 
 from __future__ import annotations
@@ -30,11 +30,13 @@ TORN = re.compile(r"(.+\.(toml|json|jsonl|npz|npy|py|sh|txt)|DONE|STOP)\.tmp")
 
 @contextmanager
 def draft_of(path: Path, *, must_lock: bool = False) -> Iterator[Path]:
-    """Yield a hidden place for what is then moved to ``path``; nothing hidden is left afterwards.
+    """Yield the hidden path of a draft that the caller then moves to ``path``.
+
+    The hidden folder is removed afterwards.
 
     Args:
-        path: where the draft is to go; its folder must be there.
-        must_lock: whether ``path`` is to be a directory of results, which needs locks.
+        path: final path of the draft; its folder must exist.
+        must_lock: whether ``path`` becomes a directory of results, which needs locks.
 
     Raises:
         EnvironmentFailure: it needs locks and the file system has none.
@@ -50,7 +52,7 @@ def draft_of(path: Path, *, must_lock: bool = False) -> Iterator[Path]:
 
 
 def remove_abandoned(folder: Path) -> None:
-    """Remove the drafts in a folder whose owners have gone."""
+    """Remove the drafts in a folder whose owners have ended."""
     with suppress(OSError):  # not there, or not ours to read
         with os.scandir(folder) as entries:
             names = [e.name for e in entries if HIDDEN.fullmatch(e.name) and not e.is_symlink()]
@@ -60,11 +62,11 @@ def remove_abandoned(folder: Path) -> None:
 
 
 def remove_torn(folder: Path, older_than: float | None = None) -> None:
-    """Remove what ``durable.replace_file`` left in a folder when it was killed.
+    """Remove the temporary files that a killed ``durable.replace_file`` left in a folder.
 
     Args:
-        folder: in which no other process writes files.
-        older_than: if others may: the moment (seconds since 1970) since which files are left.
+        folder: where no other process writes files.
+        older_than: if others may write there, newer files are left alone; seconds since 1970.
     """
     with suppress(OSError), os.scandir(folder) as entries:
         for entry in entries:
@@ -86,7 +88,7 @@ def _begin(path: Path, must_lock: bool) -> tuple[Path, int]:
             except OSError as error:
                 if must_lock:
                     raise locks.no_locks(path.parent, error, " with --out") from error
-                is_ours = True  # nobody can tell that it is in use, and nobody removes it
+                is_ours = True  # without locks nobody can see that it is in use; nobody removes it
             # Between two of these lines another process may have found it without an owner.
             if is_ours and os.path.samestat(os.fstat(handle), os.stat(folder / OWNER)):
                 os.write(handle, folder.name.encode())
@@ -103,7 +105,7 @@ def _begin(path: Path, must_lock: bool) -> tuple[Path, int]:
 
 
 def _remove_if_abandoned(folder: Path) -> None:
-    """Remove a draft's folder if its owner has gone; other folders are left alone.
+    """Remove a draft's folder if its owner has ended; other folders are left alone.
 
     Raises:
         OSError: it cannot be read or removed, or its file system has no locks.

@@ -1,4 +1,4 @@
-"""From trials to scores: where what methods ask meets what worlds report."""
+"""From the trials of methods to scores, by the outcomes of worlds."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ __all__ = ["Evaluation", "Portrait", "describe", "make_evaluator", "play", "scor
 
 @dataclass(frozen=True)
 class Portrait:
-    """What one team did, averaged over its epochs.
+    """The performance and behaviour of one team, averaged over its epochs.
 
     Attributes:
         performance: task performance measures.
         specialization: degree of specialization S of each robot.
-        labels: caste of each robot, what it did most or "non-specialized".
+        labels: caste of each robot: its most frequent action, or "non-specialized".
         castes: number of robots per caste, largest first.
-        independent: the S of each robot if it drew its actions independently, with the shares that
-            they have in each epoch.
+        independent: the S of each robot if its actions were drawn independently, with their shares
+            in each epoch.
         favourites: the setting (``World.settings``) that each robot used most, None without any.
         favourite_shares: its share in all settings that the robot used, NaN without any.
     """
@@ -43,7 +43,7 @@ class Portrait:
 
 @dataclass(frozen=True)
 class Evaluation:
-    """Scores of a batch of trials, with the outcome they were made from."""
+    """Scores of a batch of trials, with their outcome."""
 
     scores: Scores
     outcome: Outcome
@@ -62,13 +62,13 @@ def make_evaluator(
     credit: str,
     scenarios: str = "fresh",
 ) -> Evaluate:
-    """Return the function that plays trials in a world.
+    """Return a function that evaluates trials in a world.
 
     All trials of a generation meet the same ``epochs`` scenarios, addressed by seed, generation
-    and epoch, so a score depends neither on the batch nor on when it is computed; if the trials
-    have rounds, so many further ones in each. With ``scenarios`` "fixed" those of generation 0 are
-    met in all. Trials that ask for fixed scenarios meet the same ``fittest_epochs`` of them in all
-    generations. What all generations meet is drawn once.
+    and epoch, so a score depends neither on the batch nor on when it is computed; each round of
+    trials has ``epochs`` more. With ``scenarios`` "fixed", all generations meet the scenarios of
+    generation 0. Trials that ask for fixed scenarios meet the same ``fittest_epochs`` of them in
+    all generations. Scenarios of all generations are drawn once.
     """
 
     def keys(trials: Trials) -> list[int]:
@@ -77,7 +77,7 @@ def make_evaluator(
         generation = 0 if scenarios == "fixed" else trials.generation
         return [fold(seed, "epoch", generation, epoch) for epoch in range(trials.rounds * epochs)]
 
-    drawn: dict[tuple[str, int], Scenarios] = {}  # of all generations: whose, and how many
+    drawn: dict[tuple[str, int], Scenarios] = {}  # of all generations: kind of scenarios, rounds
 
     def met(trials: Trials) -> Scenarios:
         if "fixed" not in (scenarios, trials.scenarios):
@@ -103,11 +103,11 @@ def play(
     rounds: int,
     credit: str,
 ) -> Evaluation:
-    """Play teams and give each robot its credit.
+    """Evaluate teams and give each robot its credit.
 
-    With the credit "difference" every team plays in the same scenarios once more for each robot,
-    which then has an empty network. Choice: an empty network, not a robot that is not there, which
-    a world need not know; it stands in the way and acts as any whose outputs are all equal.
+    With the credit "difference", every team is evaluated in the same scenarios once more for each
+    robot, which then has an empty network. Choice: an empty network, not a missing robot, which not
+    every world can have; it is an obstacle, and acts as any robot whose outputs are all equal.
 
     Args:
         simulator: of the world.

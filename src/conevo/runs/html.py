@@ -1,4 +1,4 @@
-"""What notebooks show of a run and of a team: small HTML that inherits the notebook's colours."""
+"""Cards of runs and teams in notebooks: small HTML that inherits the notebook's colours."""
 
 from __future__ import annotations
 
@@ -40,11 +40,11 @@ INK = "currentColor"
 
 
 def card(title: str, about: Iterable[str], parts: Callable[[], Iterable[str]]) -> str:
-    """Return a card: a title, a line of facts, and what is below them.
+    """Return a card: a title, a line of facts, and the parts below them.
 
     Args:
         title, about: plain text.
-        parts: gives HTML; what it refuses to read, because it is damaged, the card says.
+        parts: returns HTML; if it raises because a file is damaged, the card shows the error.
     """
     try:
         below = "".join(parts())

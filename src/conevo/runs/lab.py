@@ -39,21 +39,21 @@ __all__ = [
 
 
 def layout_of(world: World, controller: Controller) -> Layout:
-    """Return the size of the problem that a world and its robots' controller set a method."""
+    """Return the sizes of a method's problem, given by a world and its robots' controller."""
     genome = genome_of(controller, world)
     return Layout(world.n_robots, genome.n_parts, genome.max_parts, genome.n_genes)
 
 
 @dataclass(frozen=True)
 class Price:
-    """How much a run evolves.
+    """The cost of a run.
 
     Attributes:
         evaluations: team evaluations of the first generation; later ones take a few more when the
-            size of controllers is in question.
-        generations: as many as its settings and its budget allow, at most.
-        team_steps: iterations of a team in all of them, if those after the second take as many
-            evaluations as that; testing phase left out.
+            size of controllers is adapted.
+        generations: the most that its settings and its budget allow.
+        team_steps: iterations of a team in all generations, if those after the second take the same
+            number of evaluations as the second; without the testing phase.
     """
 
     evaluations: int
@@ -62,7 +62,7 @@ class Price:
 
 
 def price_of(config: RunConfig, ancestor: State | Team | None = None) -> Price:
-    """Return how much a run would evolve; simulates nothing and loads no kernel.
+    """Return the cost of a run; simulates nothing and loads no kernel.
 
     Args:
         config: of the run.
@@ -223,25 +223,25 @@ class Lab:
             )
 
     def blank_state(self) -> State:
-        """Return generation 0 of random populations: what all states of this run are like."""
+        """Return generation 0 of random populations, an example of the states of this run."""
         return self.method.init(self.layout, self.config.run.seed)
 
     def first_state(self, ancestor: State | Team | None = None) -> State:
-        """Return the state before generation 0, after checking that it can be paid.
+        """Return the state before generation 0, after checking that the budget pays for it.
 
         Args:
-            ancestor: whose populations to begin with, or the team that they are to be bred from;
-                random ones by default.
+            ancestor: a state with the initial populations, or a team from which they are bred;
+                random populations by default.
 
         Raises:
             UsageError: the budget does not pay for one generation, the ancestor does not fit, the
-                method's state cannot be kept, or the world has no room for what belongs in it.
+                method's state cannot be kept, or the world has no room for its objects.
         """
         layout, seed = self.layout, self.config.run.seed
         check_memory(self.config, layout)
         state = _first(self.method, layout, seed, ancestor)
         check_budget(self.method, state, self.config.run)
-        self.world.scenarios([seed])  # says so now if there is no room for what belongs in it
+        self.world.scenarios([seed])  # raises now if there is no room for its objects
         return state
 
     def rehearsed(self, first: State) -> State:

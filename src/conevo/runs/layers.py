@@ -69,15 +69,15 @@ Layer = dict[str, dict[str, Value]]  # section -> key -> value
 
 
 def read_file(path: Path) -> Layer:
-    """Return what a configuration file says."""
+    """Return the settings of a configuration file."""
     return as_layer(read_toml(path), f"in {path}", path.resolve().parent)
 
 
 def as_layer(tables: Mapping[str, Any], place: str, folder: Path | None = None) -> Layer:
-    """Return tables as a layer; files in them are named from ``folder``.
+    """Return tables as a layer; paths in them are relative to ``folder``.
 
     Raises:
-        UsageError: a table is no section, or a section no table.
+        UsageError: a table that is not a section, or a section that is not a table.
     """
     layer: Layer = {}
     for section, values in tables.items():
@@ -124,11 +124,11 @@ def section_of(key: str, parts: Mapping[str, type], place: str) -> str:
 def read_preset(
     preset: str, world: WorldEntry, environment: str, method: MethodEntry, controller: str
 ) -> Layer:
-    """Return a preset's settings for this world and method, with those that the world brings.
+    """Return a preset's settings for this world and method, with those of the world.
 
-    An environment's own defaults make it the task that it is, so they win over the preset's, which
-    are about size. A controller's settings are suggestions, and lose. A preset says nothing of a
-    method in a file.
+    An environment's own defaults define its task, so they take precedence over the preset's, which
+    are about size. The world's settings of a controller are suggestions, without precedence. A
+    preset has no settings for a method in a file.
     """
     if preset not in PRESETS:
         raise unknown_name("preset", preset, PRESETS)

@@ -1,8 +1,7 @@
-"""When a run ends, and how a run that has ended is given another, later end.
+"""The length of a run, and how a finished run is extended.
 
-A run that is continued equals, bit for bit, one that was planned that long. So the new length
-takes the place of the old one in ``config.toml``, and ``provenance.json`` keeps the former end in
-its list ``extended``.
+An extended run equals, bit for bit, one that was planned that long. So the new length replaces the
+old one in ``config.toml``, and ``provenance.json`` keeps the former end in its list ``extended``.
 """
 
 from __future__ import annotations
@@ -31,7 +30,7 @@ __all__ = ["give_length", "length_of", "refuse_parts"]
 def length_of(
     generations: int | None, budget_evaluations: int | None, target: float | str | None
 ) -> Record:
-    """Return those settings of a run's length that are given; a target of "none" is none."""
+    """Return the given settings of a run's length; the target "none" becomes None."""
     given = zip(LENGTH, (generations, budget_evaluations, target), strict=True)
     length = {name: value for name, value in given if value is not None}
     return length | ({"target": None} if target == "none" else {})
@@ -40,20 +39,20 @@ def length_of(
 def give_length(
     store: Store, config: RunConfig, equip: Callable[[], Lab], is_later: bool
 ) -> Lab | None:
-    """Give a run that is locked the length that a configuration has, unless it has it.
+    """Give a locked run the length of a configuration, unless it already has it.
 
     Args:
         store: of the run.
-        config: the run's own but for its length.
-        equip: called for what the run needs, after the first checks.
-        is_later: a finished run that would end where it has ended is refused.
+        config: the run's own with another length.
+        equip: returns the run's lab; called after the first checks.
+        is_later: refuse a finished run that would end where it has ended.
 
     Returns:
-        What the run needs, None if nothing changed.
+        The run's lab, None if nothing changed.
 
     Raises:
-        UsageError: less than what is done, another run's configuration, or the run was changed
-            since it was finished; nothing was written.
+        UsageError: shorter than the finished part, another run's configuration, or the run was
+            changed since it was finished; nothing was written.
     """
     path, current = store.path, store.read_config()
     about, records = store.read_provenance(), store.read_generations()

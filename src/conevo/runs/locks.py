@@ -60,9 +60,9 @@ def no_locks(directory: Path, error: OSError, advice: str = "") -> EnvironmentFa
     """Return the error for a directory whose file system has no locks.
 
     Args:
-        directory: that cannot be locked.
-        error: what was said of it.
-        advice: how another place is chosen, if it can be.
+        directory: the directory that cannot be locked.
+        error: the system's.
+        advice: how to choose another place, if possible.
     """
     return EnvironmentFailure(
         f"cannot lock {directory}: {error.strerror or error}; without locks two processes could "

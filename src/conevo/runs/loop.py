@@ -1,4 +1,4 @@
-"""The generation loop: ask, evaluate, tell, until a generation is done; stop when it is time to."""
+"""The generation loop: ask, evaluate, tell, until a generation is finished or the run ends."""
 
 from __future__ import annotations
 
@@ -41,22 +41,22 @@ def evolve_generations(
     on_generation: Callable[[State, Record], None],
     has_time: Callable[[], bool] = lambda: True,
 ) -> str:
-    """Carry a population forward, one whole generation after another, and say why it stopped.
+    """Evolve whole generations, one after another, and return why it stopped.
 
     Args:
         method: init / ask / tell.
         state: the method's state at the beginning of a generation.
-        evaluate: plays trials.
+        evaluate: evaluates trials.
         settings: the stop conditions.
         main: the world's main measure of task performance.
-        portray: says what the first team of an outcome did.
+        portray: returns the portrait of the first team of an outcome.
         iterations: of one epoch of the world.
-        last: record of the generation before, if there was one.
+        last: record of the previous generation, None for the first.
         on_generation: called with the state after a generation and the generation's record.
-        has_time: asked before each generation whether it may begin.
+        has_time: whether another generation may begin; called before each.
 
     Returns:
-        "generations", "target" or "budget": the end. "time": not yet, but there is no time left.
+        "generations", "target" or "budget" at the end; "time" if the run has none left.
     """
     while True:
         if last is not None and has_reached(settings.target, main, last["performance"]):
@@ -135,7 +135,7 @@ def _counted(requests: int, method: Method) -> int:
 
 
 def _refuse_luck(method: Method, trials: Trials, again: Trials) -> None:
-    """Refuse a method that asks for other teams if it is asked twice in the same state."""
+    """Refuse a method that asks for different teams when it is asked twice in the same state."""
     alike = (np.array_equal(getattr(trials, n), getattr(again, n)) for n in ("genes", "teams"))
     if not all(alike):
         raise UsageError(
@@ -145,10 +145,10 @@ def _refuse_luck(method: Method, trials: Trials, again: Trials) -> None:
 
 
 def _asked(method: Method, state: State) -> Trials:
-    """Return what a method asks for.
+    """Return the trials that a method asks for.
 
     Raises:
-        UsageError: that cannot be evaluated.
+        UsageError: they cannot be evaluated.
     """
     trials = method.ask(state)
     if not isinstance(trials, Trials):
@@ -162,12 +162,12 @@ def _told(method: Method, state: State, trials: Trials, scores: Scores) -> State
     """Return a method's next state.
 
     Raises:
-        UsageError: its header does not follow from the state before.
+        UsageError: its header does not follow from the previous state.
     """
-    told = method.tell(state, trials, scores)
-    before, after = state.progress, getattr(told, "progress", None)
+    found = method.tell(state, trials, scores)
+    before, after = state.progress, getattr(found, "progress", None)
     if not isinstance(after, Progress):
-        raise UsageError(f"{method.title}: tell must return a state, not {type(told).__name__}")
+        raise UsageError(f"{method.title}: tell must return a state, not {type(found).__name__}")
     made, counted = (
         len(trials.teams) * scores.plays,
         after.team_evaluations - before.team_evaluations,
@@ -190,7 +190,7 @@ def _told(method: Method, state: State, trials: Trials, scores: Scores) -> State
                     f"{method.title}: tell must record the team of the portrait as the fittest "
                     f"(Progress.crowned does)"
                 )
-    return told
+    return found
 
 
 def check_budget(method: Method, state: State, settings: RunSettings) -> None:
@@ -214,9 +214,9 @@ def _run_generation(
     portray: Callable[[Outcome], Portrait],
     settings: RunSettings,
 ) -> tuple[State, Portrait | None, int] | None:
-    """Return what one generation leaves, None if it cannot be paid.
+    """Return the results of one generation, None if the budget does not pay for it.
 
-    That is the state after it, its fittest team's portrait, and the epochs that teams played.
+    These are the next state, the portrait of the fittest team, and the number of simulated epochs.
 
     Choice: trials that the budget cannot pay are not begun, and a generation that could not be
     finished does not count, so that a run never spends more than its budget.
@@ -246,14 +246,15 @@ def _record(
     team_steps: int,
     seconds: float,
 ) -> Record:
-    """Return what the run's log says about a generation, given the headers before and after it.
+    """Return the log entry of a generation, given the headers before and after it.
 
-    Team evaluations and team-steps are the run's so far. Sizes are those that the generation was
-    played and bred with, not the next one's. A method's own numbers follow; of a method without
-    some of CONE's, the log has those as null or 0.
+    Team evaluations and team-steps are the run's so far. Sizes are those with which the generation
+    was evaluated and bred, not the next one's. A method's own numbers follow; numbers of CONE that
+    a method lacks are null or 0.
 
     Raises:
-        UsageError: no portrait, or a number of the method is none or has the name of another entry.
+        UsageError: no portrait, or a number of the method that is not a number or has the name of
+            another entry.
     """
     if portrait is None:
         raise UsageError(
@@ -292,7 +293,7 @@ def _record(
 
 
 def _finite(value: Any) -> float | None:
-    """Return a number that JSON can hold: not-a-number and infinity become null."""
+    """Return a number as JSON has it: not-a-number and infinity become null."""
     return float(value) if math.isfinite(value) else None
 
 

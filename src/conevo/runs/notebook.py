@@ -35,10 +35,10 @@ def showing(
     """Yield the function that is called with the record of each finished generation.
 
     Args:
-        run: which is resumed.
-        progress: None: a bar in a notebook, nothing elsewhere; True: elsewhere a printed line per
-            generation; False: nothing.
-        watch: called, too.
+        run: the run that is resumed.
+        progress: None: a bar in a notebook, nothing elsewhere; True: a printed line per generation
+            elsewhere; False: nothing.
+        watch: also called.
     """
     is_bar = progress is not False and in_notebook()
     bar = _Bar(run) if is_bar else None
@@ -70,7 +70,7 @@ def _value(record: Record) -> str:
 
 
 class _Bar:
-    """A bar that IPython displays, and displays again in its place."""
+    """A bar that IPython displays and updates in place."""
 
     def __init__(self, run: Run) -> None:
         from IPython.display import display
@@ -79,7 +79,7 @@ class _Bar:
         self.handle = display(self._bundle("starts"), raw=True, display_id=True)
 
     def add(self, record: Record) -> None:
-        """Show a finished generation, if it is time to; one that was there is made again."""
+        """Show a finished generation, unless the last update is too recent."""
         self.pace.add(record)
         is_last = self.pace.done.generations == self.pace.outline.generations
         if is_last or time.monotonic() >= self.shown_at + PAUSE:
@@ -96,7 +96,7 @@ class _Bar:
         self.handle.update(self._bundle(state, share), raw=True)
 
     def _bundle(self, state: str, share: float | None = None) -> dict[str, str]:
-        """Return the bar as HTML, and what it says as text."""
+        """Return the bar as HTML, and its content as text."""
         records, planned = self.pace.records, self.pace.outline.generations
         value = [_value(records[-1])] if records else []
         text = " · ".join(

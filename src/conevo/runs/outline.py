@@ -1,6 +1,6 @@
-"""What a run is, by its own files alone: they are read, and no world or method is loaded.
+"""The outline of a run, read from its files alone: no world or method is loaded.
 
-So a run can be looked at on any machine, quickly, and without running anybody's world file.
+So a run can be shown on any machine, quickly, and without executing a world's file.
 """
 
 from __future__ import annotations
@@ -37,13 +37,13 @@ NUMBERS = {"seed": 0, "generations": 1, "budget_evaluations": 0}  # name -> smal
 
 @dataclass(frozen=True)
 class Outline:
-    """What names a run.
+    """The task, method, preset, seed and length of a run.
 
     Attributes:
         task: world and environment, "rover-v2/complex-1".
-        method, preset, seed: as its configuration has them.
-        generations: planned ones.
-        budget_evaluations: team evaluations it may spend, 0 for any number.
+        method, preset, seed: from its configuration.
+        generations: number of planned generations.
+        budget_evaluations: most team evaluations, 0 for no limit.
     """
 
     task: str

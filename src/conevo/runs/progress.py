@@ -1,4 +1,4 @@
-"""How far a run or a shaping is and how long it will still take, wherever that is shown."""
+"""The progress of a run or a shaping and the time left, the same wherever they are shown."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ if TYPE_CHECKING:
 
 __all__ = ["Done", "Pace", "seconds_left", "share_of"]
 
-RECENT = 10  # generations by which the pace is judged
+RECENT = 10  # generations that determine the pace
 
 
 class Done(NamedTuple):
-    """What a run, or a stage of a shaping, has finished: generations and team evaluations."""
+    """Finished generations of a run or of a stage of a shaping, and their team evaluations."""
 
     generations: int
     evaluations: int
 
 
 def share_of(planned: Sequence[Outline], done: Sequence[Done]) -> float:
-    """Return the share that is over, in [0, 1]: of each stage's generations, or of its budget.
+    """Return the finished share, in [0, 1]: of each stage's generations, or of its budget.
 
     Args:
-        planned: the run, or every stage; none if that is not known.
-        done: of the stages that have begun. One after which another has begun is over.
+        planned: the run, or every stage; empty if unknown.
+        done: of the stages that have begun; all but the last of them are finished.
     """
     shares = [0.0] * len(planned)
     for k, (outline, one) in enumerate(zip(planned, done, strict=False)):
@@ -46,14 +46,14 @@ def seconds_left(
     seconds: Sequence[float],
     evaluations: Sequence[float],
 ) -> float:
-    """Return the seconds from the end of the last generation to that of the last one planned.
+    """Return the seconds from the end of the last generation to the planned end.
 
-    By the pace of the last ten generations; stages to come are taken to be as fast.
+    Later generations and stages are assumed to be as fast as the last ten generations.
 
     Args:
-        planned, done: as for ``share_of``; of the stages done the last one has a generation.
+        planned, done: as for ``share_of``; the last stage in ``done`` has a generation.
         seconds: of every generation of that stage.
-        evaluations: of teams that the stage had spent at the end of every generation.
+        evaluations: team evaluations of that stage at the end of every generation.
     """
     recent = seconds[-RECENT:]
     if not recent:
@@ -64,20 +64,20 @@ def seconds_left(
         finished, spent = done[k] if k < len(done) else Done(0, 0)
         more = float(planned[k].generations - finished)
         if planned[k].budget_evaluations and cost > 0:
-            # What the budget cannot pay is not begun.
+            # No generation begins that the budget cannot pay for.
             more = min(more, (planned[k].budget_evaluations - spent) // cost)
         left += max(more, 0.0)
     return left * fmean(recent)
 
 
 class Pace:
-    """How far a run is while it evolves, how fast it is, and how long it will still take."""
+    """The progress of a run while it evolves, its speed and the time left."""
 
     def __init__(self, run: Run) -> None:
         self.outline, self.records = run.outline, run.generations()
 
     def add(self, record: Record) -> None:
-        """Add a finished generation; one that was there before it was made again."""
+        """Add a finished generation; after a resume it may replace earlier ones."""
         self.records[record["generation"] :] = [record]
 
     @property
@@ -88,7 +88,7 @@ class Pace:
 
     @property
     def share(self) -> float:
-        """The share of the run that is over, by generations or by budget."""
+        """The finished share of the run, by generations or by budget."""
         return share_of([self.outline], [self.done])
 
     @property

@@ -1,12 +1,12 @@
-"""What a result was made with: versions, code, kernels, machine, and the world's header.
+"""The provenance of a run: versions, code, kernels, machine, and the world's header.
 
-``provenance.json`` of a run holds, besides where it came from::
+``provenance.json`` of a run contains, besides its origin::
 
     conevo, python, numpy, warp, platform, cpu, device, code, kernel_hash     when it was started
-    world       its header: all that is needed to look at the run without loading the world
-    sessions    one for each time it was carried on: started, from_generation, threads, and the
-                same versions, machine, device and code as above
-    finished, stopped_by    when it is
+    world       its header: enough to show the run without loading the world
+    sessions    one for each start or resume: started, from_generation, threads, and the same
+                versions, machine, device and code as above
+    finished, stopped_by    of a finished run
 
 ``code`` is the digest of the code that decides results (``runs.code``).
 """
@@ -51,13 +51,13 @@ def describe_machine(device: str) -> dict[str, Any]:
 
 
 def describe(world: World, method: Method) -> dict[str, Any]:
-    """Return the headers of a run's world and method: what is known without loading them."""
+    """Return the headers of a run's world and method, which are read without loading them."""
     about = {"name": method.name, "title": method.title}
     return {"world": describe_world(world), "method": about}
 
 
 def declared(provenance: Mapping[str, Any]) -> dict[str, Measure]:
-    """Return the measures of a run's world by name; conevo 0.1.0 kept none."""
+    """Return the measures of a run's world by name; conevo 0.1.0 recorded none."""
     from conevo.worlds.measures import Measure
 
     found = (provenance.get("world") or {}).get("measures", ())
@@ -67,7 +67,7 @@ def declared(provenance: Mapping[str, Any]) -> dict[str, Measure]:
 def describe_world(world: World) -> dict[str, Any]:
     """Return a world's header: its names, its measures, the main one first, and its size.
 
-    ``optimum`` is the largest possible value of the main measure, None where none is known.
+    ``optimum`` is the largest possible value of the main measure, None if it is unknown.
     """
     from conevo.worlds.measures import measures_of
 
@@ -83,22 +83,22 @@ def describe_world(world: World) -> dict[str, Any]:
 
 
 def device_of(provenance: Mapping[str, Any], wanted: str | None) -> str:
-    """Return the name of the device on which a run is to be played.
+    """Return the name of the device for a run.
 
-    Results are the same on all. Unless one is wanted it is the device of the last session, or the
-    CPU where this machine has no such device; that is said once.
+    Results are the same on all devices. The default is the device of the last session, or the CPU
+    if this machine has no such device; a warning is then logged once.
     """
     if wanted is not None:
         return wanted
     last = str([provenance, *provenance["sessions"]][-1].get("device", provenance["device"]))
     if is_here(last):
         return last
-    _say_that_there_is_no(last)
+    _warn_of_missing(last)
     return CPU
 
 
 @functools.cache
-def _say_that_there_is_no(device: str) -> None:
+def _warn_of_missing(device: str) -> None:
     log.warning(
         "this machine has no %s, on which the run was last played: it is played on the cpu, with "
         "the same results",

@@ -1,7 +1,7 @@
-"""What the JSON files of a run hold, as models that they are checked against where they are read.
+"""Models of the JSON files of a run, against which they are checked where they are read.
 
-Keys that a model does not have are left alone: a later version may write them. What may be missing
-is what an earlier one did not write. None stands for a number that was not finite.
+Keys that a model does not have are left alone: a later version may write them. Optional keys are
+those that an earlier version did not write. None stands for a number that was not finite.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ class MeasureHeader(TypedDict):
 
 
 class WorldHeader(TypedDict):
-    """What is known of a world without loading it."""
+    """The properties of a world that are known without loading it."""
 
     name: str
     environment: str
@@ -60,14 +60,14 @@ class WorldHeader(TypedDict):
 
 
 class MethodHeader(TypedDict):
-    """What is known of a method without loading it."""
+    """The properties of a method that are known without loading it."""
 
     name: str
     title: str
 
 
 class Session(TypedDict):
-    """One time that a run was carried on."""
+    """One start or resume of a run."""
 
     started: str
     from_generation: Count
@@ -91,7 +91,7 @@ class Origin(TypedDict):
 
 
 class Length(TypedDict):
-    """What ends a run, see ``RunSettings``."""
+    """The settings that end a run, see ``RunSettings``."""
 
     generations: Annotated[int, Ge(1)]
     budget_evaluations: Count
@@ -99,7 +99,7 @@ class Length(TypedDict):
 
 
 class FormerEnd(TypedDict):
-    """The end that a run had, or was to have, before it was given another length."""
+    """The actual or planned end of a run before its length was changed."""
 
     at: str
     run_id: RunId
@@ -244,14 +244,14 @@ class Testing(TypedDict):
 
 
 def contradiction(found: Mapping[str, Any]) -> str:
-    """Return what does not go together in a testing phase, nothing if all does."""
+    """Return a contradiction in a testing phase, empty if there is none."""
     teams = {name: found[name] for name in ("champion", "generation_0")}
     for name, team in teams.items():
         if not len(team["labels"]) == len(team["specialization"]) == len(team["n_hidden"]):
-            return f"{name} has not as many labels as robots"
+            return f"{name} has a different number of labels and robots"
         n, likes = len(team["labels"]), [len(team[key]) for key in FAVOURITES if key in team]
         if likes not in ([], [n, n]):
-            return f"{name} has not as many favourites, and shares of them, as robots"
+            return f"{name} has a different number of favourites, or of their shares, and robots"
     parts = list(teams.values())
     if "validation" in found:
         about = found["validation"]

@@ -1,4 +1,4 @@
-"""A run: one seeded experiment on disk, and the one call that makes one."""
+"""A run: one seeded experiment on disk, and the call that makes one."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from conevo.runs.time_limit import TimeLimit
 from conevo.terms import quoted
 from conevo.typing import Record
 
-# A run is looked at more often than it is carried on: what simulates it is loaded where it is used.
+# A run is shown more often than continued: the simulator is loaded where it is used.
 if TYPE_CHECKING:
     from pandas import DataFrame
 
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 __all__ = ["RUNS", "Run", "evolve", "start"]
 
-RUNS = Path("runs")  # where runs are made and looked for unless told otherwise
+RUNS = Path("runs")  # default folder of runs
 Watch = Callable[["Run", Record], None]
 
 
@@ -47,20 +47,20 @@ def evolve(
     origin: Run | str | Path | None = None,
     of_champion: bool = False,
 ) -> Run:
-    """Evolve a team and test it; everything is kept in one directory.
+    """Evolve a team and test it; everything is written to one directory.
 
     Args:
         world: world and environment, "rover/complex-1".
         method: "cone" (default), "mesp" ..., "FILE.py:NAME", or an object of a class in a file.
         preset: "smoke" (seconds), "desk" (minutes, default), "night" (hours), "thesis".
-        seed: the same seed gives the same run, to the bit.
+        seed: the same seed gives the same run, bit for bit.
         out: the run's directory; by default a new one under ``runs/``.
         config: a TOML file with settings, for example the ``config.toml`` of another run.
         overrides: single settings, for example ``{"run.generations": 5}``.
         threads: CPU threads, all by default; results do not depend on it.
         device: "cpu", "cuda", or "auto": "cuda" if there is one; results do not depend on it.
         progress: as for ``Run.resume``.
-        origin: a finished run with whose populations this one begins, if its controllers fit.
+        origin: a finished run; start from its final populations, if its controllers fit.
         of_champion: breed the populations from the origin's champion instead.
 
     Raises:
@@ -88,21 +88,21 @@ def start(
     origin: Run | None = None,
     of_champion: bool = False,
 ) -> Run:
-    """Create the directory of a run that is then carried on by ``Run.resume``.
+    """Create the directory of a run; ``Run.resume`` then evolves it.
 
     Args:
-        config: what to run.
+        config: of the run.
         out: the run's directory; by default a new one under ``runs/``.
         threads: CPU threads, all by default.
         device: "cpu", "cuda", or "auto": "cuda" if there is one; results do not depend on it.
-        command: what the provenance says the run was started with.
-        origin: a finished run; the new one begins with the populations that it ended with, which
-            are copied into the new directory, and is otherwise as any other.
-        of_champion: its populations are bred from the origin's champion instead.
+        command: that started the run, for the provenance.
+        origin: a finished run; the new one starts from its final populations, which are copied
+            into the new directory.
+        of_champion: breed the populations from the origin's champion instead.
 
     Raises:
         UsageError: the directory exists, the budget does not pay for one generation, or the
-            origin is unfinished, was changed since, or its populations do not fit.
+            origin is unfinished, was changed, or its populations do not fit.
         EnvironmentFailure: no such device, full disk, no permission; nothing was written.
     """
     from conevo.runs.lab import Lab
@@ -130,7 +130,7 @@ def start(
 def beginning(
     config: RunConfig, out: str | Path | None, origin: Run | None, of_champion: bool
 ) -> tuple[Path, State | Team | None, Record]:
-    """Return where a run would be, what it begins with, and what its provenance says of that.
+    """Return a new run's directory, its initial populations and their provenance entry.
 
     Raises:
         UsageError: as ``start``.
@@ -153,10 +153,10 @@ class Run:
     """A run on disk, finished or not.
 
     Args:
-        path: its directory, or the store of it.
+        path: its directory, or its store.
 
     Raises:
-        UsageError: there is no run at ``path``.
+        UsageError: ``path`` is not a run.
     """
 
     def __init__(self, path: str | Path | Store, lab: Lab | None = None) -> None:
@@ -167,10 +167,10 @@ class Run:
 
     @cached_property
     def config(self) -> RunConfig:
-        """Its settings, all of them; this loads its world.
+        """All its settings; this loads its world.
 
         Raises:
-            UsageError: the world's file is not there, or is not the one it was made with.
+            UsageError: the world's file is missing, or has changed.
         """
         return self._store.read_config()
 
@@ -196,34 +196,34 @@ class Run:
 
     @property
     def champion(self) -> Team | None:
-        """The run's best team, None before the first generation has ended.
+        """The run's best team, None before the end of the first generation.
 
-        Of a finished run it is the finalist that validation chose, of any other the fittest so far
-        in the scenarios that all generations' fittest teams meet.
+        For a finished run it is the finalist that validation chose, else the fittest so far in the
+        scenarios that the fittest teams of all generations meet.
         """
         return self._store.load_champion()
 
     @property
     def test_result(self) -> Record | None:
-        """The testing phase of a finished run, None before.
+        """The testing phase of a finished run, else None.
 
-        "champion" and "generation_0" are tests of these teams, "validation" says how the champion
-        was chosen; runs of conevo 0.1.0 have none.
+        "champion" and "generation_0" are tests of these teams, "validation" records how the
+        champion was chosen; runs of conevo 0.1.0 have none.
         """
         return self._store.read_test()
 
     @property
     def changed_files(self) -> list[str]:
-        """Files of a finished run that are not as they were when it was sealed."""
+        """Files of a finished run that have changed since it was sealed."""
         return self._store.check_seal() if self._store.is_finished else []
 
     @property
     def run_ids(self) -> tuple[str, ...]:
-        """Its id, alone; a shaping has one for every stage."""
+        """Its only id; a shaping has one for every stage."""
         return (self.provenance["run_id"],)
 
     def done(self) -> tuple[int, int]:
-        """Return the number of finished generations, and of the team evaluations they took."""
+        """Return the number of finished generations, and of their team evaluations."""
         return self._store.count_generations()
 
     def tables(self) -> dict[str, Any]:
@@ -257,10 +257,10 @@ class Run:
         Args:
             generation: of the team.
             lab: this run's.
-            progress: told the generations done and wanted, if the team was not kept.
+            progress: called with the numbers of finished and of all generations to evolve again.
 
         Raises:
-            UsageError: no such generation, or evolving again does not give what the log says.
+            UsageError: no such generation, or the result differs from the log.
         """
         records = self.generations()
         if not 0 <= generation < len(records):
@@ -286,26 +286,26 @@ class Run:
         remark: Callable[[str], None] | None = None,
         accept_other_code: bool = False,
     ) -> Run:
-        """Carry the run on from its last checkpoint to its end: the same bits as without a break.
+        """Continue from the last checkpoint to the end, bit for bit as without interruption.
 
-        With another length (see ``extend``) a finished run is continued, too.
+        With another length (see ``extend``), a finished run is continued, too.
 
         Args:
             generations, budget_evaluations, target: another length, if any of them is given.
             time_limit: seconds after which it stops at a checkpoint; its status is then
-                "interrupted", and resuming it again carries it on.
+                "interrupted", and it can be resumed again.
             threads: CPU threads, all by default.
-            device: by default the one of the last session, or the CPU where that is not here.
-            progress: None: a bar in a notebook, nothing elsewhere; True: elsewhere a printed line
-                per generation; False: nothing.
+            device: by default the one of the last session, or the CPU if that is missing.
+            progress: None: a bar in a notebook, nothing elsewhere; True: a printed line per
+                generation elsewhere; False: nothing.
             watch: called with the run and the record of each finished generation.
-            remark: told about a checkpoint that could not be used.
-            accept_other_code: go on although another conevo made the run so far; it is recorded.
+            remark: called with a message about an unusable checkpoint.
+            accept_other_code: continue results of another version; the run records both.
 
         Raises:
             UsageError: finished (without another length), in use, made by other code or with other
-                kernels, no usable checkpoint, or a length that is less than what is done.
-            EnvironmentFailure: the machine refused; the run can be resumed when it no longer does.
+                kernels, no usable checkpoint, or a length shorter than the finished part.
+            EnvironmentFailure: the machine refused; the run can be resumed later.
         """
         from conevo.runs.notebook import showing
         from conevo.runs.session import evolve_on, finish
@@ -340,20 +340,20 @@ class Run:
         device: str | None = None,
         accept_other_code: bool = False,
     ) -> Run:
-        """Give the run another length, finished or not; ``resume`` then carries it on.
+        """Change the length of the run, finished or not; ``resume`` then continues it.
 
-        The result equals, bit for bit, that of a run which was planned that long, ``config.toml``
-        and the run's id included. The former end is kept in the provenance.
+        The result equals, bit for bit, that of a run planned that long, including ``config.toml``
+        and the run's id. The provenance keeps the former end.
 
         Args:
-            generations: the run now ends after this many.
-            budget_evaluations: it now spends at most so many team evaluations; 0 is no limit.
-            target: it now ends at this main task performance; "none" takes the target away.
+            generations: new number of generations.
+            budget_evaluations: new limit of team evaluations; 0: no limit.
+            target: new main task performance at which the run ends; "none" removes it.
             threads, device, accept_other_code: as for ``resume``.
 
         Raises:
-            UsageError: less than what is done; of a finished run no more than it has, or it was
-                changed since; part of a shaping or campaign, in use, or made by other code.
+            UsageError: shorter than the finished part; a finished run that would not continue, or
+                was changed; part of a shaping or campaign, in use, or made by other code.
             EnvironmentFailure: the machine refused.
         """
         from conevo.runs.length import length_of, refuse_parts
@@ -373,12 +373,12 @@ class Run:
         device: str | None = None,
         accept_other_code: bool = False,
     ) -> Run:
-        """Give the run the length that another configuration has; ``resume`` carries it on.
+        """Give the run the length of another configuration; ``resume`` continues it.
 
-        It may be one at which the run ends where it has ended.
+        With this length the run may end where it has already ended.
 
         Args:
-            config: the run's own but for its length.
+            config: the run's own with another length.
             threads, device, accept_other_code: as for ``resume``.
 
         Raises:
@@ -393,7 +393,7 @@ class Run:
     def _extend(
         self, config: RunConfig, threads: int | None, device: str | None, is_later: bool = False
     ) -> None:
-        """Give the run the length that a configuration has; see ``give_length``."""
+        """Give the run the length of a configuration; see ``give_length``."""
         from conevo.runs.length import give_length
 
         lab = give_length(self._store, config, lambda: self.equip(threads, device), is_later)
@@ -401,7 +401,7 @@ class Run:
 
     @contextmanager
     def _open(self) -> Iterator[None]:
-        """Keep other processes out, and read again what they may have changed."""
+        """Lock the run, and read its settings again, which other processes may have changed."""
         with self._store.locked():
             self._store.settle()
             self.outline, self.config = self._store.read_outline(), self._store.read_config()
@@ -419,14 +419,14 @@ class Run:
         """Re-execute the fittest team so far in fresh scenarios; writes nothing.
 
         Args:
-            scenarios: how many, by default as many as the run's own testing phase.
-            seed: draws other scenarios than the run's own testing phase.
+            scenarios: number of scenarios, by default that of the run's own testing phase.
+            seed: of other scenarios than those of the run's own testing phase.
             threads, device: as for ``resume``.
-            team: another run's team, for which the world has robots and networks of the same size.
+            team: another run's team with the same numbers of robots and genes.
 
         Raises:
-            UsageError: no generation has finished yet, made with other kernels, or numbers of
-                scenarios or a seed that are out of bounds.
+            UsageError: no generation has finished yet, other kernels, or a number of scenarios or a
+                seed out of bounds.
         """
         from conevo.runs.testing import refuse_numbers
 
@@ -476,7 +476,7 @@ class Run:
         )
 
     def refuse_finished(self) -> None:
-        """Raise UsageError if there is nothing left to do."""
+        """Raise UsageError if the run is finished."""
         if self._store.is_finished:
             path = quoted(self.path)
             raise UsageError(
@@ -485,11 +485,11 @@ class Run:
             )
 
     def refuse_other_code(self, is_accepted: bool = False) -> None:
-        """Raise UsageError if other code, unless accepted, made it, or its world is not played."""
+        """Raise UsageError for an earlier version of the world, or other code unless accepted."""
         refuse_other_code(self.path, self.outline.task, last_code(self.provenance), is_accepted)
 
     def equip(self, threads: int | None, device: str | None) -> Lab:
-        """Return what the run needs, after checking that it is what it was started with."""
+        """Return the run's lab, after checking that its kernels are those of the start."""
         from conevo.runs.lab import Lab
 
         lab, self._lab = self._lab, None

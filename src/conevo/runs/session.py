@@ -1,4 +1,4 @@
-"""A session of a run: from its last checkpoint on, as far as its end or the time allows."""
+"""A session of a run: from its last checkpoint to its end or the time limit."""
 
 from __future__ import annotations
 
@@ -30,20 +30,20 @@ def evolve_on(
     watch: Callable[[Record], object],
     remark: Callable[[str], None] | None,
 ) -> str:
-    """Evolve one generation after another, keep each, and return why it stopped.
+    """Evolve and record one generation after another, and return why it stopped.
 
     Args:
         store: of the run, which this process has locked.
         lab: the run's.
         limit: the time that is left.
         watch: called with the record of each finished generation.
-        remark: told about a checkpoint that could not be used.
+        remark: called with a message about an unusable checkpoint.
 
     Returns:
-        "generations", "target" or "budget": the end. "time": not yet, but there is no time left.
+        "generations", "target" or "budget" at the end; "time" if the run has none left.
 
     Raises:
-        UsageError: a file that is needed is lost or damaged.
+        UsageError: a file is lost or damaged.
         EnvironmentFailure: the machine refused.
     """
     settings, method, blank = lab.config.run, lab.config.method, lab.blank_state()
@@ -57,7 +57,7 @@ def evolve_on(
         remark(f"{problem}; going on from generation {generation} instead")
     records = store.cut_generations(generation)
     champion, best = store.load_champion(), _best_so_far(store) if records else []
-    best = [team for team in best if team.generation < generation]  # others come again
+    best = [team for team in best if team.generation < generation]  # others are evolved again
     newest = saved = state
     seconds: list[float] = []  # of the generations of this session
     about = store.read_provenance()
@@ -144,11 +144,11 @@ def evolve_again(
     Args:
         store: of the run.
         lab: the run's.
-        generation: which is wanted.
-        progress: told the generations done and wanted.
+        generation: of the team.
+        progress: called with the numbers of finished and of all generations.
 
     Raises:
-        UsageError: evolving again does not give what the log says.
+        UsageError: the result differs from the log.
     """
     records = store.read_generations()
     teams: list[Team] = []
@@ -177,7 +177,7 @@ def evolve_again(
 
 
 def _best_so_far(store: Store) -> list[Team]:
-    """Return the finalists of a run that has at least one generation."""
+    """Return the finalists of a run with at least one generation."""
     teams = store.load_finalists()
     if not teams and "code" not in store.read_provenance():  # conevo 0.1.0 kept the champion alone
         teams = [team for team in [store.load_champion()] if team is not None]

@@ -78,7 +78,7 @@ class RunSettings:
     it that sum less the one in the same scenarios when its network is empty, which costs a further
     team evaluation for each robot."""
     budget_evaluations: Annotated[int, Ge(0), Le(2**63 - 1)] = 0
-    """the run never spends more team evaluations than this; 0 is no limit. Choice: those that a
+    """the run never spends more team evaluations than this; 0: no limit. Choice: those that a
     difference takes count, too."""
     target: float | None = None
     """the run ends when the fittest team's main task performance is as good as this: at least, or,
@@ -86,16 +86,16 @@ class RunSettings:
     checkpoint_every: Annotated[int, Ge(1), Le(10_000_000)] = 1
     """generations between two checkpoints."""
     n_finalists: Annotated[int, Ge(1), Le(1000)] = 10
-    """the fittest teams of the run, which are validated at its end. Choice: 10, as the thesis says
-    nothing of how a run's best team is found. 1 leaves the choice to the scenarios of the evolution
-    phase."""
+    """the fittest teams of the run, which are validated at its end. Choice: 10, as the thesis does
+    not describe how a run's best team is found. 1 leaves the choice to the scenarios of the
+    evolution phase."""
     n_validations: Annotated[int, Ge(1), Le(10_000)] = 20
     """scenarios in which finalists are validated. Choice: 20, as many as tests."""
     n_tests: Annotated[int, Ge(1), Le(10_000)] = 20
     """fresh scenarios of the testing phase (5.4: 20)."""
 
     def plays(self, n_robots: int) -> int:
-        """Return the team evaluations that each team of so many robots takes."""
+        """Return the number of team evaluations that each team of ``n_robots`` takes."""
         return 1 + n_robots if self.credit == "difference" else 1
 
 
@@ -108,7 +108,7 @@ class Setting:
         default: its value unless something sets another; None if it has none.
         unit: of the value, empty for a plain number, a name or a switch.
         allowed: the values that are accepted, in words.
-        meaning: what it sets, empty if its class does not say.
+        meaning: its effect, empty if its class has no text for it.
     """
 
     name: str

@@ -1,16 +1,16 @@
-"""Shaping: a task learned in stages, each a run that begins with the last one's populations.
+"""Shaping: a task learned in stages, each a run that starts from the previous one's populations.
 
-Nitschke 2009, sections 4.3 (prey) and 6.4.2 (construction). Where a stage has another method than
-the one before, its populations are bred from that one's champion (``runs.first``)::
+Nitschke 2009, sections 4.3 (prey) and 6.4.2 (construction). If the method changes between stages,
+populations are bred from the champion of the previous stage (``runs.first``)::
 
     shaping.toml    the resolved configuration of every stage; never changes
-    inputs/         copies of the files that it names: a world's, and its prey
-    stage-1/ ...    the runs, each as any other; a stage appears when the one before is sealed
-    generations.jsonl   every generation of all stages with the environment that it saw; written
-                    when a stage is sealed
-    prey.npz        what the world makes of these stages, if it does: here evolved prey
+    inputs/         copies of its files: of a world, a method, prey
+    stage-1/ ...    ordinary runs; a stage appears when the previous one is sealed
+    generations.jsonl   every generation of all stages with its environment; written when a stage is
+                    sealed
+    prey.npz        the world's product of these stages, if it has one: here evolved prey
     DONE            the seal of a finished shaping: digests of all files
-    lock            held (flock) by the process that is at work here
+    lock            locked (flock) by the process that writes here
 """
 
 from __future__ import annotations
@@ -53,10 +53,10 @@ GENERATIONS = "generations.jsonl"
 
 
 def tasks_up_to(task: str) -> list[str]:
-    """Return a task's family up to it: complex-1, complex-2, complex-3 for "rover/complex-3".
+    """Return a task and the previous ones of its family: complex-1, -2, -3 for "rover/complex-3".
 
     Raises:
-        UsageError: no such task, or none comes before it.
+        UsageError: no such task, or the first of its family.
     """
     from conevo.worlds.registry import resolve as resolve_world
 
@@ -81,19 +81,19 @@ def start_shaping(
     command: str = "conevo.runs.shaping.start_shaping",
     place: str = "in overrides",
 ) -> Shaping:
-    """Create the directory of a shaping that is then carried on by ``Shaping.resume``.
+    """Create the directory of a shaping; ``Shaping.resume`` then evolves it.
 
     Args:
         tasks: worlds and environments in the order in which they are learned.
-        method: of all stages, as the settings that follow.
+        method: of all stages, like the following settings.
         preset: "smoke", "desk" (default), "night", "thesis".
-        seed: the same seed gives the same stages, to the bit.
+        seed: the same seed gives the same stages, bit for bit.
         out: the directory; by default a new one under ``runs/``.
         overrides: single settings, for example ``{"run.generations": 5}``.
-        config: a TOML file with settings; ``tasks`` win over the world it names.
+        config: a TOML file with settings; ``tasks`` take precedence over its world.
         threads: CPU threads, all by default; results do not depend on it.
         device: "cpu", "cuda", or "auto": "cuda" if there is one; results do not depend on it.
-        command: what the provenance says the stages were started with.
+        command: that started the stages, for the provenance.
         place: where ``overrides`` came from, for error messages.
 
     Raises:
@@ -161,9 +161,9 @@ def start_stages(
 
 
 def stand_ins(configs: Sequence[RunConfig]) -> list[Team | None]:
-    """Return for each stage a team in place of the champion that it will be bred from.
+    """Return for each stage a team in place of the champion from which it will be bred.
 
-    None for a stage that begins with the populations of the one before, or with random ones.
+    None for a stage that starts from the previous one's populations, or from random ones.
     """
     from conevo.runs.lab import first_team
 
@@ -180,7 +180,7 @@ class Shaping:
         path: its directory.
 
     Raises:
-        UsageError: there is no shaping at ``path``, or it is not the one that was started.
+        UsageError: ``path`` is not a shaping, or its file has changed.
     """
 
     def __init__(self, path: str | Path) -> None:
@@ -197,7 +197,7 @@ class Shaping:
         """The settings of every stage; this loads its world.
 
         Raises:
-            UsageError: a world's file is not there, or is not the one it was made with.
+            UsageError: a world's file is missing, or has changed.
         """
         from conevo.runs.config import resolve
 
@@ -229,7 +229,7 @@ class Shaping:
         """The stages that have begun, in order.
 
         Raises:
-            UsageError: a stage is not the one that was planned.
+            UsageError: a stage differs from the plan.
         """
         begun: list[Run] = []
         for number, run_id in enumerate(self.run_ids, start=1):
@@ -242,10 +242,10 @@ class Shaping:
         return begun
 
     def generations(self) -> list[Record]:
-        """Return the record of every finished generation of all stages, each with what it saw.
+        """Return the record of every finished generation of all stages, each with its task.
 
-        Before a run's record stand the generation's ``number`` through all stages, its ``stage``
-        (from 1) and its ``task``: world and environment.
+        A record begins with the generation's ``number`` through all stages, its ``stage`` (from 1)
+        and its ``task``: world and environment. The run's own record follows.
         """
         found: list[Record] = []
         for stage, run in enumerate(self.stages, start=1):
@@ -270,7 +270,7 @@ class Shaping:
 
     @property
     def sessions(self) -> list[Mapping[str, Any]]:
-        """The sessions of all stages, each from a generation as it is numbered through them."""
+        """The sessions of all stages, with generations numbered through all stages."""
         found: list[Mapping[str, Any]] = []
         before = 0
         for run in self.stages:
@@ -293,17 +293,17 @@ class Shaping:
         """Re-execute the last stage's fittest team in the environment of every stage begun.
 
         Args:
-            scenarios: how many of each, by default as many as the stage's own testing phase.
-            seed: draws other scenarios than that.
+            scenarios: number for each stage, by default that of the stage's own testing phase.
+            seed: of other scenarios than those.
             threads, device: as for ``resume``.
 
         Returns:
-            A result for each stage, as ``Run.test`` has it, with the ``stage``, its ``task`` and
-            the stage that the team is of (``team_of``) before it.
+            A result for each stage: ``stage``, its ``task``, the stage of the team (``team_of``),
+            then the result of ``Run.test``.
 
         Raises:
             UsageError: no generation has finished yet, the stages have teams of different sizes,
-                or a stage was made with other kernels.
+                or other kernels than those of a stage.
         """
         stages = self.stages
         of, champion = len(stages), None
@@ -320,23 +320,23 @@ class Shaping:
 
     @property
     def product(self) -> Path | None:
-        """The file that a finished shaping of these tasks has made, None if it makes none."""
+        """The file that a finished shaping of these tasks produces, None without one."""
         makes = product_of(self.tasks) if self._directory.is_finished else None
         return self.path / makes.FILE if makes else None
 
     @property
     def changed_files(self) -> list[str]:
-        """Files of a finished shaping that are not as they were when it was sealed."""
+        """Files of a finished shaping that have changed since it was sealed."""
         return self._directory.check_seal() if self._directory.is_finished else []
 
     def refuse_finished(self) -> None:
-        """Raise UsageError if there is nothing left to do."""
+        """Raise UsageError if the shaping is finished."""
         if self._directory.is_finished:
             show = f"conevo show {quoted(self.path)}"
             raise UsageError(f"{self.path} is finished; see it with '{show}'")
 
     def refuse_other_code(self, is_accepted: bool = False) -> None:
-        """Raise UsageError if other code, unless accepted, made it, or its world is not played."""
+        """Raise UsageError for an earlier version of the world, or other code unless accepted."""
         if begun := self.stages:
             code = last_code(begun[-1].provenance)
             refuse_other_code(self.path, self.outlines[0].task, code, is_accepted)
@@ -352,20 +352,20 @@ class Shaping:
         remark: Callable[[str], None] | None = None,
         accept_other_code: bool = False,
     ) -> Shaping:
-        """Carry the shaping on to the end of its last stage: the same bits as without a break.
+        """Continue to the end of the last stage, bit for bit as without interruption.
 
         Choice: stages keep their length. A shaping that was planned longer has longer first
         stages, so that all that follows would be another; what a last stage may go on with is a
         run of its own that begins with its populations.
 
         Args:
-            time_limit: seconds after which it stops at a checkpoint, as ``Run.resume``.
+            time_limit: seconds after which it stops at a checkpoint, as for ``Run.resume``.
             threads: CPU threads, all by default.
-            device: by default the one of the last session, or the CPU where that is not here.
+            device: by default the one of the last session, or the CPU if that is missing.
             progress: of every stage, as for ``Run.resume``.
             watch: called with the stage and the record of each finished generation.
-            remark: told about a checkpoint that could not be used.
-            accept_other_code: go on although another conevo made it so far; it is recorded.
+            remark: called with a message about an unusable checkpoint.
+            accept_other_code: continue results of another version; the runs record both.
 
         Raises:
             UsageError: finished, in use, made by other code, or a stage cannot be resumed.
@@ -393,13 +393,12 @@ class Shaping:
         device: str | None = None,
         accept_other_code: bool = False,
     ) -> Shaping:
-        """Begin one stage after the other; ``carry`` resumes each to its end.
+        """Begin one stage after another; ``carry`` resumes each to its end.
 
         Args:
-            carry: called with a stage that is not finished and its number, from 1. If the stage is
-                not finished after that, the shaping stops there.
-            threads, device: as for ``resume``.
-            accept_other_code: begin a stage although another conevo made those before.
+            carry: called with each unfinished stage and its number, from 1. If the stage is still
+                unfinished afterwards, the shaping stops there.
+            threads, device, accept_other_code: as for ``resume``.
 
         Raises:
             UsageError: finished, in use, or made by other code.
@@ -428,7 +427,7 @@ class Shaping:
             replace_file(path, lines.encode())
 
     def _stage(self, number: int, threads: int | None, device: str | None) -> Run:
-        """Return a stage, begun by now; the ones before are finished."""
+        """Return a stage, which is begun if necessary; the previous ones are finished."""
         begun = self.stages
         if number <= len(begun):
             return begun[number - 1]
@@ -458,7 +457,7 @@ def label(configs: Sequence[RunConfig]) -> str:
 
 
 def _read(path: Path) -> dict[str, Any]:
-    """Return what a shaping file says, with settings and outline of every stage; loads no world."""
+    """Return the content of a shaping file, with settings and outlines; loads no world."""
     from conevo.runs.records import ShapingText
 
     try:

@@ -1,4 +1,4 @@
-"""What is left of a champion's worth where nothing was chosen by it."""
+"""The performance of a champion in scenarios that did not select it."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ __all__ = ["shrinkage"]
 
 
 def shrinkage(result: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Return how much of what a champion was chosen by is left in scenarios that did not choose it.
+    """Compare a champion's values in the scenarios that selected it with those in fresh ones.
 
     Args:
         result: the testing phase of a run, with its "validation".
 
     Returns:
-        A row for its robots' mean fitness ("fitness"), which is what chose it, and for each
+        A row for its robots' mean fitness ("fitness"), by which it was selected, and for each
         performance measure: its mean at "selection", its ``spread`` in "validation" and "test", and
         the "ratio" of test to selection, None where selection has no positive value.
     """

@@ -1,27 +1,27 @@
-"""A run's directory: what is written when, so that a kill at any moment leaves a run to resume.
+"""A run's directory: a kill at any moment leaves a run that can be resumed.
 
 ::
 
     config.toml                 the resolved configuration; changes only with the run's length
-    inputs/                     copies of the files that it names: a world's, and its prey
+    inputs/                     copies of its files: of a world, a method, prey
     provenance.json             versions, kernel hash, machine, sessions; replaced whole
-    origin.npz                  the first state, if the run begins with the populations of another
+    origin.npz                  the first state, if it is from another run
     generations.jsonl           one line per generation, on the disk before the next begins
     finalists.npz               the fittest teams so far
-    champion.npz                the first of them; of a finished run the one that validation chose
+    champion.npz                the fittest; of a finished run the choice of the validation
     teams/generation-0000.npz   the fittest team of some generations
     checkpoint-a.npz, -b.npz    the method's state, written in turn
     test.json                   the testing phase
     DONE                        the seal of a finished run: digests of all files
-    extension.json              only while a run is given another length: what is to change
-    lock                        held (flock) by the process that is at work here
+    extension.json              only while the length of a run changes: the changes
+    lock                        locked (flock) by the process that writes here
 
-Within a generation teams are written first, then the log line, then the checkpoint. What is newer
-than the checkpoint is written again, to the bit, when the run is resumed. A directory appears under
-its name only when the files down to ``generations.jsonl`` are in it.
+Within a generation teams are written first, then the log line, then the checkpoint. Everything
+newer than the checkpoint is written again, bit for bit, when the run is resumed. A directory gets
+its name only when it contains the files down to ``generations.jsonl``.
 
-A run is given another length in one step: ``extension.json`` is written, and where there is a
-``DONE`` it counts from the moment that is removed. What it says is then written into
+The length of a run changes in one step: ``extension.json`` is written, and takes effect when
+``DONE`` is removed, or at once if the run is unfinished. Its content is then written into
 ``config.toml`` and ``provenance.json``, by the same process or by the next one that has the lock.
 """
 
@@ -66,16 +66,16 @@ CHECKPOINTS = ("checkpoint-a.npz", "checkpoint-b.npz")
 
 
 def create(path: Path, config: RunConfig, provenance: Record, first: State | None = None) -> Store:
-    """Make a run's directory appear at ``path``, all at once.
+    """Create a run's directory, which appears at ``path`` all at once.
 
     Args:
         path: the directory.
         config: the resolved configuration.
-        provenance: what the run is made with; says its ``origin`` if there is a first state.
-        first: the state to begin with, if it is not the method's own.
+        provenance: versions and machine; has an ``origin`` if there is a first state.
+        first: the initial state, if it is not the method's own.
 
     Raises:
-        UsageError: something is there already; it is left as it is.
+        UsageError: the path exists; it is left unchanged.
         EnvironmentFailure: the directory cannot be written.
     """
     from conevo.runs.inputs import keep_inputs
@@ -97,7 +97,7 @@ class Store(Directory):
 
     Args:
         path: the run's directory.
-        config: what has just been written there.
+        config: the configuration that has just been written there.
 
     Raises:
         UsageError: there is no run at ``path``.
@@ -108,10 +108,10 @@ class Store(Directory):
         self._next_checkpoint = 0
         self._config = (config.to_toml(path).encode(), config) if config else None
 
-    # --- what the run is --------------------------------------------------------------------------
+    # --- configuration and provenance -------------------------------------------------------------
 
     def read_outline(self) -> Outline:
-        """Return what the run is, without its world.
+        """Return the run's task, method, preset, seed and length, without loading its world.
 
         Raises:
             UsageError: the configuration is not the one the run was started with.
@@ -129,7 +129,7 @@ class Store(Directory):
         """Return the run's configuration; this loads its world, once for each text of the file.
 
         Raises:
-            UsageError: it is not the one the run was started with, or its world is not there.
+            UsageError: it is not the one the run was started with, or its world is missing.
         """
         self.read_outline()
         text, extension = read_bytes(self.path / CONFIG, MOST_TOML), self._read_extension()
@@ -139,7 +139,7 @@ class Store(Directory):
         return config.of_length(extension["length"]) if extension else config
 
     def _resolve(self) -> RunConfig:
-        """Return what the configuration file says; name both versions if another one wrote it."""
+        """Return the configuration in the file; errors name the version that wrote it."""
         from conevo.runs.config import resolve
         from conevo.worlds.registry import refuse_earlier
 
@@ -182,7 +182,7 @@ class Store(Directory):
         replace_file(self.path / PROVENANCE, as_json(provenance))
 
     def refuse_changed(self) -> None:
-        """Refuse a finished run whose records are not those that it was sealed with.
+        """Refuse a finished run whose records have changed since it was sealed.
 
         Raises:
             DamagedFile: its settings, generations or testing phase were changed.
@@ -195,12 +195,12 @@ class Store(Directory):
     # --- another length ---------------------------------------------------------------------------
 
     def extend(self, config: RunConfig, former: Record, at: str) -> None:
-        """Give the run another length; a finished one is unsealed.
+        """Change the run's length; a finished run is unsealed.
 
         Args:
-            config: the run's own but for its length.
-            former: the end that it had.
-            at: the time.
+            config: the run's own with another length.
+            former: its former end.
+            at: the present time.
         """
         extension = {
             "run_id": config.run_id,
@@ -214,7 +214,7 @@ class Store(Directory):
         self.settle()
 
     def settle(self) -> None:
-        """Carry out what an interrupted ``extend`` left to do, or remove what it never began."""
+        """Complete an interrupted ``extend``, or remove its file if it has not taken effect."""
         if extension := self._read_extension():
             about = self.read_provenance()
             replace_file(self.path / CONFIG, extension["config"].encode())
@@ -223,7 +223,7 @@ class Store(Directory):
             (self.path / EXTENSION).unlink(missing_ok=True)
 
     def _read_extension(self) -> Record | None:
-        """Return the extension that counts but is not in all files yet, None if there is none."""
+        """Return an extension in effect that is not in all files yet, None if there is none."""
         path = self.path / EXTENSION
         if not os.path.lexists(path) or self.is_finished:
             return None
@@ -238,7 +238,7 @@ class Store(Directory):
         append_line(self.path / GENERATIONS, json.dumps(record, allow_nan=False))
 
     def read_generations(self) -> list[Record]:
-        """Return the log's whole lines; a torn last one does not count.
+        """Return the records of the log's whole lines, without a torn last one.
 
         Raises:
             UsageError: a line in the middle is damaged.
@@ -266,12 +266,12 @@ class Store(Directory):
         return records
 
     def count_generations(self) -> tuple[int, int]:
-        """Return the number of finished generations, and of the team evaluations that they took.
+        """Return the number of finished generations, and of their team evaluations.
 
-        The last line is parsed, and all of them only if one looks wrong.
+        Only the last line is parsed, unless one looks wrong.
 
         Raises:
-            UsageError: a line is cut or damaged, or is not the one that belongs there.
+            UsageError: a line is cut, damaged or out of order.
         """
         from conevo.runs.records import Generation
 
@@ -287,7 +287,7 @@ class Store(Directory):
         """Keep the log's first ``count`` lines and return them.
 
         Raises:
-            UsageError: there are fewer.
+            UsageError: it has fewer.
         """
         path, content = self.path / GENERATIONS, self._read_log()
         kept = b"".join(line + b"\n" for line in whole_lines(content)[:count])
@@ -369,14 +369,14 @@ class Store(Directory):
         self._next_checkpoint = 1 - self._next_checkpoint
 
     def load_checkpoint(self, method: str, blank: State) -> tuple[State | None, str]:
-        """Return the newest usable state and a remark on those that are not usable.
+        """Return the newest usable state, and a message about unusable ones.
 
         Args:
             method: of the run.
-            blank: a state of that method, whose fields those of the file must be.
+            blank: a state of that method; the file must have the same fields.
 
         Returns:
-            The state, None if no checkpoint was written yet; the remark is empty if all is well.
+            The state, None if no checkpoint was written yet; the message is empty without problems.
 
         Raises:
             UsageError: there are checkpoints, but none is usable.
@@ -403,7 +403,7 @@ class Store(Directory):
         return states[newest], "; ".join(problems)
 
     def load_origin(self, method: str, blank: State) -> State | None:
-        """Return the state the run began with, None if that is the method's own.
+        """Return the run's first state if it is from another run, else None.
 
         Args:
             method, blank: as for ``load_checkpoint``.
@@ -418,7 +418,7 @@ class Store(Directory):
         return checkpoint.load_like(blank, self.path / ORIGIN, identity)
 
     def load_final(self, method: str, blank: State) -> tuple[State, str]:
-        """Return the state a finished run ended with, and the digest of its checkpoint.
+        """Return the last state of a finished run, and the digest of its checkpoint.
 
         Args:
             method, blank: as for ``load_checkpoint``.
@@ -453,7 +453,7 @@ class Store(Directory):
         replace_file(self.path / TEST, as_json(result))
 
     def read_test(self) -> Record | None:
-        """Return the testing phase, None if the run has not come to it."""
+        """Return the testing phase, None before it."""
         from conevo.runs.records import Testing, contradiction
 
         path = self.path / TEST
@@ -471,8 +471,8 @@ class Store(Directory):
 
 
 def _identity(provenance: Record) -> dict[str, str]:
-    """Return what a run's files say they belong to."""
-    # Runs that differ in length alone share their files; conevo 0.1.0 did not know that.
+    """Return the identity that a run's files must have."""
+    # Runs that differ only in length may share files; those of conevo 0.1.0 may not.
     key = "stem_id" if "stem_id" in provenance else "run_id"
     identity = {key: provenance[key]}
     if "origin" in provenance:  # the same settings on other populations are another run

@@ -1,4 +1,4 @@
-"""What follows evolution: finalists are validated, then the champion is tested.
+"""The testing phase, after evolution: finalists are validated, then the champion is tested.
 
 Nitschke 2009, section 5.4: evolution phase, then testing phase with 20 executions. Neither is
 counted in a run's team evaluations.
@@ -47,8 +47,8 @@ def validate(
 ) -> tuple[Team, dict[str, Any]]:
     """Choose the champion among finalists, in scenarios that no generation has met.
 
-    The best of many generations on the same few scenarios was lucky in them: the more generations,
-    the luckier. Scenarios of their own tell the lucky ones from the good ones.
+    The best of many generations on the same few scenarios was also lucky: the more generations, the
+    luckier. Further scenarios distinguish the good teams from the lucky ones.
 
     Choice: the champion is the finalist whose robots have the highest mean fitness over all
     validation scenarios, one with a scenario that is not finite last, of equal ones the fittest by
@@ -64,15 +64,15 @@ def validate(
         selected: task performance of each finalist's generation in the scenarios it was chosen on.
 
     Returns:
-        The champion, and plain data: the scenarios, the generation chosen, and of each finalist
-        its generation, its robots' mean fitness and its performance: at "selection" (no fitness if
-        the credit is a difference, which is another thing), and in "validation" as ``spread`` gives
-        them.
+        The champion, and plain data: the number of scenarios, the chosen generation, and for each
+        finalist its generation, its robots' mean fitness and its performance: at "selection"
+        (without fitness if the credit is a difference, which cannot be compared), and in
+        "validation" as results of ``spread``.
     """
     scenarios = world.scenarios([fold(seed, "validation", k) for k in range(n_scenarios)])
     outcome = simulator.evaluate(*Finalists.of(finalists).as_trials(), scenarios)
     fitness = outcome.fitness.astype(np.float64).mean(axis=2)
-    robots = len(finalists[0].fitness) if credit == "team" else 1  # whose sum each is credited with
+    robots = len(finalists[0].fitness) if credit == "team" else 1  # each is credited with their sum
     is_fitness = credit != "difference"
     rows = [
         {
@@ -124,11 +124,10 @@ def test_team(
 
 
 def spread(values: npt.NDArray[Any]) -> dict[str, Any]:
-    """Return the values of one team's scenarios, a row each, and what they amount to.
+    """Return the values of one team's scenarios with their mean and standard deviation.
 
-    A value that is not a finite number keeps its scenario's place as None and does not count: "n"
-    says how many do, "mean" is theirs (None if there are none), "sd" their sample standard
-    deviation (None below two).
+    A value that is not finite becomes None and does not count: "n" is the number of finite values,
+    "mean" their mean (None for none), "sd" their sample standard deviation (None below two).
     """
     numbers = values.astype(np.float64)
     finite = numbers[np.isfinite(numbers)]
@@ -141,5 +140,5 @@ def spread(values: npt.NDArray[Any]) -> dict[str, Any]:
 
 
 def _finite(value: float) -> float | None:
-    """Return a number that JSON can hold."""
+    """Return a number as JSON has it."""
     return float(value) if np.isfinite(value) else None

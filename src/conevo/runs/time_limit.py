@@ -37,7 +37,7 @@ class TimeLimit:
         return time.monotonic() >= self.ends
 
     def has_time(self, seconds: float) -> bool:
-        """Whether there is time for what takes so many seconds."""
+        """Whether this number of seconds is left."""
         return time.monotonic() + seconds < self.ends
 
 
