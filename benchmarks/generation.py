@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from conevo.runs.config import resolve
-from conevo.runs.run import start
+from conevo.runs.start import start
 from conevo.worlds.rollout import Rollout
 from machine import machine, table
 

@@ -21,7 +21,7 @@ METHODS = ("homcne", "hetcne", "ccga", "mesp", "cone")
 def peak(method: str, world: str, iterations: int) -> list[object]:
     """Run one generation in this process and return a row of the table."""
     from conevo.runs.config import resolve
-    from conevo.runs.run import start
+    from conevo.runs.start import start
 
     overrides = {"run.generations": 1, "run.n_tests": 1, "world.iterations": iterations}
     config = resolve(world, method, "thesis", seed=1, overrides=overrides)

@@ -11,7 +11,7 @@ import warp as wp
 from conevo.controllers.registry import CONTROLLERS, controller, genome_of
 from conevo.rng import fold
 from conevo.runs.config import resolve
-from conevo.runs.run import start
+from conevo.runs.start import start
 from conevo.worlds import rollout
 from conevo.worlds.checks import random_teams_of
 from conevo.worlds.registry import world

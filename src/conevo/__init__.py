@@ -22,7 +22,8 @@ if TYPE_CHECKING:
     from conevo.errors import ConevoError, EnvironmentFailure, UsageError
     from conevo.evolution.methods.registry import METHODS, method
     from conevo.evolution.protocol import Layout, Method, Scores, Trials
-    from conevo.runs.run import Run, evolve
+    from conevo.runs.run import Run
+    from conevo.runs.start import evolve
     from conevo.worlds.protocol import World
     from conevo.worlds.registry import WORLDS, world
     from conevo.worlds.rollout import Rollout
@@ -67,7 +68,7 @@ _HOMES = {
     "UsageError": "errors",
     "World": "worlds.protocol",
     "controller": "controllers.registry",
-    "evolve": "runs.run",
+    "evolve": "runs.start",
     "method": "evolution.methods.registry",
     "world": "worlds.registry",
 }

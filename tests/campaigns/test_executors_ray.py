@@ -17,6 +17,7 @@ from conevo.campaigns.executors.protocol import RunJob
 from conevo.campaigns.executors.ray import RayCluster
 from conevo.campaigns.executors.registry import make_executor
 from conevo.errors import EnvironmentFailure
+from conevo.runs.start import start
 
 pytest.importorskip("ray")
 pytestmark = pytest.mark.slow
@@ -45,7 +46,7 @@ def undisturbed(tmp_path_factory):
     """Return what the first run comes to if nobody disturbs it."""
     folder = tmp_path_factory.mktemp("undisturbed")
     planned = next(iter(tiny_campaign(folder, more=LONG, seeds=1).planned.values()))
-    return outcome(conevo.runs.run.start(planned.configs()[0], folder / "run", threads=1).resume())
+    return outcome(start(planned.configs()[0], folder / "run", threads=1).resume())
 
 
 def outcome(run):

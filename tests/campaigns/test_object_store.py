@@ -13,6 +13,7 @@ from campaigns.plans import tiny_campaign
 from conevo.campaigns.object_store import ObjectStore
 from conevo.campaigns.worker import carry_out
 from conevo.errors import EnvironmentFailure, UsageError
+from conevo.runs.start import start
 
 MORE = '[[where]]\nsettings = { "run.generations" = 9 }'
 
@@ -49,7 +50,7 @@ def begun(campaign, label):
     """Begin a run as a worker does, and leave it after two generations."""
     planned = campaign.planned[label]
     (config,) = planned.configs()
-    conevo.runs.run.start(config, campaign.paths.run(label), threads=1)
+    start(config, campaign.paths.run(label), threads=1)
     advance(campaign.paths.run(label), 2)
     return campaign.paths.run(label)
 

@@ -6,12 +6,12 @@ import os
 
 import pytest
 
-import conevo
 from campaigns.plans import tiny_campaign
 from conevo.campaigns.executors.registry import make_executor
 from conevo.campaigns.progress import RunProgress, last_written, progress_of
 from conevo.campaigns.worker import carry_out
 from conevo.runs.directory import Directory
+from conevo.runs.start import start
 from watch.followed import record
 
 NAMES = 'world = "rover/complex-2"\nmethod = "cone"\npreset = "smoke"\nseed = 1\n'
@@ -87,7 +87,7 @@ def test_what_a_coordinator_knows_counts_for_more_than_what_a_worker_wrote(campa
 def test_a_coordinator_waits_for_runs_that_others_carry_out(campaign, is_finished_there):
     label = next(iter(campaign.planned))
     planned = campaign.planned[label]
-    run = conevo.runs.run.start(planned.configs()[0], campaign.paths.run(label), threads=1)
+    run = start(planned.configs()[0], campaign.paths.run(label), threads=1)
     hold = contextlib.ExitStack()
     hold.enter_context(Directory(run.path, "run").locked())
     endings = []
@@ -111,7 +111,7 @@ def test_a_worker_leaves_a_run_that_another_one_has(campaign, monkeypatch):
     monkeypatch.setattr("conevo.campaigns.worker.PATIENCE", 0.0)
     label = next(iter(campaign.planned))
     planned = campaign.planned[label]
-    run = conevo.runs.run.start(planned.configs()[0], campaign.paths.run(label), threads=1)
+    run = start(planned.configs()[0], campaign.paths.run(label), threads=1)
     with Directory(run.path, "run").locked():
         assert not carry_out(campaign.path, label, 1)
     assert not campaign.paths.ended(label).exists()  # that is for the other to write

@@ -15,7 +15,7 @@ from campaigns.plans import write_plan
 from conevo.errors import UsageError
 from conevo.runs.config import resolve
 from conevo.runs.lab import Lab
-from conevo.runs.run import start
+from conevo.runs.start import start
 from runs.tiny import TASK, command, spawn, tiny_settings, wait_for
 
 SPACED = "my runs/it's one"

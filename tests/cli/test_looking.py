@@ -13,7 +13,7 @@ import pytest
 import conevo
 from campaigns.plans import tiny_campaign
 from conevo.runs.config import resolve
-from conevo.runs.run import start
+from conevo.runs.start import start
 from runs.tiny import TASK, evolve_tiny, tiny_settings
 
 LIGHT = Path(__file__).parents[2] / "examples" / "light.py"

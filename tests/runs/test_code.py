@@ -17,7 +17,7 @@ from conevo.cli.main import main
 from conevo.errors import UsageError
 from conevo.runs.code import DECIDING, changes_text, code_digest, sessions_of
 from conevo.runs.config import resolve
-from conevo.runs.run import start
+from conevo.runs.start import start
 from runs.tiny import TASK, evolve_tiny, tiny_settings
 
 # Loaded by what decides results without deciding any: what is asked for is spelt out in a run's

@@ -13,8 +13,8 @@ from conevo.errors import EnvironmentFailure, UsageError
 from conevo.replay.recording import record
 from conevo.runs import provenance
 from conevo.runs.config import resolve
-from conevo.runs.run import start
 from conevo.runs.shaping import start_shaping
+from conevo.runs.start import start
 from conevo.studies.observation import equip
 from runs.tiny import TASK, content, evolve_tiny, tiny_settings
 

@@ -13,8 +13,8 @@ import pytest
 import conevo
 from conevo.errors import UsageError
 from conevo.runs.config import resolve
-from conevo.runs.run import start
 from conevo.runs.shaping import start_shaping
+from conevo.runs.start import start
 from runs.crashes import Crash, fail_at
 from runs.tiny import (
     TASK,

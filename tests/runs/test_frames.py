@@ -10,7 +10,7 @@ import pytest
 import conevo
 from conevo.errors import EnvironmentFailure, UsageError
 from conevo.runs.frames import TABLES
-from conevo.runs.run import start
+from conevo.runs.start import start
 from runs.tiny import TASK, evolve_tiny, tiny_settings
 
 pandas = pytest.importorskip("pandas")

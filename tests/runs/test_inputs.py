@@ -11,8 +11,8 @@ import pytest
 import conevo
 from conevo.errors import UsageError
 from conevo.runs.config import resolve
-from conevo.runs.run import start
 from conevo.runs.shaping import Shaping, start_shaping
+from conevo.runs.start import start
 from conevo.worlds.pursuit import prey_sets
 from runs.tiny import content, evolve_tiny
 

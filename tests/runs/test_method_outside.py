@@ -21,6 +21,7 @@ from conevo.errors import UsageError
 from conevo.evolution.methods.registry import METHODS
 from conevo.evolution.methods.registry import resolve as resolve_method
 from conevo.runs.config import resolve
+from conevo.runs.start import start
 from runs.tiny import TASK, content, tiny_settings
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "random_search.py"
@@ -92,7 +93,7 @@ def interrupted(path: Path, name: str) -> conevo.Run:
             raise KeyboardInterrupt
 
     config = resolve(TASK, name, "smoke", overrides=SETTINGS)
-    run = conevo.runs.run.start(config, path, threads=1)
+    run = start(config, path, threads=1)
     with pytest.raises(KeyboardInterrupt):
         run.resume(threads=1, watch=stop)
     return conevo.Run(path)

@@ -14,7 +14,7 @@ import pytest
 import conevo
 from conevo.numbers import number
 from conevo.runs.html import card
-from conevo.runs.run import start
+from conevo.runs.start import start
 from runs.tiny import TASK, evolve_tiny, tiny_settings
 
 
@@ -159,7 +159,7 @@ def test_the_card_of_a_run_shows_its_curve_its_test_and_its_castes(tmp_path: Pat
     points = re.findall(r'<polyline points="([^"]*)"', html)
     assert [len(one.split()) for one in points] == [5]
     area = test["champion"]["performance"]["area"]
-    assert f"{area['mean']:.3g} ± {area['sd']:.3g}" in card.text
+    assert f"{number(area['mean'])} ± {number(area['sd'])}" in card.text
     for caste, robots in test["champion"]["castes"].items():
         assert re.search(rf"{caste} +{robots}\b", card.text)
 
@@ -180,4 +180,4 @@ def test_the_card_of_a_team_has_a_row_for_every_robot(tmp_path: Path) -> None:
     assert f"Fittest team of generation {team.generation}" in card.text
     assert card.names.count("tr") == 1 + 3
     for s, parts in zip(team.specialization, team.active.sum(axis=1), strict=True):
-        assert re.search(rf" {parts} .* {s:.3g} ", card.text)
+        assert re.search(rf" {parts} .* {number(s)} ", card.text)

@@ -11,7 +11,7 @@ import pytest
 import conevo.runs.config
 from conevo.cli.main import main
 from conevo.runs.config import resolve
-from conevo.runs.run import start
+from conevo.runs.start import start
 from conevo.worlds.pursuit import prey_sets
 from conevo.worlds.registry import WorldEntry
 from runs.tiny import tiny_settings

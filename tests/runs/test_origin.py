@@ -12,7 +12,7 @@ import conevo
 from conevo.errors import UsageError
 from conevo.runs.config import resolve
 from conevo.runs.lab import Lab
-from conevo.runs.run import start
+from conevo.runs.start import start
 from runs.tiny import TASK, content, evolve_tiny, tiny_settings
 
 

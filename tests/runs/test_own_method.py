@@ -16,7 +16,7 @@ from conevo.errors import UsageError
 from conevo.runs.checkpoint import save
 from conevo.runs.config import resolve
 from conevo.runs.lab import Lab
-from conevo.runs.run import start
+from conevo.runs.start import start
 from conevo.runs.store import Store
 from runs.tiny import TASK, content, tiny_settings
 

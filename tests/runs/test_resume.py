@@ -14,7 +14,7 @@ import conevo
 from conevo.errors import EnvironmentFailure, UsageError
 from conevo.evolution.methods.registry import METHODS
 from conevo.runs.config import resolve
-from conevo.runs.run import start
+from conevo.runs.start import start
 from runs.crashes import Crash, fail_at
 from runs.tiny import (
     TASK,

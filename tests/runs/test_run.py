@@ -18,8 +18,8 @@ from conevo.rng import fold
 from conevo.runs.champions import Team, finalists, sampled_generations
 from conevo.runs.config import resolve
 from conevo.runs.lab import price_of
-from conevo.runs.run import start
 from conevo.runs.shrinkage import shrinkage
+from conevo.runs.start import start
 from conevo.runs.testing import spread
 from runs.tiny import TASK, content, evolve_tiny, tiny_settings
 

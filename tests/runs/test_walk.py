@@ -13,7 +13,7 @@ import pytest
 
 import conevo
 from conevo.cli.main import main
-from conevo.runs.run import start
+from conevo.runs.start import start
 from conevo.worlds.protocol import kernel_params
 from conevo.worlds.rollout import Rollout
 

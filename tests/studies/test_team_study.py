@@ -16,7 +16,7 @@ from conevo.errors import UsageError
 from conevo.rng import fold
 from conevo.runs.config import resolve
 from conevo.runs.lab import Lab
-from conevo.runs.run import start
+from conevo.runs.start import start
 from conevo.specialization import degree
 from conevo.specialization.individual import independent_degree
 from conevo.specialization.team import METRICS, Activity, measure

@@ -18,6 +18,7 @@ from conevo.cli.main import main
 from conevo.errors import UsageError
 from conevo.runs.config import resolve
 from conevo.runs.shaping import start_shaping, tasks_up_to
+from conevo.runs.start import start
 from conevo.worlds.registry import WORLDS
 from conevo.worlds.registry import resolve as resolve_world
 from runs.tiny import command, content, evolve_tiny, kill_twice, tiny_settings
@@ -124,7 +125,7 @@ def interrupted(path: Path, task: str) -> conevo.Run:
             raise KeyboardInterrupt
 
     config = resolve(task, "homcne", "smoke", overrides=tiny_settings("homcne", task))
-    run = conevo.runs.run.start(config, path, threads=1)
+    run = start(config, path, threads=1)
     with pytest.raises(KeyboardInterrupt):
         run.resume(threads=1, watch=stop)
     return conevo.Run(path)

@@ -36,8 +36,9 @@ from conevo.reading import read_json_lines
 from conevo.runs.directory import as_json, kind_of
 from conevo.runs.durable import replace_file
 from conevo.runs.records import RunId
-from conevo.runs.run import Run, start
+from conevo.runs.run import Run
 from conevo.runs.shaping import Shaping, start_stages
+from conevo.runs.start import start
 from conevo.runs.time_limit import TimeLimit
 
 __all__ = ["carry_out", "core_seconds", "main", "planned_runs"]

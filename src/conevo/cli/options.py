@@ -153,8 +153,9 @@ class Order:
         from conevo.cli.lookup import find_last
         from conevo.cli.settings_text import print_dry_run
         from conevo.runs.directory import refuse_existing
-        from conevo.runs.run import RUNS, beginning
+        from conevo.runs.run import RUNS
         from conevo.runs.shaping import label, stand_ins
+        from conevo.runs.start import beginning
 
         if len(configs) == 1:
             found = None if origin is None else find_last(origin)
@@ -176,7 +177,7 @@ class Order:
             of_champion: breed the populations from the champion of ``origin`` instead.
         """
         from conevo.cli.lookup import find_last
-        from conevo.runs.run import start
+        from conevo.runs.start import start
 
         begun = start(
             config,

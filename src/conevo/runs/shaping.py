@@ -33,7 +33,8 @@ from conevo.runs.directory import CONFIG, SHAPING, Directory, appearing, refuse_
 from conevo.runs.durable import is_there, replace_file
 from conevo.runs.outline import Outline, flattened, identify, outline_of
 from conevo.runs.provenance import device_of
-from conevo.runs.run import RUNS, Run, Watch, start
+from conevo.runs.run import RUNS, Run, Watch
+from conevo.runs.start import start
 from conevo.runs.time_limit import TimeLimit
 from conevo.terms import quoted
 from conevo.typing import Record
