@@ -108,9 +108,9 @@ def test_named_levels_may_be_of_some_runs_only(tmp_path):
     ("old", "new", "says"),
     [
         ('["small", "large"]', '["small", "lage"]', "level of ranges 'lage'.*mean 'large'"),
-        ("[levels.ranges]", "[levels.range]", "levels.range in .*: there is no factor 'range'"),
-        ("[levels.ranges]", "[levels.method]", "levels.method .* name of its own"),
-        ("[levels.ranges]", '[levels."a.b"]', "levels.a.b .* name of its own"),
+        ("[levels.ranges]", "[levels.range]", "levels.range in .*: has no factor 'range'"),
+        ("[levels.ranges]", "[levels.method]", "levels.method .* needs its own name"),
+        ("[levels.ranges]", '[levels."a.b"]', "levels.a.b .* needs its own name"),
         ("large =", '"so, large" =', "levels.ranges.so, large .*letters, digits"),
         ('large = { "world.low_range" = 0.2 }', "large = 2", "levels.ranges.large .* be a table"),
         ('"world.hi_range" =', '"world.high_range" =', "'world.high_range'.*'world.hi_range'"),
@@ -224,7 +224,7 @@ def test_some_runs_of_a_plan_may_be_shapings(tmp_path):
         ("[settings]", '[settings]\n"run.method" = "mesp"', "run.method = 'mesp'.*is given as"),
         ("[settings]", '[settings]\n"run.preset" = "desk"', "the preset is given as smoke"),
         ("[settings]", '[settings]\n"run.world" = "rover/complex-2"', "the world is given as"),
-        ("complex-1", "complex-5..2", "begins with its smaller number"),
+        ("complex-1", "complex-5..2", "starts with its smaller number"),
         (
             "[settings]",
             '[settings]\n"method.start_noise" = 0.1',

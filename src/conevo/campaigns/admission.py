@@ -1,7 +1,7 @@
-"""Which code may carry a campaign on: the one that began it, and those that were accepted since.
+"""The versions of the code that may continue a campaign: the first, and those accepted since.
 
-``code.json`` in the campaign's directory lists them, so that workers on whatever machine refuse to
-continue with another conevo: runs of one comparison would be made by different code unnoticed.
+``code.json`` in the campaign's directory lists them, so that workers on all machines refuse to
+continue with another conevo: else different code might make the runs of one comparison, unnoticed.
 """
 
 from __future__ import annotations
@@ -20,15 +20,15 @@ __all__ = ["admit_code", "admitted_codes"]
 
 
 def admit_code(paths: Paths, labels: Iterable[str], accept: bool = False) -> None:
-    """Let this conevo carry a campaign on.
+    """Let this version of conevo continue a campaign.
 
     Args:
         paths: of the campaign.
-        labels: of its runs; the first code is admitted while none of them has begun.
+        labels: of its runs; while none of them has begun, the first code is admitted.
         accept: admit it although others have begun the campaign.
 
     Raises:
-        UsageError: it was begun by other code, and this one is not accepted.
+        UsageError: other code has begun it, and this one is not accepted.
         EnvironmentFailure: ``code.json`` cannot be written.
     """
     here, codes = current_code(), admitted_codes(paths)
@@ -48,7 +48,7 @@ def admit_code(paths: Paths, labels: Iterable[str], accept: bool = False) -> Non
 
 
 def admitted_codes(paths: Paths) -> list[str]:
-    """Return the versions, each with its code, that may carry a campaign on; none if not begun.
+    """Return the versions, each with its code, that may continue a campaign; none if not begun.
 
     Raises:
         UsageError: the list is damaged.

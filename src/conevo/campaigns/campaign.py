@@ -5,18 +5,18 @@
     plan.toml             the plan, resolved: scale, seeds and all settings
     inputs/               copies of the files that it names: of worlds and prey
     runs.jsonl            every run of the plan, written before anything starts
-    code.json             which code may carry it on
-    ledger.sqlite         how every run stands; written by the coordinator only
-    runs/LABEL/           the runs, each as any other; or shapings
-    studies/LABEL.json    what the fittest team of a finished run does
+    code.json             the versions of the code that may continue it
+    ledger.sqlite         the state of every run; written by the coordinator only
+    runs/LABEL/           the runs, each like any other; or shapings
+    studies/LABEL.json    the study of a finished run's fittest team
     studies/signal/       the signal of its populations, as LABEL.json
     ended/LABEL.json      how the last worker of a run ended
-    logs/LABEL.txt        what its workers said
-    tables/*.parquet      what reports read, made of all that is finished
+    logs/LABEL.txt        output of its workers
+    tables/*.parquet      read by reports, made of all finished runs
     lock                  held (flock) by the coordinator
 
-Runs, not the ledger, are the truth: whatever is killed, starting the campaign again finishes what
-is missing, and a finished run is never run twice.
+Runs, not the ledger, are the truth: after any kill, starting the campaign again finishes what is
+missing, and a finished run is never executed twice.
 """
 
 from __future__ import annotations
@@ -56,24 +56,24 @@ if TYPE_CHECKING:
 __all__ = ["ATTEMPTS", "CAMPAIGNS", "Campaign", "Stopped", "check", "create"]
 
 log = logging.getLogger("conevo")
-CAMPAIGNS = Path("campaigns")  # where campaigns are made and looked for unless told otherwise
-ATTEMPTS = 3  # of a run whose worker is lost, or whose machine refused
-SEAL_EVERY = 60.0  # seconds at least between two makings of the tables while runs go on
+CAMPAIGNS = Path("campaigns")  # default folder, of new campaigns and for names
+ATTEMPTS = 3  # of a run whose worker is lost, or whose machine failed
+SEAL_EVERY = 60.0  # seconds at least from one update of the tables to the next
 LOOK = 0.25  # seconds between two looks at workers and the order to stop
 
 
 class Stopped(Exception):
-    """The campaign was told to stop by ``Campaign.stop``, or its time is over."""
+    """The campaign was stopped by ``Campaign.stop``, or its time is over."""
 
 
 Watch = Callable[["Campaign", "Ending | None"], None]
 
 
 def check(plan: Plan, path: Path) -> list[PlannedRun]:
-    """Return the runs of a plan, if ``create`` can write it out; writes nothing.
+    """Return the runs of a plan, if ``create`` can write it out; write nothing.
 
     Raises:
-        UsageError: a run that cannot be, or ``path`` holds a campaign that this does not extend.
+        UsageError: an impossible run, or ``path`` has a campaign that this plan does not extend.
     """
     runs = plan.write_out()
     if is_there(Paths(path).plan):
@@ -82,19 +82,19 @@ def check(plan: Plan, path: Path) -> list[PlannedRun]:
 
 
 def create(plan: Plan, path: Path, accept_other_code: bool = False) -> Campaign:
-    """Write a campaign out; nothing is started.
+    """Write a campaign; nothing is started.
 
-    A campaign that is there already is extended, if the plan has all its runs, as long or longer,
-    and perhaps more.
+    An existing campaign is extended, if the plan has all its runs, as long or longer, and perhaps
+    more.
 
     Args:
-        plan: what to run.
+        plan: its runs.
         path: its directory.
         accept_other_code: extend a campaign although other code has begun it.
 
     Raises:
-        UsageError: a run that cannot be, a world whose kernel cannot be built, ``path`` holds
-            something else, or other code has begun the campaign there; nothing was written.
+        UsageError: an impossible run, a world whose kernel cannot be built, ``path`` has other
+            contents, or other code has begun the campaign there; nothing was written.
         EnvironmentFailure: it cannot be written.
     """
     plan = plan.mapped(lambda value: located(value, Path.cwd()))
@@ -117,11 +117,10 @@ def create(plan: Plan, path: Path, accept_other_code: bool = False) -> Campaign:
 
 
 def _build_worlds(runs: Iterable[PlannedRun]) -> None:
-    """Build the kernels of all worlds, once for all runs, and before any of them begins.
+    """Build the kernels of all worlds, once for all runs, before any of them starts.
 
     Raises:
-        UsageError: a world in a file of its own, whose author made a mistake, such as an index
-            outside its array.
+        UsageError: a mistake in a user's world, such as an index outside its array.
         EnvironmentFailure: compiled kernels cannot be written.
     """
     from conevo.controllers.registry import DEFAULT, controller
@@ -144,7 +143,7 @@ class Campaign:
         path: its directory.
 
     Raises:
-        UsageError: there is no campaign at ``path``, or it is damaged.
+        UsageError: ``path`` is not a campaign, or it is damaged.
     """
 
     def __init__(self, path: str | Path) -> None:
@@ -158,10 +157,10 @@ class Campaign:
     def _load(self) -> None:
         self.plan: Plan = read_plan(self.paths.plan)
         self.planned: dict[str, PlannedRun] = planned_runs(self.path)
-        self._shorter: set[str] | None = None  # runs that had not the planned length when found
+        self._shorter: set[str] | None = None  # runs found with another length than planned
 
     def settle(self) -> None:
-        """Put a new plan in place that a killed process has left; the lock is held."""
+        """Put in place a new plan that a killed process has left; the lock is held."""
         settle(self.paths)
         self._load()
 
@@ -187,7 +186,7 @@ class Campaign:
         return self.query(f"SELECT * FROM {table}")
 
     def query(self, sql: str) -> DataFrame:
-        """Return what one SQL query of these tables gives, as a pandas DataFrame.
+        """Return the result of one SQL query of these tables as a pandas DataFrame.
 
         Raises:
             UsageError: not a query, DuckDB's reason for refusing it, or every run is damaged.
@@ -204,7 +203,7 @@ class Campaign:
 
     @property
     def is_running(self) -> bool:
-        """Whether a coordinator is at work on it."""
+        """Whether a coordinator is running."""
         return self._directory.is_in_use
 
     def is_finished(self, label: str) -> bool:
@@ -216,7 +215,7 @@ class Campaign:
         return label not in self._shorter or not self._is_shorter(label)
 
     def _is_shorter(self, label: str) -> bool:
-        """Whether a sealed run has another length than the plan, which was extended meanwhile."""
+        """Whether a sealed run has another length than in the plan, which was extended since."""
         planned, path = self.planned[label], self.paths.run(label)
         if planned.in_stages or not (path / "DONE").is_file():
             return False
@@ -231,11 +230,11 @@ class Campaign:
         )
 
     def standings(self) -> dict[str, Entry]:
-        """Return the state of every run, in the order of the plan; writes nothing.
+        """Return the state of every run, in the order of the plan; write nothing.
 
-        A run is running if its coordinator says so, or if any process holds its lock: a SLURM task
-        or a ``conevo resume``. It has failed if the ledger says so, or if a worker without a
-        coordinator has written that it did.
+        A run is running if a coordinator that is running has started it, or if any process holds
+        its lock: a SLURM task or a ``conevo resume``. It has failed according to the ledger, or to
+        the ``ended`` file of a worker without a coordinator.
         """
         known = {entry.label: entry for entry in self.ledger.entries()}
         is_coordinated = self.is_running
@@ -254,14 +253,14 @@ class Campaign:
         return found
 
     def _ended_alone(self, entry: Entry) -> Entry:
-        """Return what is known of a run whose end no coordinator has seen."""
+        """Return the state of a run that may have ended without a coordinator."""
         ended = read_ended(self.paths.ended(entry.label))
         if ended is None or ended["status"] != "failed":
             return entry
         return dataclasses.replace(entry, state="failed", reason=ended["message"])
 
     def admit_code(self, accept: bool = False) -> None:
-        """Let this conevo carry the campaign on; see ``admission``.
+        """Let this version of conevo continue the campaign; see ``admission``.
 
         Raises:
             UsageError: other code has begun it, and this one is not accepted.
@@ -272,7 +271,7 @@ class Campaign:
         """Ask the coordinator to stop: its workers write their checkpoints and leave.
 
         Raises:
-            UsageError: none is at work.
+            UsageError: none is running.
         """
         if not self.is_running:
             raise UsageError(
@@ -281,10 +280,10 @@ class Campaign:
         replace_file(self.paths.stop, b"")
 
     def retry(self) -> list[str]:
-        """Let every failed run wait again, and return their labels.
+        """Make failed runs pending again, and return their labels.
 
         Raises:
-            UsageError: a coordinator is at work.
+            UsageError: a coordinator is running.
         """
         with self.locked():
             self.settle()
@@ -304,30 +303,30 @@ class Campaign:
         watch: Watch | None = None,
         time_limit: float | TimeLimit | None = None,
     ) -> dict[str, Entry]:
-        """Finish what is missing, and make the tables of all that is finished.
+        """Finish the missing runs, and make the tables of all finished ones.
 
-        A run that fails is written down and does not end the campaign. Cores that no waiting run
-        needs are given to the last ones.
+        A failed run is recorded and does not end the campaign. The last runs get the cores that no
+        pending run needs.
 
         Args:
-            executor: where runs are carried out.
-            threads: CPU threads of a run, at most as many as the executor has cores.
-            devices: for runs in turn, begun or not; the executor must have them. Without any, runs
-                begin on the CPU and go on where they were.
-            watch: called with the campaign and each ending; with None while there is none.
+            executor: of the runs.
+            threads: CPU threads of a run, at most the executor's cores.
+            devices: for runs in turn, begun or not; the executor must have them. By default runs
+                start on the CPU, and continue on their previous device.
+            watch: called with the campaign and each ending, and with None between endings.
             time_limit: seconds after which it stops, as by ``stop``.
 
         Raises:
-            UsageError: a coordinator is at work already, or other code has begun the campaign.
+            UsageError: another coordinator is running, or other code has begun the campaign.
             EnvironmentFailure: compiled kernels or the campaign's files cannot be written.
-            Stopped: by ``stop``, or the time is over; the campaign can be carried on.
+            Stopped: by ``stop``, or the time is over; the campaign can be continued.
         """
         limit = time_limit if isinstance(time_limit, TimeLimit) else TimeLimit(time_limit)
         with self.locked():
             self.settle()
             self.admit_code()
             left = [run for label, run in self.planned.items() if not self.is_finished(label)]
-            with suppress(UsageError):  # of a world: its runs record that
+            with suppress(UsageError):  # of a world: its runs record it
                 _build_worlds(left)
             self.paths.stop.unlink(missing_ok=True)
             self._reconcile()
@@ -344,7 +343,7 @@ class Campaign:
 
     @property
     def is_sealed(self) -> bool:
-        """Whether its tables are those of all that is finished."""
+        """Whether its tables are those of all finished runs."""
         from conevo.campaigns.sealing import is_sealed
 
         return is_sealed(self.paths, self._finished)
@@ -354,7 +353,7 @@ class Campaign:
         return [run for label, run in self.planned.items() if self.is_finished(label)]
 
     def seal(self, into: Path | None = None) -> None:
-        """Make the tables of all that is finished, unless they are those already.
+        """Make the tables of all finished runs, unless they are up to date.
 
         Args:
             into: a folder to make them in, if not the campaign's own.
@@ -366,7 +365,7 @@ class Campaign:
             seal_tables(self.paths, finished, spent, into)
 
     def _reconcile(self) -> None:
-        """Make the ledger say what the directories say."""
+        """Update the ledger from the runs' directories."""
         self.ledger.enrol(self.planned)
         self.ledger.release()
         entries = {entry.label: entry.state for entry in self.ledger.entries()}
@@ -404,7 +403,7 @@ class Campaign:
                 self.ledger.begin(job.label, share, time.time())
                 executor.submit(job)
             if waiting and not at_work:
-                time.sleep(LOOK)  # others carry out what is left
+                time.sleep(LOOK)  # other processes have the runs that are left
             for ending in executor.wait(LOOK) if at_work else ():
                 del at_work[ending.label]
                 if limit.is_over and not (self.paths.ended(ending.label).is_file() or ending.lost):
@@ -426,7 +425,7 @@ class Campaign:
                 watch(self, None)
 
     def _ready(self, waiting: deque[str], most: int) -> deque[str]:
-        """Return runs that nobody carries out; what others have finished waits no more."""
+        """Return runs that no process has; those that others have finished leave the queue."""
         free: deque[str] = deque()
         for label in list(waiting):
             if len(free) == most:
@@ -439,7 +438,7 @@ class Campaign:
         return free
 
     def _settle(self, ending: Ending) -> str:
-        """Write down how a worker ended, and return the state of its run."""
+        """Record how a worker ended, and return the state of its run."""
         label, path = ending.label, self.paths.ended(ending.label)
         attempts = 1 + next(e.attempts for e in self.ledger.entries() if e.label == label)
         if (ended := read_ended(path)) is None:

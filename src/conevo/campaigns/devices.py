@@ -1,7 +1,7 @@
-"""The devices on which a campaign's runs are simulated: which are meant, and which comes next.
+"""The devices that simulate a campaign's runs: their names, and the next one to use.
 
-Results are the same on all, so a run that was begun on one may be carried on with any other. Where
-no device is named, runs begin on the CPU and go on where they were.
+Results are the same on all, so a run that began on one may continue on any other. If no device is
+named, runs start on the CPU, and continue on their previous device.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ def parse_devices(text: str) -> tuple[str, ...]:
     """Return the devices that "cuda:0,cuda:1" names.
 
     Raises:
-        UsageError: one that cannot be, one that is there twice, or CPU and CUDA together: the
-            workers on the CPU would be the last to end.
+        UsageError: an impossible name, a device that is listed twice, or CPU and CUDA together:
+            the workers on the CPU would be the last to end.
     """
     devices = tuple(part.strip() for part in text.split(","))
     for device in devices:
@@ -39,10 +39,10 @@ def parse_devices(text: str) -> tuple[str, ...]:
 
 
 def devices_here(devices: Sequence[str]) -> tuple[str, ...]:
-    """Return the devices that are meant on this machine: for "auto" all its cards, or the CPU.
+    """Return the devices of this machine that are meant: for "auto" all its cards, or the CPU.
 
     Raises:
-        EnvironmentFailure: one is not here.
+        EnvironmentFailure: it does not have one of them.
     """
     if tuple(devices) == (AUTO,):
         return cards_here() or (CPU,)
@@ -50,7 +50,7 @@ def devices_here(devices: Sequence[str]) -> tuple[str, ...]:
 
 
 def next_device(devices: Sequence[str], in_use: Iterable[str | None]) -> str | None:
-    """Return the device with the fewest workers, the first of several; None if there are none."""
+    """Return the device with the fewest workers, ties go to the first; None without devices."""
     workers = Counter(in_use)
     if not devices:
         return None
@@ -58,7 +58,7 @@ def next_device(devices: Sequence[str], in_use: Iterable[str | None]) -> str | N
 
 
 def main() -> None:
-    """End with one line and exit code 3 unless this machine has the device that is named."""
+    """Exit with one line and code 3 unless this machine has the named device."""
     try:
         devices_here(parse_devices(sys.argv[1]))
     except ConevoError as error:

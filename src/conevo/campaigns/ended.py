@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Literal
+from typing import Literal, cast
 
 from typing_extensions import TypedDict
 
@@ -14,7 +14,7 @@ __all__ = ["Ended", "failures", "read_ended"]
 
 
 class Ended(TypedDict):
-    """What a worker wrote, as far as it is read again.
+    """The fields of the file that are read again.
 
     status: whether the run is finished and studied. origin: of a failure: the "machine", the
     "request" or the "program". message: of a failure. core_seconds: of the attempt.
@@ -29,8 +29,8 @@ class Ended(TypedDict):
 def read_ended(path: Path) -> Ended | None:
     """Return how a worker ended; None if it has not written that, or the file is damaged.
 
-    A damaged one is as none: the run's directory shows what there is, and the next worker writes
-    another.
+    A damaged file counts as none: the run's directory has the results, and the next worker writes
+    the file again.
 
     Raises:
         EnvironmentFailure: it cannot be read.
@@ -38,13 +38,13 @@ def read_ended(path: Path) -> Ended | None:
     if not path.is_file():
         return None
     try:
-        return _read(path)
+        return cast("Ended", read_json(path, Ended))
     except DamagedFile:
         return None
 
 
 def failures(folder: Path) -> tuple[dict[str, Ended], dict[str, str]]:
-    """Return the runs of which the last worker failed, and the files that cannot be read.
+    """Return the runs whose last worker failed, and the files that cannot be read.
 
     Args:
         folder: with a file for each run that a worker has left.
@@ -56,20 +56,10 @@ def failures(folder: Path) -> tuple[dict[str, Ended], dict[str, str]]:
     unread: dict[str, str] = {}
     for path in sorted(folder.glob("*.json")):
         try:
-            ended = _read(path)
+            ended = cast("Ended", read_json(path, Ended))
         except ConevoError as error:
             unread[path.name] = str(error)
         else:
             if ended["status"] == "failed":
                 failed[path.stem] = ended
     return failed, unread
-
-
-def _read(path: Path) -> Ended:
-    found = read_json(path, Ended)
-    return Ended(
-        status=found["status"],
-        origin=found["origin"],
-        message=found["message"],
-        core_seconds=found["core_seconds"],
-    )

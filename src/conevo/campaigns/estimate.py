@@ -1,4 +1,4 @@
-"""When a campaign will be finished, judged by the runs that are."""
+"""The time until a campaign is finished, estimated from its finished runs."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ __all__ = ["remaining_seconds"]
 def remaining_seconds(
     campaign: Campaign, entries: Mapping[str, Entry], cores: int, at: float
 ) -> float | None:
-    """Return the seconds until the last run is finished; None if nothing can be said yet.
+    """Return the seconds until the last run is finished; None if that cannot be estimated yet.
 
-    A run is expected to take as many core seconds as the finished ones of its cell, else of its
-    world, else of all; while none is finished, as many as those at work will, by their progress.
+    A run is expected to take the mean core seconds of the finished runs of its cell, else of its
+    world, else of all; while none is finished, of the running ones, judged by their progress.
 
     Args:
-        campaign: whose runs.
-        entries: how they stand.
-        cores: that work on them together.
+        campaign: that the runs are of.
+        entries: their states.
+        cores: that execute them together.
         at: the present time, seconds since 1970.
     """
     planned = campaign.planned
@@ -55,11 +55,11 @@ def remaining_seconds(
 
 
 def _keys(campaign: Campaign, label: str) -> list[tuple[str, ...]]:
-    """Return what a run is like, the closest likeness first."""
+    """Return the groups of similar runs that a run belongs to, the most similar first."""
     run = campaign.planned[label]
     return [(run.world, run.method, run.variant), (run.world.partition("/")[0],), ()]
 
 
 def _passed(entry: Entry, at: float) -> float:
-    """Return the core seconds that an attempt has had."""
+    """Return the core seconds that an attempt has used."""
     return max(at - (entry.began or at), 0.0) * entry.threads

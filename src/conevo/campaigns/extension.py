@@ -1,7 +1,7 @@
-"""Another plan for a campaign that is there: more runs, or longer ones.
+"""Another plan for an existing campaign: more runs, or longer ones.
 
-Runs are extended by their workers, each as ``conevo resume RUN --generations N`` does. The new plan
-takes the place of the old one in one step: ``extension.json`` holds it until both files say so.
+Workers extend their runs, as ``conevo resume RUN --generations N`` does. The new plan replaces the
+old one in one step: ``extension.json`` has it until both files are written.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ __all__ = ["check_plan", "settle", "texts_of", "write_plan"]
 
 
 def texts_of(plan: Plan, runs: Iterable[PlannedRun], directory: Path) -> dict[str, str]:
-    """Return the text of a plan and of its runs, after copying the files that they name.
+    """Return the texts of ``plan.toml`` and ``runs.jsonl``, after copying the files in them.
 
     Args:
         plan, runs: to be written.
         directory: the campaign's.
 
     Returns:
-        Those of ``plan.toml`` and ``runs.jsonl``, as "plan" and "runs".
+        The texts by "plan" and "runs".
     """
     root = directory.resolve()
     names = keep_files([*plan.values, *(value for run in runs for value in run.values)], root)
@@ -54,7 +54,7 @@ def check_plan(campaign: Campaign, runs: Mapping[str, PlannedRun]) -> None:
     """Raise UsageError unless these are the campaign's runs, as long or longer, and perhaps more.
 
     Args:
-        campaign: that is there.
+        campaign: the existing one.
         runs: of the new plan, by label.
     """
     start = f"conevo campaign start {quoted(campaign.path)}"
@@ -81,13 +81,13 @@ def check_plan(campaign: Campaign, runs: Mapping[str, PlannedRun]) -> None:
 
 
 def write_plan(campaign: Campaign, plan: Plan, runs: list[PlannedRun]) -> None:
-    """Put a plan in place of the campaign's, in one step; its lock is held."""
+    """Replace the campaign's plan in one step; its lock is held."""
     replace_file(campaign.paths.extension, as_json(texts_of(plan, runs, campaign.path)))
     settle(campaign.paths)
 
 
 def settle(paths: Paths) -> None:
-    """Carry out what an interrupted ``write_plan`` left to do; the campaign's lock is held."""
+    """Finish an interrupted ``write_plan``; the campaign's lock is held."""
     if paths.extension.is_file():
         extension = read_json(paths.extension)
         replace_file(paths.runs, extension["runs"].encode())
@@ -97,12 +97,12 @@ def settle(paths: Paths) -> None:
 
 
 def _cell(planned: PlannedRun) -> list[object]:
-    """Return all of a run but its seed."""
+    """Return a run's names and settings, without its seed."""
     return [planned.tasks, planned.method, planned.preset, planned.overrides, planned.of_first]
 
 
 def _why_not(old: list[RunConfig], new: list[RunConfig]) -> str:
-    """Return why runs of one cell cannot go on as those of another, "" if they can."""
+    """Return why runs of one cell cannot be continued as those of another, "" if they can."""
     for one, other in zip(old, new, strict=True):
         if one.entry.digest != other.entry.digest:
             file = Path(one.entry.file or other.entry.file).name

@@ -1,4 +1,4 @@
-"""What notebooks show of a campaign: how its runs stand, a bar for each cell."""
+"""A campaign in notebooks: the states of its runs, a bar for each cell."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ FAILURES = 10  # failed runs whose reason is shown
 
 
 def campaign_card(campaign: Campaign) -> str:
-    """Return a row per environment and variant and a column per method: finished runs of all.
+    """Return a table of finished runs: a row per environment and variant, a column per method.
 
     A bar is green for finished runs, orange for the part of running ones that is over, and red for
     failed ones.
@@ -50,7 +50,7 @@ def campaign_card(campaign: Campaign) -> str:
 
 
 def _cell(campaign: Campaign, entries: Sequence[Entry]) -> str:
-    """Return a bar, and what ``cell_text`` says of it."""
+    """Return a bar, and the text of ``cell_text``."""
     text = cell_text(entries)
     if not entries:
         return text

@@ -1,6 +1,6 @@
-"""The files that a plan names, of worlds, methods and prey: copied so that it can be moved.
+"""The files that a plan names, of worlds, methods and prey: copied, so that it can be moved.
 
-On disk they are named from the folder of the plan, in memory by their whole paths.
+On disk their paths are relative to the folder of the plan, in memory they are absolute.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ Rename = Callable[[Any], Any]
 
 
 def located(value: Any, folder: Path) -> Any:
-    """Return a level or setting; if it names a file of a folder, by its whole path.
+    """Return a level or setting; if it names a file of a folder, with its absolute path.
 
-    "FILE.py:NAME", a world or method in a file, always does; another text if there is such a file.
+    "FILE.py:NAME", a world or method in a file, always does; another text if that file exists.
     """
     if not isinstance(value, str):
         return value
@@ -31,13 +31,13 @@ def located(value: Any, folder: Path) -> Any:
 
 
 def shown_as(value: Any) -> str:
-    """Return a level as labels show it: a file without its folder."""
+    """Return a level as in labels: a file without its folder."""
     text = str(value)
     return Path(text).name if Path(text).is_absolute() else text
 
 
 def renamed(value: Any, names: Mapping[str, str]) -> Any:
-    """Return a level or setting with the file in it named otherwise."""
+    """Return a level or setting with the file in it renamed."""
     if not isinstance(value, str):
         return value
     file, colon, environment = value.rpartition(":")
@@ -50,11 +50,11 @@ def keep_files(values: Iterable[Any], directory: Path) -> dict[str, str]:
     """Copy the files that are named into ``inputs/`` of a campaign.
 
     Args:
-        values: levels and settings; files by their whole paths.
+        values: levels and settings; files by their absolute paths.
         directory: the campaign's.
 
     Returns:
-        The name of each file from that directory, by its whole path.
+        Absolute path of each file -> path of its copy from that directory.
 
     Raises:
         UsageError: two files of one name.

@@ -1,7 +1,7 @@
-"""What the coordinator of a campaign knows of every run: SQLite, one writer.
+"""The ledger of a campaign, the state of every run: SQLite, one writer.
 
 Only the process that holds the campaign's lock writes here; others read. The runs' directories are
-the truth: a ledger that is lost is made again from them.
+the truth: a lost ledger is rebuilt from them.
 """
 
 from __future__ import annotations
@@ -37,16 +37,16 @@ CREATE TABLE IF NOT EXISTS events (
 
 @dataclass(frozen=True)
 class Entry:
-    """A run as the ledger has it.
+    """A run in the ledger.
 
     Attributes:
         label: of the run.
         state: one of ``STATES``.
-        attempts: how often it ended by itself or was lost.
-        reason: why it failed last, "" if it never did.
+        attempts: that ended by themselves or were lost.
+        reason: of the last failure, "" if there was none.
         threads: of the last attempt.
-        began: when the last attempt began, seconds since 1970; None before.
-        core_seconds: spent by all attempts that ended by themselves.
+        began: start of the last attempt, seconds since 1970; None before the first.
+        core_seconds: used by all attempts that ended by themselves.
     """
 
     label: str
@@ -69,7 +69,7 @@ class Ledger:
         self.path = path
 
     def enrol(self, labels: Iterable[str]) -> None:
-        """Add runs that are not in it, in the order of the plan."""
+        """Add the runs that are missing, in the order of the plan."""
         with self._writing() as db:
             db.executemany(
                 "INSERT INTO runs (label, place) VALUES (?, ?) "
@@ -78,7 +78,7 @@ class Ledger:
             )
 
     def entries(self) -> list[Entry]:
-        """Return all runs in the order of the plan; none if nothing was written yet."""
+        """Return all runs in the order of the plan; none if the file does not exist yet."""
         if not self.path.is_file():
             return []
         query = (
@@ -89,7 +89,7 @@ class Ledger:
             return [Entry(*row) for row in db.execute(query)]
 
     def begin(self, label: str, threads: int, at: float) -> None:
-        """Say that a worker has begun."""
+        """Record that a worker has started."""
         with self._writing() as db:
             db.execute(
                 "UPDATE runs SET state = 'running', threads = ?, began = ? WHERE label = ?",
@@ -98,7 +98,7 @@ class Ledger:
             _note(db, label, "begun", "")
 
     def end(self, label: str, state: str, reason: str = "", core_seconds: float = 0.0) -> None:
-        """Say how a worker ended: "finished", "failed" or, to be tried again, "pending"."""
+        """Record how a worker ended: "finished", "failed" or, to be tried again, "pending"."""
         with self._writing() as db:
             db.execute(
                 "UPDATE runs SET state = ?, reason = ?, attempts = attempts + 1, "
@@ -108,7 +108,7 @@ class Ledger:
             _note(db, label, state, reason)
 
     def put(self, labels: Iterable[str], state: str, why: str) -> None:
-        """Set the state of runs that no worker is at; those that are made to wait start afresh."""
+        """Set the state of runs without a worker; "pending" resets their attempts."""
         with self._writing() as db:
             for label in labels:
                 reset = ", attempts = 0, reason = ''" if state == "pending" else ""
@@ -116,7 +116,7 @@ class Ledger:
                 _note(db, label, state, why)
 
     def release(self) -> None:
-        """Let runs that are said to be running wait: their coordinator has gone."""
+        """Make running runs pending: their coordinator has left."""
         with self._writing() as db:
             for (label,) in db.execute("SELECT label FROM runs WHERE state = 'running'").fetchall():
                 _note(db, label, "pending", "the coordinator left")
@@ -130,7 +130,7 @@ class Ledger:
 
     @contextmanager
     def _reading(self) -> Iterator[sqlite3.Connection]:
-        # What a killed writer left half-written is undone first, which a reader may not do.
+        # A transaction of a killed writer is undone first, which a reader may not do.
         is_torn = self.path.with_name(f"{self.path.name}-journal").exists()
         with self._open("rw" if is_torn else "ro") as db:
             yield db

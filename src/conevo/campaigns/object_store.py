@@ -1,9 +1,9 @@
 """Runs copied to and from an object store, for machines that share no file system.
 
-An object store has neither locks nor renaming, and copying may break off between any two files. So
-a run's files are stored in an order that leaves a run to resume after each of them: checkpoints
-after what they are about, seals last. They are read the other way round, since the run may be at
-work meanwhile: what is newer than its checkpoint is written again when a run is resumed.
+An object store has neither locks nor renaming, and copying may stop between any two files. So a
+run's files are stored in an order that leaves a run to resume after each of them: checkpoints after
+the files that they refer to, seals last. They are read in the opposite order, since the run may be
+running meanwhile: a resumed run writes again what is newer than its checkpoint.
 """
 
 from __future__ import annotations
@@ -27,16 +27,16 @@ __all__ = ["ObjectStore"]
 
 
 class ObjectStore:
-    """Where the files of one campaign are kept, named as in its directory.
+    """The store of one campaign's files, under their names in its directory.
 
     Args:
-        uri: "s3://BUCKET/PATH", "gs://BUCKET/PATH", "file:///PATH": whatever pyarrow.fs knows.
+        uri: "s3://BUCKET/PATH", "gs://BUCKET/PATH", "file:///PATH" or others that pyarrow.fs knows.
 
     Raises:
         UsageError: pyarrow is not installed, or does not know the address.
 
-    All methods raise EnvironmentFailure if the store cannot be reached or refuses. Messages show an
-    address without the password and the options that it may have.
+    All methods raise EnvironmentFailure if the store cannot be reached or refuses. Messages show
+    the address without its password and options.
     """
 
     def __init__(self, uri: str) -> None:
@@ -55,7 +55,7 @@ class ObjectStore:
             raise UsageError(f"object store {uri!r}: it has no bucket")
 
     def put_plan(self, root: Path) -> None:
-        """Store what a worker reads of a plan: its runs, its inputs, and who may carry it on."""
+        """Store the files of a plan that a worker reads: its runs, its inputs, and its codes."""
         paths = Paths(root)
         inputs = sorted((root / INPUTS).glob("*"))
         for path in (paths.runs, paths.code, *inputs):
@@ -63,7 +63,7 @@ class ObjectStore:
                 self._put(root, path, path.read_bytes())
 
     def get_plan(self, root: Path) -> None:
-        """Write that into a directory."""
+        """Write these files into a directory."""
         paths = Paths(root)
         self._get(root, paths.runs)
         for name in self._names(INPUTS):
@@ -72,7 +72,7 @@ class ObjectStore:
             self._get(root, paths.code)
 
     def put_run(self, root: Path, label: str) -> None:
-        """Store a run as it stands, at work or not, its studies and how it ended."""
+        """Store a run, running or not, its studies, its log and how it ended."""
         run = Paths(root).run(label)
         contents: dict[Path, bytes] = {}
         for path in sorted(_results(run), key=lambda path: (_rank(path), path)):
@@ -82,7 +82,7 @@ class ObjectStore:
                 continue
         seal = run / "DONE"
         if self._has(root, seal) and self._read(f"runs/{label}/DONE") != contents.get(seal):
-            self._delete(f"runs/{label}/DONE")  # the run has another length since
+            self._delete(f"runs/{label}/DONE")  # the run has another length now
         for path in reversed(contents):
             self._put(root, path, contents[path])
         there = {path.relative_to(run).as_posix() for path in contents}
@@ -95,7 +95,7 @@ class ObjectStore:
                 self._delete(path.relative_to(root).as_posix())
 
     def get_run(self, root: Path, label: str) -> None:
-        """Put what is stored of a run into a directory, in place of what is there."""
+        """Replace a run in a directory by the stored one."""
         run = Paths(root).run(label)
         if names := self._names(f"runs/{label}"):
             shutil.rmtree(run, ignore_errors=True)
@@ -109,11 +109,11 @@ class ObjectStore:
                 self._get(root, path)
 
     def has_run(self, label: str) -> bool:
-        """Whether anything of a run was stored."""
+        """Whether any file of a run is stored."""
         return bool(self._names(f"runs/{label}"))
 
     def forget_ending(self, root: Path, label: str) -> None:
-        """Remove how a run ended last, since it is tried again."""
+        """Remove the record of a run's last end, since it is tried again."""
         path = Paths(root).ended(label)
         if self._has(root, path):
             self._delete(path.relative_to(root).as_posix())
@@ -176,14 +176,14 @@ def _results(run: Path) -> list[Path]:
 
 
 def _rank(path: Path) -> int:
-    """Return when a file is to be read, lowest first, and written, lowest last."""
+    """Return the rank of a file, which is read in ascending order, and written in descending."""
     if path.name == "DONE":
         return 0
     return 1 if path.name.startswith("checkpoint-") else 2
 
 
 def _beside(root: Path, label: str) -> list[Path]:
-    """Return where a run's studies, its log and how it ended may be, in this order."""
+    """Return the paths of a run's studies, its log and its last end, in this order."""
     paths = Paths(root)
     names = planned_runs(root)[label].names
     studies = [paths.study(name, kind) for name in names for kind in STUDIES]

@@ -1,4 +1,4 @@
-"""Where the files of a campaign are; see ``campaign`` for what is in them."""
+"""Paths of the files of a campaign; ``campaign`` describes their contents."""
 
 from __future__ import annotations
 
@@ -28,27 +28,27 @@ class Paths:
 
     @property
     def code(self) -> Path:
-        """Which code may carry the campaign on."""
+        """The versions of the code that may continue the campaign."""
         return self.root / "code.json"
 
     @property
     def extension(self) -> Path:
-        """Another plan, while it takes the place of the old one."""
+        """Another plan, while it replaces the old one."""
         return self.root / "extension.json"
 
     @property
     def ledger(self) -> Path:
-        """What the coordinator knows of every run."""
+        """The state of every run, as the coordinator knows it."""
         return self.root / "ledger.sqlite"
 
     @property
     def stop(self) -> Path:
-        """Tells the coordinator to stop; it removes it."""
+        """Makes the coordinator stop, which removes it."""
         return self.root / "STOP"
 
     @property
     def tables(self) -> Path:
-        """Parquet files for questions and reports."""
+        """Parquet files for queries and reports."""
         return self.root / "tables"
 
     @property
@@ -61,7 +61,7 @@ class Paths:
         return self.root / "runs" / name
 
     def study(self, name: str, kind: str = "teams") -> Path:
-        """A study of a run or stage: "teams" is what its fittest team does."""
+        """A study of a run or stage: "teams" is that of its fittest team."""
         folder = self.root / "studies" if kind == "teams" else self.root / "studies" / kind
         return folder / f"{name.replace('/', '-')}.json"
 
@@ -70,5 +70,5 @@ class Paths:
         return self.root / "ended" / f"{label}.json"
 
     def log(self, label: str) -> Path:
-        """What the workers of a run said."""
+        """Output of a run's workers."""
         return self.root / "logs" / f"{label}.txt"

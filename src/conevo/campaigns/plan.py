@@ -1,7 +1,7 @@
-"""What a campaign is: factors, levels and seeds, written out as a list of runs.
+"""A campaign's plan: factors, levels and seeds, written out as a list of runs.
 
 Every combination of the levels of its factors is a cell, and every cell is run with every seed.
-``plan_file`` says how a plan is written down.
+``plan_file`` reads plans from files.
 """
 
 from __future__ import annotations
@@ -23,17 +23,20 @@ from conevo.errors import UsageError, unknown_name
 from conevo.evolution.inheritance import refuse_idle
 from conevo.evolution.methods.registry import MethodEntry, name_in
 from conevo.evolution.methods.registry import resolve as resolve_method
-from conevo.runs.config import IN_FILES, RunConfig
+from conevo.runs.config import RunConfig
 from conevo.runs.first import FIRST, SHARE, resolve_stages, take_first, without_method
 from conevo.runs.layers import PRESETS
 from conevo.runs.shaping import tasks_up_to
 from conevo.worlds.registry import WorldEntry
 from conevo.worlds.registry import resolve as resolve_world
 
-__all__ = ["MOST_SEEDS", "Plan", "PlannedRun", "Where", "levels_of"]
+__all__ = ["EFFECTS", "HEAD", "MOST_SEEDS", "Plan", "PlannedRun", "Where", "levels_of"]
 
 MOST_RUNS = 100_000
 MOST_SEEDS = 10_000
+HEAD = ("name", "title", "produces", "seeds", "preset", "shape", "studies")
+EFFECTS = ("shape", "settings", "factors")
+NAMING = ("world", "method", "overrides", "of_first")  # parts of a run that may name files
 
 
 def levels_of(variant: str) -> dict[str, str]:
@@ -47,14 +50,15 @@ class PlannedRun:
     """One run of a campaign, or one shaping.
 
     Attributes:
-        label: its name in the campaign, and of its directory.
+        label: its name in the campaign, and the name of its directory.
         world: address of the world and environment; of a shaping the last environment.
         method: address of the method.
         preset, seed: as for any run.
         variant: levels of all factors but world and method, "gst=0.1"; empty if there are none.
-        overrides: settings over those of the preset, ``first`` and ``first_share`` among them.
+        overrides: settings that replace those of the preset, ``first`` and ``first_share`` among
+            them.
         shape: whether the environments before this one are learned first.
-        studies: what is made of it when it is finished.
+        studies: made when the run is finished.
         run_ids: of the run, or of every stage.
         of_first: settings of the first stage, if another method evolves it (``runs.first``).
     """
@@ -74,16 +78,12 @@ class PlannedRun:
     @property
     def values(self) -> list[Any]:
         """Its world, its method and its settings."""
-        return [self.world, self.method, *self.overrides.values(), *self.of_first.values()]
+        return _values_in([getattr(self, part) for part in NAMING])
 
     def mapped(self, change: Callable[[Any], Any]) -> PlannedRun:
         """Return the run with its world, its method and its settings changed."""
-        overrides, of_first = (
-            {key: change(value) for key, value in settings.items()}
-            for settings in (self.overrides, self.of_first)
-        )
-        names = {"world": change(self.world), "method": change(self.method)}
-        return dataclasses.replace(self, **names, overrides=overrides, of_first=of_first)
+        parts = {part: _changed(getattr(self, part), change) for part in NAMING}
+        return dataclasses.replace(self, **parts)
 
     @property
     def in_stages(self) -> bool:
@@ -92,9 +92,9 @@ class PlannedRun:
 
     @property
     def courses(self) -> dict[str, list[str]]:
-        """What tables call the run, or every stage, each with its directories in order.
+        """The name in tables of the run, or of every stage, each with its directories in order.
 
-        Two stages of one task, of which another method evolves the first, are one run there.
+        Two stages of one task, the first evolved by another method, are one run in tables.
         """
         if not self.in_stages:
             return {self.label: [self.label]}
@@ -103,7 +103,7 @@ class PlannedRun:
 
     @property
     def names(self) -> list[str]:
-        """What tables call the run, or every stage."""
+        """The name in tables of the run, or of every stage."""
         return list(self.courses)
 
     @property
@@ -115,7 +115,7 @@ class PlannedRun:
         """Return the configuration of the run, or of every stage.
 
         Raises:
-            UsageError: they are not what they were when the plan was written out.
+            UsageError: they differ from those of the time when the plan was written out.
         """
         place = "in the campaign's plan"
         found = resolve_stages(
@@ -140,9 +140,9 @@ class Where:
     """Settings of some runs.
 
     Attributes:
-        conditions: "world", "method" or "preset" -> the names for which it holds.
+        conditions: "world", "method" or "preset" -> the names to which it applies.
         settings: key -> value.
-        shape: whether they are shapings; None leaves it.
+        shape: whether they are shapings; None: as in the rest of the plan.
         factors: name -> levels, of these runs only.
     """
 
@@ -151,8 +151,8 @@ class Where:
     shape: bool | None = None
     factors: dict[str, tuple[Any, ...]] = field(default_factory=dict)
 
-    def holds(self, names: Mapping[str, str]) -> bool:
-        """Whether a run with these names is meant."""
+    def applies(self, names: Mapping[str, str]) -> bool:
+        """Whether it applies to a run with these names."""
         return all(names[key] in allowed for key, allowed in self.conditions.items())
 
 
@@ -163,13 +163,13 @@ class Plan:
     Attributes:
         name: of the campaign.
         title: one line for people.
-        produces: tables and figures of the thesis that it is the data of.
+        produces: tables and figures of the thesis that are made from its data.
         seeds: of every cell.
         preset: scale of every run.
-        shape: whether runs are shapings, unless ``where`` says otherwise.
-        studies: what is made of finished runs.
+        shape: whether runs are shapings, unless ``where`` states otherwise.
+        studies: made of finished runs.
         factors: name -> levels; "world" and "method" are among them.
-        levels: name of a factor -> name of a level -> its settings, where a level is several.
+        levels: name of a factor -> name of a level -> its settings, if a level has several.
         settings: of all runs.
         where: of some runs.
         place: where the plan was read, for error messages.
@@ -218,21 +218,21 @@ class Plan:
         return len(self._cells()) * len(self.seeds)
 
     def _cells(self) -> list[dict[str, Any]]:
-        """Return every combination of levels, those of some runs' own factors among them."""
+        """Return every combination of levels, with those of factors that only some runs have."""
         found: list[dict[str, Any]] = []
         self._refuse_many(self.factors)
         for levels in _combinations(self.factors):
             names = {"world": levels["world"], "method": levels["method"], "preset": self.preset}
             own: dict[str, tuple[Any, ...]] = {}
             for one in self.where:
-                own |= one.factors if one.holds(names) else {}
+                own |= one.factors if one.applies(names) else {}
             self._refuse_many(own)
             found += [levels | more for more in _combinations(own)]
             self._refuse_many({"": tuple(found)})
         return found
 
     def _refuse_many(self, factors: Mapping[str, tuple[Any, ...]]) -> None:
-        """Raise UsageError before more runs are written out than a campaign may have."""
+        """Raise UsageError if a plan has more runs than a campaign may have."""
         n = math.prod(map(len, factors.values())) * len(self.seeds)
         if n > MOST_RUNS:
             raise UsageError(f"{n:,} runs {self.place}: a campaign has {MOST_RUNS:,} at most")
@@ -254,7 +254,7 @@ class Plan:
         return runs
 
     def _refuse_namesakes(self, kind: str, entries: Iterable[WorldEntry | MethodEntry]) -> None:
-        """Refuse two worlds or methods that are named alike: results go by the name."""
+        """Refuse two worlds or methods of one name: results are identified by it."""
         files: dict[str, str] = {}
         for entry in entries:
             other = files.setdefault(entry.name, entry.file)
@@ -271,7 +271,7 @@ class Plan:
         names = {"world": world, "method": method, "preset": self.preset}
         shape = self.shape
         for one in self.where:
-            shape = one.shape if one.shape is not None and one.holds(names) else shape
+            shape = one.shape if one.shape is not None and one.applies(names) else shape
         overrides = self._settings_of(names, further)
         own, first = take_first(overrides, self.place)
         of_first: dict[str, Any] = {}
@@ -321,12 +321,12 @@ class Plan:
         Args:
             names: world, method and preset.
             further: factor -> level.
-            other: parameters of the method that levels are of, if it is not the one that is named:
-                what they set of it is left out.
+            other: parameters of the runs' own method, if ``names`` has another one: what levels
+                set of them is left out.
         """
         found = dict(self.settings)
         for one in self.where:
-            found |= one.settings if one.holds(names) else {}
+            found |= one.settings if one.applies(names) else {}
         for factor, level in further.items():
             settings = self.levels[factor][level] if factor in self.levels else {factor: level}
             found |= settings if other is None else without_method(settings, other)
@@ -334,68 +334,49 @@ class Plan:
 
     @property
     def values(self) -> list[Any]:
-        """All levels, settings, and worlds and methods that conditions name."""
-        tables = [self.factors, *(one.factors for one in self.where)]
-        found = [level for table in tables for levels in table.values() for level in levels]
-        conditions = [one.conditions.get(key, ()) for one in self.where for key in IN_FILES]
-        found += [name for names in conditions for name in names]
-        named = [settings for some in self.levels.values() for settings in some.values()]
-        for table in (self.settings, *named, *(one.settings for one in self.where)):
-            found += table.values()
-        return found
+        """All levels and settings, and the names in conditions."""
+        some = [vars(one) for one in self.where]
+        return _values_in([self.factors, self.settings, self.levels, some])
 
     def mapped(self, change: Callable[[Any], Any]) -> Plan:
-        """Return the plan with all levels, settings and worlds of conditions changed."""
-
-        def of(table: Mapping[str, Any]) -> dict[str, Any]:
-            return {key: change(value) for key, value in table.items()}
-
-        def each(table: Mapping[str, tuple[Any, ...]]) -> dict[str, tuple[Any, ...]]:
-            return {key: tuple(map(change, values)) for key, values in table.items()}
-
-        where = tuple(
-            dataclasses.replace(
-                one,
-                conditions=each(one.conditions),
-                settings=of(one.settings),
-                factors=each(one.factors),
-            )
-            for one in self.where
-        )
-        levels = {
-            factor: {name: of(settings) for name, settings in some.items()}
-            for factor, some in self.levels.items()
+        """Return the plan with all levels, settings and names in conditions changed."""
+        parts = {
+            part: _changed(getattr(self, part), change)
+            for part in ("factors", "levels", "settings")
         }
-        factors, settings = each(self.factors), of(self.settings)
-        return dataclasses.replace(
-            self, factors=factors, levels=levels, settings=settings, where=where
-        )
+        where = tuple(Where(**_changed(vars(one), change)) for one in self.where)
+        return dataclasses.replace(self, **parts, where=where)
 
     def to_toml(self) -> str:
         """Return the text that ``read_plan`` turns back into this plan."""
-        head = {
-            "name": self.name,
-            "title": self.title,
-            "produces": list(self.produces),
-            "seeds": list(self.seeds),
-            "preset": self.preset,
-            "shape": self.shape,
-            "studies": list(self.studies),
-        }
         where = [
-            {key: list(allowed) for key, allowed in one.conditions.items()}
-            | ({} if one.shape is None else {"shape": one.shape})
-            | {"settings": one.settings}
-            | ({"factors": {k: list(v) for k, v in one.factors.items()}} if one.factors else {})
+            one.conditions
+            | {k: v for k, v in vars(one).items() if k in EFFECTS and v not in (None, {})}
             for one in self.where
         ]
         tables = {
-            "campaign": head,
-            "factors": {name: list(levels) for name, levels in self.factors.items()},
+            "campaign": {key: getattr(self, key) for key in HEAD},
+            "factors": self.factors,
             "settings": self.settings,
         }
-        levels = {"levels": self.levels} if self.levels else {}
-        return tomli_w.dumps(tables | levels | ({"where": where} if where else {}))
+        more = {"levels": self.levels, "where": where}
+        return tomli_w.dumps(tables | {key: part for key, part in more.items() if part})
+
+
+def _changed(part: Any, change: Callable[[Any], Any]) -> Any:
+    """Return nested tables and lists with all values in them changed."""
+    if isinstance(part, dict):
+        return {key: _changed(value, change) for key, value in part.items()}
+    if isinstance(part, list | tuple):
+        return type(part)(_changed(value, change) for value in part)
+    return change(part)
+
+
+def _values_in(part: Any) -> list[Any]:
+    """Return all values in nested tables and lists."""
+    found: list[Any] = []
+    _changed(part, found.append)
+    return found
 
 
 def _levels(cells: Iterable[Mapping[str, Any]], factor: str) -> list[str]:

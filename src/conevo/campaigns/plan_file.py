@@ -9,7 +9,7 @@ run with every seed::
     seeds = 20                     # 1 to 20; or a list of seeds
     preset = "desk"                # scale; the command line wins
     shape = false                  # true: every run learns the environments 1 to N in stages
-    studies = ["teams"]            # made of every finished run; "signal" is another, [] for none
+    studies = ["teams"]            # made of every finished run; also "signal"; [] for none
 
     [factors]
     world = ["rover/complex-1..10"]
@@ -19,7 +19,7 @@ run with every seed::
     [settings]                     # of all runs, over those of the preset
     "run.budget_evaluations" = 20000
 
-    [[where]]                      # of the runs that all conditions hold for; later ones win
+    [[where]]                      # of the runs that meet all conditions; later ones win
     method = ["ccga", "mesp", "cone"]
     preset = "desk"
     settings = { "method.n_elitist" = 5 }
@@ -30,7 +30,7 @@ run with every seed::
     factors = { "method.gst" = [0.1, 0.2], ranges = ["small", "large"] }
 
     [[where]]                      # two stages of one task, the first of another method; they share
-    method = ["ccga"]              # the run's budget: half each, unless first_share says otherwise
+    method = ["ccga"]              # the run's budget: half each by default, else see first_share
     factors = { first = ["none", "homcne"] }   # as every factor, it may also be a setting
 
     [levels.ranges]                # a factor whose levels are several settings
@@ -47,7 +47,7 @@ from pathlib import Path
 from typing import Any
 
 from conevo.campaigns.inputs import located
-from conevo.campaigns.plan import MOST_SEEDS, Plan, Where
+from conevo.campaigns.plan import EFFECTS, HEAD, MOST_SEEDS, Plan, Where
 from conevo.errors import UsageError, shown, unknown_name
 from conevo.evolution.methods.registry import METHODS
 from conevo.reading import parse_toml, read_toml
@@ -59,9 +59,7 @@ __all__ = ["STUDIES", "preset_names", "read_plan", "read_preset"]
 
 STUDIES = ("teams", "signal")
 TABLES = ("campaign", "factors", "levels", "settings", "where")
-HEAD = ("name", "title", "produces", "seeds", "preset", "shape", "studies")
 CONDITIONS = ("world", "method", "preset")
-EFFECTS = ("settings", "shape", "factors")
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
 RANGE = re.compile(r"(.*-)(\d+)\.\.(\d+)")
 
@@ -78,7 +76,7 @@ def read_preset(name: str) -> Plan:
     """Return a plan that comes with conevo.
 
     Raises:
-        UsageError: there is none of this name.
+        UsageError: none has this name.
     """
     if name not in preset_names():
         raise unknown_name("campaign", name, preset_names())
@@ -88,12 +86,12 @@ def read_preset(name: str) -> Plan:
 
 
 def read_plan(path: Path) -> Plan:
-    """Return the plan in a file; its name is the file's unless it says another.
+    """Return the plan in a file; its name is the file's by default.
 
-    Files that it names, of worlds, methods and prey, are taken from its folder.
+    Names of files, of worlds, methods and prey, are relative to its folder.
 
     Raises:
-        UsageError: it is no plan; the message names the key and what is allowed.
+        UsageError: it is not a plan; the message names the key and what is allowed.
         EnvironmentFailure: it cannot be read.
     """
     plan = _parse(read_toml(path), f"in {path}", path.stem)
@@ -202,18 +200,18 @@ def _factors(table: Mapping[str, Any], key: str, place: str) -> dict[str, tuple[
 def _levels(
     tables: Mapping[str, Any], factors: Iterable[Mapping[str, tuple[Any, ...]]], place: str
 ) -> dict[str, dict[str, dict[str, Any]]]:
-    """Return the settings of named levels, of factors that there are."""
+    """Return the settings of named levels: factor -> level -> settings."""
     used = [(name, level) for table in factors for name in table for level in table[name]]
     found: dict[str, dict[str, dict[str, Any]]] = {}
     for factor in _table(tables, "levels", place):
         key = f"levels.{factor}"
         if factor in ("world", "method") or not NAME.fullmatch(factor) or "." in factor:
             raise UsageError(
-                f"{key} {place}: a factor with named levels has a name of its own, of letters, "
+                f"{key} {place}: a factor with named levels needs its own name, of letters, "
                 f"digits, _ and -"
             )
         if factor not in [name for name, _ in used]:
-            raise UsageError(f"{key} {place}: there is no factor {factor!r}")
+            raise UsageError(f"{key} {place}: the plan has no factor {factor!r}")
         named = found[factor] = {}
         for level in _table(tables["levels"], factor, place, key):
             if not NAME.fullmatch(level):
@@ -234,7 +232,7 @@ def _expand(names: Iterable[str]) -> list[str]:
             if max(len(first), len(last)) > 3:
                 raise UsageError(f"{shown(name)}: the numbers of a range have three digits at most")
             if int(first) > int(last):
-                raise UsageError(f"{shown(name)}: a range begins with its smaller number")
+                raise UsageError(f"{shown(name)}: a range starts with its smaller number")
             found += [f"{stem}{k}" for k in range(int(first), int(last) + 1)]
         else:
             found.append(name)
@@ -254,9 +252,9 @@ def _where(table: Any, of_all: Mapping[str, Any], firsts: Sequence[str], place: 
     """Return one [[where]].
 
     Args:
-        table: as it is written.
+        table: as written.
         of_all: the factors of all runs, which it may not repeat.
-        firsts: methods of first stages, which conditions may name as well.
+        firsts: methods of first stages, which conditions may name, too.
         place: where it is, for messages.
     """
     if not isinstance(table, dict):
@@ -275,7 +273,7 @@ def _where(table: Any, of_all: Mapping[str, Any], firsts: Sequence[str], place: 
                 raise unknown_name(f"where.{key}", name, known, place)
     for name in conditions.get("world", ()):
         if name not in of_all["world"] and ".py" not in name:
-            resolve_world(name)  # a condition on a world that does not exist never holds
+            resolve_world(name)  # a condition on a world that does not exist is a mistake
     for key in ("world", "method"):
         names = conditions.get(key)
         planned = [*of_all[key], *(firsts if key == "method" else ())]

@@ -1,8 +1,8 @@
-"""How far a run of a campaign is, by its files alone, whoever carries it out and wherever.
+"""The progress of a campaign's runs, from their files alone, whichever process executes them.
 
 A coordinator knows its own workers only. A SLURM task or a ``conevo resume`` holds the lock of the
-run's directory, and every worker writes a line per generation. On network file systems that do not
-pass locks on to other machines, the time of the last line is all that can be known of theirs.
+run's directory, and every worker writes a line per generation. Some network file systems do not
+pass locks on to other machines; then the time of the last line is the only sign of life.
 """
 
 from __future__ import annotations
@@ -32,15 +32,15 @@ __all__ = ["RunProgress", "cell_text", "cells", "is_held", "last_written", "prog
 
 @dataclass(frozen=True)
 class RunProgress:
-    """How far a run or a shaping is.
+    """The progress of a run or a shaping.
 
     Attributes:
-        generations: done, of all stages.
+        generations: finished, of all stages.
         of: planned generations of all stages, 0 if that cannot be read.
         evaluations: of teams so far.
         budget: of team evaluations, 0 if there is none.
         share: of the run that is over, of its generations or of its budget, in [0, 1].
-        written: when its last generation was written, seconds since 1970; None if none was.
+        written: time of its last generation, seconds since 1970; None if there is none.
     """
 
     generations: int
@@ -64,7 +64,7 @@ def cells(
 
 
 def cell_text(entries: Sequence[Entry]) -> str:
-    """Return "3/6", with what is running ("+1") and what has failed ("!1")."""
+    """Return "3/6" for the finished runs, with running ("+1") and failed ones ("!1")."""
     if not entries:
         return "-"
     found = Counter(entry.state for entry in entries)
@@ -74,14 +74,14 @@ def cell_text(entries: Sequence[Entry]) -> str:
 
 
 def is_held(paths: Paths, label: str) -> bool:
-    """Whether a process that this machine knows of holds a run."""
+    """Whether a process, as far as this machine knows, holds a run."""
     return locks.is_held(paths.run(label) / LOCK)
 
 
 def last_written(paths: Paths, label: str) -> float | None:
     """Return when the log of a run, or of a shaping's newest stage, was last written.
 
-    Seconds since 1970, by the clock of the machine that wrote it; None if nothing was.
+    In seconds since 1970, by the clock of the machine that wrote it; None without a log.
     """
     run = paths.run(label)
     found: list[float] = []
@@ -93,7 +93,7 @@ def last_written(paths: Paths, label: str) -> float | None:
 
 
 def progress_of(paths: Paths, planned: PlannedRun) -> RunProgress:
-    """Return how far a run is; what is missing or damaged counts as not done."""
+    """Return the progress of a run; missing or damaged files count as no progress."""
     outlines = _outlines(paths.run(planned.label), planned.in_stages)
     done: list[Done] = []
     written: list[float] = []
@@ -115,7 +115,7 @@ def progress_of(paths: Paths, planned: PlannedRun) -> RunProgress:
 
 
 def _outlines(path: Path, in_stages: bool) -> list[Outline]:
-    """Return what a run, or each stage, is planned to be; none if that cannot be read."""
+    """Return the outline of a run, or of each stage; none if that cannot be read."""
     try:
         tables = read_toml(path / (SHAPING if in_stages else CONFIG))
         return [outline_of(stage) for stage in (tables["stages"] if in_stages else [tables])]
@@ -124,7 +124,7 @@ def _outlines(path: Path, in_stages: bool) -> list[Outline]:
 
 
 def _last_generation(path: Path) -> tuple[int, int, float | None]:
-    """Return how many generations a log has, their evaluations, and when it was written."""
+    """Return a log's number of generations, their evaluations, and when it was written."""
     try:
         line = read_last_line(path)
         if not line:

@@ -1,4 +1,4 @@
-"""The tables of a campaign: their columns, for who writes them and for who asks."""
+"""The tables of a campaign: their columns, for writers and readers."""
 
 import re
 
@@ -51,17 +51,16 @@ SCHEMA: dict[str, dict[str, str]] = {
 }
 """Columns of each table and their DuckDB types, as written to and read from NAME.parquet.
 
-``runs``: one row for each run or stage of a shaping. Two stages of one task, of which another
-method evolves the first, are one run: generations, evaluations and team_steps are counted through
-both, here and in ``generations``; method and champion are the second's, generation 0 is the
-first's. title is the method's name as published; planned_evaluations is the budget of team
-evaluations that a run was given, NULL without one; evaluations is what it spent; exchanges is the
-number of pairs of sub-populations that recombined between populations, in the mean of the
-generations, exchange_share that of the pairs that could have; both are NULL for methods that never
-do. ``robots``: specialization is S, independent the S of independent draws from the robot's shares,
-relative S over that; a share is 1 if it is always the same; columns from favourite_setting on are
-NULL of studies that earlier versions made. ``signal``: as ``studies.signal.signal_of_run`` has it;
-icc is of one trial, scheme is the number of trials that the method gives each genotype; NULL where
-all fitness was the same. ``measures``: the world's, as it declares them; of one that is not listed
-larger is better.
+``runs``: one row for each run or stage of a shaping. Two stages of one task, the first evolved by
+another method, are one run: generations, evaluations and team_steps are counted through both, here
+and in ``generations``; method and champion are the second's, generation 0 is the first's. title is
+the method's name as published; planned_evaluations is a run's budget of team evaluations, NULL
+without one; evaluations is the number it spent; exchanges is the number of pairs of sub-populations
+that recombined between populations, the mean over generations; exchange_share is its share of the
+pairs that could have; both are NULL for methods that never do. ``robots``: specialization is S,
+independent the S of independent draws from the robot's shares, relative S over that; a share is 1
+if it is always the same; columns from favourite_setting on are NULL in studies of earlier versions.
+``signal``: see ``studies.signal.signal_of_run``; icc is of one trial, scheme is the number of
+trials that the method gives each genotype; NULL where all fitness was the same. ``measures``: the
+world's, as it declares them; for one that is not listed, larger is better.
 """

@@ -1,7 +1,7 @@
-"""The tables that reports read: everything that is finished, as Parquet.
+"""The tables that reports read: all finished runs, as Parquet.
 
 One row per run, score, generation and so on, made by DuckDB from the files of the runs and their
-studies; their columns are ``campaigns.schema.SCHEMA``. All are made anew when more is finished.
+studies. Their columns are ``campaigns.schema.SCHEMA``. All are made again when more is finished.
 """
 
 from __future__ import annotations
@@ -40,10 +40,11 @@ if TYPE_CHECKING:
 __all__ = ["is_sealed", "left_out", "seal_tables", "sealed_tables"]
 
 MANIFEST = "tables.json"
+PROVENANCE = ("stopped_by", "run_id", "conevo", "numpy", "warp", "kernel_hash")  # in table runs
 
 
 def is_sealed(paths: Paths, finished: Sequence[PlannedRun]) -> bool:
-    """Whether the tables are those of exactly these runs."""
+    """Whether the tables are those of these runs, and of no others."""
     path = paths.tables / MANIFEST
     if not all((paths.tables / f"{table}.parquet").is_file() for table in SCHEMA):
         return False
@@ -55,13 +56,13 @@ def is_sealed(paths: Paths, finished: Sequence[PlannedRun]) -> bool:
 
 @contextmanager
 def sealed_tables(campaign: Campaign, note: Callable[[str], None]) -> Iterator[Path]:
-    """Yield the folder with the tables of all that is finished; without a finished run it is empty.
+    """Yield the folder with the tables of all finished runs; it is empty if there are none.
 
-    While the campaign runs they are as its coordinator last made them. Where they are out of date
-    and cannot be written, as on a read-only file system, they are made in a temporary folder.
+    While the campaign runs they are as its coordinator last made them. If they are out of date and
+    cannot be written, as on a read-only file system, they are made in a temporary folder.
 
     Args:
-        campaign: whose tables.
+        campaign: that they are of.
         note: called with the reason for a temporary folder.
 
     Raises:
@@ -89,16 +90,16 @@ def seal_tables(
     spent: Mapping[str, float],
     into: Path | None = None,
 ) -> None:
-    """Make the tables of these runs, unless they are there.
+    """Make the tables of these runs, unless they exist.
 
-    A run whose files are damaged, or are not those that it was sealed with, is left out, and the
-    manifest shows which and why; it is looked at again the next time. A kill leaves the tables that
-    were there before, or none.
+    A run is left out if its files are damaged, or differ from those that it was sealed with. The
+    manifest lists it with the reason, and the next call tries it again. A kill leaves the previous
+    tables, or none.
 
     Args:
         paths: of the campaign.
         finished: its finished runs.
-        spent: core seconds by label, as far as the ledger knows them.
+        spent: core seconds by label, as far as the ledger has them.
         into: the folder to make, by default that of the campaign.
 
     Raises:
@@ -141,7 +142,7 @@ def seal_tables(
 
 
 def left_out(folder: Path) -> dict[str, str]:
-    """Return the runs that the tables in a folder lack since they are damaged, and why."""
+    """Return the damaged runs that the tables in a folder lack, and what is wrong with each."""
     manifest = folder / MANIFEST
     found: dict[str, str] = read_json(manifest)["left_out"] if manifest.is_file() else {}
     return found
@@ -160,13 +161,13 @@ def _quoted(path: Path) -> str:
 
 
 def _last_cost(paths: Paths, label: str) -> float:
-    """Return the core seconds of a run's last worker, which may have known no coordinator."""
+    """Return the core seconds of a run's last worker, which may have had no coordinator."""
     ended = read_ended(paths.ended(label))
     return ended["core_seconds"] if ended is not None else 0.0
 
 
 def _rows(paths: Paths, planned: PlannedRun, cost: float) -> Iterator[tuple[str, Record]]:
-    """Yield every row that a finished run has in any table."""
+    """Yield all rows of a finished run, each with the name of its table."""
     for name, parts in planned.courses.items():
         runs = [Run(paths.run(part)) for part in parts]
         tests = [_tested(run) for run in runs]
@@ -211,7 +212,7 @@ def _rows(paths: Paths, planned: PlannedRun, cost: float) -> Iterator[tuple[str,
 
 
 def _tested(run: Run) -> Record:
-    """Return the testing phase of a run, after checking that it is as it was sealed."""
+    """Return the testing phase of a run, after checking that the run is as it was sealed."""
     test = run.test_result
     if test is None or not run.generations():
         raise DamagedFile(f"{run.path} is sealed, but lacks its generations or its testing phase")
@@ -222,10 +223,8 @@ def _tested(run: Run) -> Record:
 def _joined(runs: Sequence[Run]) -> tuple[list[Record], list[Record], int]:
     """Return the generations and sessions of a run, or of its stages as those of one run.
 
-    Generations, team evaluations and team-steps are counted through the stages.
-
-    Returns:
-        Both, and the number of generations before the last stage.
+    Generations, team evaluations and team-steps are counted through the stages. The third value
+    is the number of generations before the last stage.
     """
     records: list[Record] = []
     sessions: list[Record] = []
@@ -265,38 +264,22 @@ def _run_row(
         "evaluations": records[-1]["team_evaluations"],
         "team_steps": records[-1]["team_steps"],
         "seconds": sum(record["seconds"] for record in records),
-        "stopped_by": provenance["stopped_by"],
-        "run_id": provenance["run_id"],
-        "conevo": provenance["conevo"],
         "code": ", ".join(dict.fromkeys(one.get("code", "") for one in sessions)),
         "changes": "; ".join(changes_text(sessions)),
-        "numpy": provenance["numpy"],
-        "warp": provenance["warp"],
-        "kernel_hash": provenance["kernel_hash"],
-    }
+    } | {name: provenance[name] for name in PROVENANCE}
 
 
 def _generation_rows(name: str, record: Record) -> Iterator[tuple[str, Record]]:
-    generation = record["generation"]
-    yield (
-        "generations",
-        {
-            "run": name,
-            "generation": generation,
-            "evaluations": record["team_evaluations"],
-            "team_steps": record["team_steps"],
-            "value": next(iter(record["performance"].values())),
-            "fitness": record["team_fitness"],
-            "specialization": record["specialization"],
-            "sst": record["sst"],
-            "gst": record["gst"],
-            "recombinations": record["recombinations"],
-            "type_c_evaluations": record.get("type_c_evaluations"),  # since conevo 0.2
-            "hidden": sum(record["n_hidden"]) / len(record["n_hidden"]),
-        },
-    )
+    about = {"run": name, "generation": record["generation"]}
+    as_recorded = {key: record[key] for key in SCHEMA["generations"] if key in record}
+    of_others = {
+        "evaluations": record["team_evaluations"],
+        "value": next(iter(record["performance"].values())),
+        "fitness": record["team_fitness"],
+        "hidden": sum(record["n_hidden"]) / len(record["n_hidden"]),
+    }
+    yield "generations", as_recorded | of_others | about
     for caste, robots in record["castes"].items():
-        about = {"run": name, "generation": generation}
         yield "castes", about | {"caste": caste, "robots": robots}
 
 

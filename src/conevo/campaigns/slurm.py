@@ -1,9 +1,9 @@
 """A campaign as a SLURM job array: a script that is submitted by hand, without a coordinator.
 
-Each task of the array carries out its share of the runs, one by one, with the same worker as all
+Each task of the array executes its share of the runs, one by one, with the same worker as all
 executors. Before its time is up SLURM signals the script, which lets its worker write a checkpoint
-and puts the task back into the queue, so that no run needs to fit into one job. Starting the
-campaign as usual then finds what is finished, and finishes what is not.
+and requeues the task, so no run needs to fit into one job. Starting the campaign as usual then
+finds the finished runs, and finishes the others.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ __all__ = ["check_request", "write_array"]
 TASKS = 1000  # SLURM takes array indices below 1001 unless a site allows more
 GRACE = 180  # seconds before the end at which SLURM signals the script
 MOST_HOURS = 8760  # a year
-OURS = {  # what the script sets, and the option of conevo for it
+OURS = {  # options that the script sets, and conevo's option for each
     "array": "--at-once",
     "cpus-per-task": "--threads",
     "time": "--hours",
@@ -66,7 +66,7 @@ for ((k = SLURM_ARRAY_TASK_ID; k < {n_runs}; k += {tasks})); do
     while kill -0 "$worker" 2> /dev/null; do wait "$worker"; done  # a signal interrupts wait
     exec 3>&-
     case $leaving in
-        # SLURM_JOB_ID of one of the tasks is that of the whole array, which would be put back
+        # SLURM_JOB_ID of one of the tasks is that of the whole array, which would be requeued
         requeue) exec scontrol requeue "${{SLURM_ARRAY_JOB_ID}}_$SLURM_ARRAY_TASK_ID" ;;
         end) exit 143 ;;
     esac
@@ -75,7 +75,7 @@ done
 [ -z "$failed" ]  # SLURM lists a task as failed if one of its runs is
 """
 
-# A node without the device ends its task with one line, before any of its runs is begun.
+# A node without the device ends its task with one line, before any of its runs starts.
 CHECK = """\
 {python} -m conevo.campaigns.devices {device} || exit 3
 """
@@ -95,19 +95,18 @@ def write_array(
     """Write ``slurm.sh`` into a campaign's directory; nothing is submitted.
 
     Args:
-        root: the campaign's directory, which all nodes must see under the same path.
-        labels: of the runs to carry out.
+        root: the campaign's directory, which must have the same path on all nodes.
+        labels: of the runs to execute.
         threads: CPU threads of a run.
         hours: time limit of a task; unfinished runs are requeued.
-        at_once: tasks that may run together; no limit by default.
+        at_once: largest number of tasks at the same time; no limit by default.
         options: of sbatch, for every task: "--gres=gpu:1"; see ``check_request``.
-        device: "auto", "cpu" or a CUDA device of every node; by default runs begin on the CPU and
-            go on where they were.
+        device: "auto", "cpu" or a CUDA device of every node; by default runs start on the CPU, and
+            continue on their previous device.
         python: the interpreter on the nodes.
 
     Raises:
-        UsageError: no runs, less time than a worker is given to leave, or an option that is not
-            allowed.
+        UsageError: no runs, less time than a worker has to leave, or an option that is not allowed.
         EnvironmentFailure: the file cannot be written.
     """
     if not labels:
@@ -134,7 +133,7 @@ def write_array(
         device=f" {device}" if device else "",
         check="" if device in (None, AUTO, CPU) else check,
     )
-    for label in labels:  # what the script would take for finished, and is not any more
+    for label in labels:  # the script would skip a run that was finished before it was extended
         _forget_finished(Paths(root).ended(label))
     replace_file(path, text.encode())
     return path
@@ -144,9 +143,9 @@ def check_request(hours: float, options: Sequence[str], device: str | None = Non
     """Refuse a time limit, options or devices with which the script would not work.
 
     Raises:
-        UsageError: less time than a worker is given to leave, or more than a year; an option is
-            not written ``--NAME`` or ``--NAME=VALUE`` in the characters that ``#SBATCH`` lines take
-            as they are, is the script's own, or is there twice; several devices.
+        UsageError: less time than a worker has to leave, or more than a year; an option that is not
+            ``--NAME`` or ``--NAME=VALUE`` in characters that ``#SBATCH`` lines take unquoted, that
+            is the script's own, or that is given twice; several devices.
     """
     if device and len(parse_devices(device)) > 1:
         raise UsageError(f"--device {device}: a task of the array has one device, cpu or cuda")
@@ -173,7 +172,7 @@ def check_request(hours: float, options: Sequence[str], device: str | None = Non
 
 
 def _forget_finished(ended: Path) -> None:
-    """Remove how a run ended if that was said to be finished."""
+    """Remove the record of a run's end if it is "finished"."""
     try:
         if ended.is_file() and read_json(ended).get("status") == "finished":
             ended.unlink()

@@ -1,8 +1,10 @@
-"""The tables of a campaign, opened for questions: DuckDB over sealed Parquet."""
+"""The tables of a campaign, opened for queries: DuckDB over sealed Parquet."""
 
 from __future__ import annotations
 
 from collections import defaultdict
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -23,14 +25,14 @@ __all__ = ["Tables", "RunValue"]
 
 QUERY = '"SELECT method, count(*) FROM runs GROUP BY ALL"'
 QUERIES = ("SELECT", "EXPLAIN", "MULTI")  # as DuckDB names them: VALUES is a SELECT, PIVOT MULTI
-NEAR = 0.2  # budgets that differ by no more are one
+NEAR = 0.2  # budgets that differ by no more are the same
 
 
 class RunValue(NamedTuple):
-    """What one run reached: the unit of all statistics.
+    """The performance of one run: the unit of all statistics.
 
     budget: of the group of runs that may be compared with it, see ``Tables``.
-    measure: which task performance measure ``value`` is, with its unit and direction.
+    measure: the task performance measure of ``value``, with its unit and direction.
     optimum: its largest possible value, known for a world's main measure only.
     value: mean over the scenarios of a study.
     """
@@ -54,18 +56,18 @@ class RunValue(NamedTuple):
 class Tables:
     """The tables of a campaign: one connection, the tables of ``SCHEMA``, and ``budgets``.
 
-    Read into memory once: whatever is asked, no file is written or read any more. A table without
-    a file is empty. Runs that are one and the same (the first stages of two
-    shapings that differ later only) count once: the first by name stays in ``runs``.
+    All are read into memory once: no query writes or reads a file. A table without a file is empty.
+    Identical runs (the first stages of two shapings that only differ later) count once: the first
+    by name stays in ``runs``.
 
-    ``budgets`` (run, budget) tells which runs may be compared: those of one world, one preset, and
+    ``budgets`` (run, budget) shows which runs may be compared: those of one world, one preset, and
     about equal numbers of team evaluations and of team-steps per evaluation; stages of shapings
-    apart. Choice: "about equal" is within 20 %, as methods do not divide a budget evenly and CONE
-    spends some on type C. A run that ended because the next generation would have exceeded its
-    budget counts with that budget, whatever it spent of it, and so does one that ended at its
-    target before. Without a budget, the latter counts with those it saved evaluations to.
+    separately. Choice: "about equal" is within 20 %, as methods do not divide a budget evenly and
+    CONE spends some on type C. A run that ended because the next generation would have exceeded its
+    budget counts with that budget, whatever it spent of it. So does one that ended earlier at its
+    target. Without a budget, the latter counts with those it saved evaluations to.
 
-    Use as a context, or ``close`` it.
+    Use it as a context, or ``close`` it.
     """
 
     def __init__(self, folder: Path, may_be_empty: bool = False) -> None:
@@ -73,17 +75,17 @@ class Tables:
 
         Args:
             folder: of the tables.
-            may_be_empty: no run need be finished; tables without a file are empty.
+            may_be_empty: whether ``runs.parquet`` may be missing, as before any run is finished.
 
         Raises:
-            UsageError: no runs.parquet there, or a file without one of the columns.
+            UsageError: no runs.parquet, or a file without one of the columns.
         """
         import duckdb
 
         self.folder = Path(folder)
         if not (may_be_empty or (self.folder / "runs.parquet").is_file()):
             raise UsageError(f"no table of runs in {self.folder} (runs.parquet)")
-        # One thread: sums of floats then have one order, so that a report has one text.
+        # One thread: sums of floats then have one order, so a report always has the same text.
         self._connection = duckdb.connect(":memory:", config={"threads": 1})
         for table, columns in SCHEMA.items():
             self._open(table, columns)
@@ -101,7 +103,7 @@ class Tables:
         self._connection.execute("SET lock_configuration = true")
 
     def ask(self, sql: str) -> tuple[list[str], list[tuple[Any, ...]]]:
-        """Return what ``query`` does of a text that must only ask: anybody's.
+        """Return the same as ``query``, but refuse other statements than queries.
 
         Raises:
             UsageError: a statement that is not a query, or as ``query``.
@@ -116,23 +118,15 @@ class Tables:
             UsageError: as ``ask``.
             EnvironmentFailure: pandas is not installed.
         """
-        import duckdb
-
         pandas()
         self._refuse_orders(sql)
-        try:
+        with _refusing():
             return self._connection.execute(sql).df()
-        except duckdb.Error as error:
-            raise _refused(error) from error
 
     def _refuse_orders(self, sql: str) -> None:
-        """Raise UsageError unless a text has queries, and these alone."""
-        import duckdb
-
-        try:
+        """Raise UsageError unless a text consists of queries, at least one."""
+        with _refusing():
             statements = self._connection.extract_statements(sql)
-        except duckdb.Error as error:
-            raise _refused(error) from error
         for one in statements:
             if one.type.name not in QUERIES:
                 raise UsageError(f"{one.type.name} is not a query; ask as in {QUERY}")
@@ -140,23 +134,19 @@ class Tables:
             raise UsageError(f"no SQL statement, as in {QUERY}")
 
     def query(self, sql: str) -> tuple[list[str], list[tuple[Any, ...]]]:
-        """Return the column names and the rows that one SQL statement gives.
+        """Return the column names and the rows of an SQL statement's result.
 
         Raises:
             UsageError: no statement, or DuckDB's reason for refusing it.
         """
-        import duckdb
-
-        try:
+        with _refusing():
             result = self._connection.execute(sql)
             if result is None or not result.description:
                 raise UsageError(f"no SQL statement, as in {QUERY}")
             return [str(column[0]) for column in result.description], result.fetchall()
-        except duckdb.Error as error:
-            raise _refused(error) from error
 
     def records(self, sql: str) -> list[Record]:
-        """Return the rows that one SQL statement gives, by the names of its columns.
+        """Return the rows of an SQL statement's result, by the names of its columns.
 
         Raises:
             UsageError: as ``query``.
@@ -165,19 +155,15 @@ class Tables:
         return [dict(zip(columns, row, strict=True)) for row in rows]
 
     def arrays(self, sql: str) -> dict[str, Floats]:
-        """Return the columns of numbers that one SQL statement gives, as arrays: NULL is NaN.
+        """Return the columns of an SQL statement's result, all numbers, as arrays: NULL is NaN.
 
         For many rows, where ``query`` would make a Python object of each number.
 
         Raises:
             UsageError: as ``query``.
         """
-        import duckdb
-
-        try:
+        with _refusing():
             columns = self._connection.execute(sql).fetchnumpy()
-        except duckdb.Error as error:
-            raise _refused(error) from error
         return {
             name: np.ma.filled(np.ma.asarray(column).astype(np.float64), np.nan)
             for name, column in columns.items()
@@ -188,8 +174,8 @@ class Tables:
     ) -> list[RunValue]:
         """Return the mean over scenarios of a measure, a row per run that has it.
 
-        Ordered by task, budget, variant, method, seed and run. Runs whose mean is not a finite
-        number are left out.
+        Rows are ordered by task, budget, variant, method, seed and run. Runs whose mean is not
+        finite are left out.
 
         Args:
             measure: one of the world's task performance measures; None: each world's main one.
@@ -219,7 +205,7 @@ class Tables:
         ]
 
     def close(self) -> None:
-        """Let go of the connection."""
+        """Close the connection."""
         self._connection.close()
 
     def __enter__(self) -> Tables:
@@ -235,8 +221,6 @@ class Tables:
 
     def _open(self, table: str, columns: dict[str, str]) -> None:
         """Read one table."""
-        import duckdb
-
         file = self.folder / f"{table}.parquet"
         if file.is_file():
             listed = ", ".join(
@@ -252,16 +236,20 @@ class Tables:
                 " QUALIFY row_number() OVER (PARTITION BY run_id, task, method, preset, variant,"
                 " seed ORDER BY run) = 1"
             )
-        try:
+        with _refusing(f"{file} is not a table of {table}", "\n"):
             self._connection.execute(f"CREATE TABLE {table} AS {source}")
-        except duckdb.Error as error:
-            line = " ".join(str(error).split("\n")[0].split())
-            raise UsageError(f"{file} is not a table of {table}: {line}") from error
 
 
-def _refused(error: Exception) -> UsageError:
-    """Return what DuckDB says about a statement, in one line."""
-    return UsageError(f"query: {' '.join(str(error).split('LINE 1:')[0].split())}")
+@contextmanager
+def _refusing(what: str = "query", end: str = "LINE 1:") -> Iterator[None]:
+    """Raise UsageError, with ``what`` and DuckDB's message up to ``end``, if DuckDB fails."""
+    import duckdb
+
+    try:
+        yield
+    except duckdb.Error as error:
+        line = " ".join(str(error).split(end)[0].split())
+        raise UsageError(f"{what}: {line}") from error
 
 
 def _budgets(rows: list[tuple[Any, ...]]) -> dict[str, str]:

@@ -1,8 +1,8 @@
-"""One worker: carries one run of a campaign to its end, wherever it stands.
+"""A worker: carries one run of a campaign to its end, whether it has begun or not.
 
 ``python -m conevo.campaigns.worker CAMPAIGN LABEL THREADS [DEVICE]`` is the unit of work of every
-executor. It is idempotent: a finished run is left alone, an interrupted one goes on from its
-checkpoint, and how it ended is a file, ``ended/LABEL.json``, that holds plain data.
+executor. It is idempotent: a finished run is left alone, and an interrupted one continues from its
+checkpoint. ``ended/LABEL.json`` records how it ended.
 """
 
 from __future__ import annotations
@@ -62,9 +62,7 @@ class PlannedLine(TypedDict):
     shape: bool
     studies: list[str]
     run_ids: Annotated[list[RunId], MinLen(1)]
-    of_first: NotRequired[
-        dict[str, bool | int | float | str]
-    ]  # conevo 0.2.0.dev0 had none at first
+    of_first: NotRequired[dict[str, bool | int | float | str]]  # missing before conevo 0.2
 
 
 class _InUse(Exception):
@@ -97,19 +95,19 @@ def carry_out(
     limit: TimeLimit | None = None,
     spent_before: float = 0.0,
 ) -> bool:
-    """Carry a run on to its end, study it, and write down how it ended.
+    """Carry a run to its end, study it, and record how it ended.
 
     Args:
         root: the campaign's directory.
-        label: which of its runs.
-        threads: CPU threads; no result depends on it.
-        device: by default the CPU for a run that has not begun, and where it was for one that has.
-        limit: the time that is left for evolving, any by default.
+        label: of the run.
+        threads: CPU threads; results do not depend on it.
+        device: by default the CPU for a new run, and the previous device for one that has begun.
+        limit: the time left for evolution, no limit by default.
         spent_before: core seconds of this process that are not the run's.
 
     Returns:
-        Whether it is finished. If not, ``ended/LABEL.json`` says why, unless another worker has it
-        or its time is over.
+        Whether it is finished. If not, ``ended/LABEL.json`` gives the reason, unless another worker
+        has the run or its time is over.
     """
     began = time.perf_counter()
     ending: dict[str, Any] = {"status": "finished", "origin": "", "message": "", "traceback": ""}
@@ -125,7 +123,7 @@ def carry_out(
         _study(paths, planned[label], found, threads)
     except _InUse:
         sys.stderr.write(f"{label} is in use by another worker, which will finish it\n")
-        return False  # whoever has it writes how it ended
+        return False  # the other worker records how it ended
     except (Exception, SystemExit) as error:
         ending = {"status": "failed", **_describe(error)}
     ending |= {
@@ -141,13 +139,13 @@ def carry_out(
 
 
 def core_seconds() -> float:
-    """Return the core seconds that this process has had."""
+    """Return the core seconds that this process has used."""
     spent = resource.getrusage(resource.RUSAGE_SELF)
     return spent.ru_utime + spent.ru_stime
 
 
 def _describe(error: BaseException) -> dict[str, str]:
-    """Return whose fault an error is, what it says, and where a program's own came from."""
+    """Return the origin and message of an error, and the traceback of one that is unexpected."""
     if isinstance(error, ConevoError):
         origin = "machine" if isinstance(error, EnvironmentFailure) else "request"
         return {"origin": origin, "message": str(error), "traceback": ""}
@@ -162,7 +160,7 @@ def _describe(error: BaseException) -> dict[str, str]:
 def _evolve(
     paths: Paths, planned: PlannedRun, threads: int, device: str | None, limit: TimeLimit
 ) -> Run | Shaping:
-    """Return the run, finished by now unless its time was over."""
+    """Return the run, which is finished unless its time was over."""
     path = paths.run(planned.label)
     found: Run | Shaping
     if kind_of(path):
@@ -185,7 +183,7 @@ def _evolve(
         raise _InUse
     how = {"threads": threads, "device": device, "accept_other_code": True}
     if longer and isinstance(found, Run):
-        for kind in STUDIES:  # of a team, and of populations, that may not stay
+        for kind in STUDIES:  # of a team and populations that will change
             paths.study(planned.label, kind).unlink(missing_ok=True)
         found.extend_as(longer, **how)
     if found.status != "finished":
@@ -194,9 +192,9 @@ def _evolve(
 
 
 def _study(paths: Paths, planned: PlannedRun, found: Run | Shaping, threads: int) -> None:
-    """Make the studies of a run, or of every stage, that were not made yet.
+    """Make the missing studies of a run, or of every stage.
 
-    Of a run whose first stage another method evolves, they are those of the second.
+    If another method evolved the first stage, only the second is studied.
     """
     from conevo.studies.signal import signal_study
     from conevo.studies.team_study import study
@@ -216,14 +214,14 @@ def _frozen(value: Any) -> Any:
 
 
 def main() -> None:
-    """Carry out one run; end when the coordinator does, which holds the other end of stdin."""
+    """Carry out one run; end when the coordinator does, which has the other end of stdin."""
     root, label, threads, *rest = sys.argv[1:]
-    # A shell's background jobs ignore interrupts, and what they begin does so, too.
+    # A shell's background jobs ignore interrupts, and so do processes that they start.
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
     def leave_with_coordinator() -> None:
         sys.stdin.buffer.read()
-        _thread.interrupt_main()  # as Ctrl-C: the run writes its checkpoint
+        _thread.interrupt_main()  # like Ctrl-C: the run writes its checkpoint
 
     if not sys.stdin.isatty():
         threading.Thread(target=leave_with_coordinator, daemon=True).start()

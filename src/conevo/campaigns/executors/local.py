@@ -23,7 +23,7 @@ class Serial:
         self._endings: list[Ending] = []
 
     def submit(self, job: RunJob) -> None:
-        """Carry the job out now; Ctrl-C reaches the run itself."""
+        """Execute the job now; Ctrl-C reaches the run itself."""
         carry_out(
             job.root,
             job.label,
@@ -35,7 +35,7 @@ class Serial:
         self._endings.append(Ending(job.label))
 
     def wait(self, seconds: float) -> list[Ending]:
-        """Return what was carried out since the last call."""
+        """Return the endings since the last call."""
         endings, self._endings = self._endings, []
         return endings
 
@@ -44,7 +44,7 @@ class Serial:
 
 
 class Processes:
-    """One spawned process per run: what befalls one run befalls no other."""
+    """One spawned process per run, so that the failure of one does not affect others."""
 
     name: ClassVar[str] = "processes"
 

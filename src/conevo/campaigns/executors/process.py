@@ -15,7 +15,7 @@ ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 def spawn(job: RunJob) -> subprocess.Popen[bytes]:
-    """Begin a worker, which leaves when its stdin ends; what it says goes to the run's log."""
+    """Start a worker, which leaves when its stdin ends; its output goes to the run's log."""
     log = Paths(job.root).log(job.label)
     log.parent.mkdir(exist_ok=True)
     with log.open("ab") as file:
@@ -30,14 +30,14 @@ def spawn(job: RunJob) -> subprocess.Popen[bytes]:
 
 
 def worker_command(job: RunJob) -> list[str]:
-    """Return the command that carries a job out."""
+    """Return the command that executes a job."""
     arguments = [str(job.root.resolve()), job.label, str(job.threads)]
     arguments += [job.device] if job.device else []
     return [sys.executable, "-m", "conevo.campaigns.worker", *arguments]
 
 
 def why_lost(code: int) -> str:
-    """Return what an exit code says of a worker that may not have written how it ended."""
+    """Return why a worker with this exit code could not record how it ended; "" if it could."""
     if code in (0, 1):
         return ""
     return f"killed by signal {-code}" if code < 0 else f"ended with exit code {code}"

@@ -1,7 +1,6 @@
 """The protocol of executors. One only decides where runs are executed; ``worker`` executes them.
 
-Results are files in the campaign's directory. An executor reports that a worker is gone, never
-what it found.
+Results are files in the campaign's directory. An executor only reports that a worker has left.
 """
 
 from __future__ import annotations
@@ -19,7 +18,7 @@ __all__ = ["Ending", "Executor", "RunJob"]
 class RunJob:
     """One run to execute, with its number of threads and its device.
 
-    Without a device it is begun on the CPU, and carried on where it was. ``limit`` is for an
+    Without a device it starts on the CPU, and continues on its previous one. ``limit`` is for an
     executor that runs in this process.
     """
 
@@ -32,11 +31,11 @@ class RunJob:
 
 @dataclass(frozen=True)
 class Ending:
-    """A worker that is gone.
+    """A worker that has left.
 
     Attributes:
         label: of its run.
-        lost: why it could not write down how it ended ("killed by signal 9"); "" if it could.
+        lost: why it could not record how it ended ("killed by signal 9"); "" if it could.
     """
 
     label: str
@@ -44,7 +43,7 @@ class Ending:
 
 
 class Executor(Protocol):
-    """Carries out jobs.
+    """Executes jobs.
 
     Attributes:
         name: as on the command line.
@@ -55,10 +54,10 @@ class Executor(Protocol):
     cores: int
 
     def submit(self, job: RunJob) -> None:
-        """Begin a job; only called when the cores it asks for are free."""
+        """Start a job; only called when its cores are free."""
 
     def wait(self, seconds: float) -> list[Ending]:
-        """Return the workers that are gone, after at most about so long if there are none."""
+        """Return the workers that have left; wait at most about this long for one."""
 
     def stop(self) -> None:
         """Let every worker write its checkpoint and leave; return when all have."""

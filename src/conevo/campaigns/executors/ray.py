@@ -1,9 +1,9 @@
-"""Runs as tasks of a Ray cluster, which carries a task out again where its node was lost.
+"""Runs as tasks of a Ray cluster, which executes a task again if its node was lost.
 
-A task holds the cores of its run and spawns the same worker as the executor "processes", so that a
-run is carried out alike everywhere and one run's threads, memory and end are its own. All that
-comes back through Ray is the worker's exit code. Results are files: in the campaign's directory, if
-all nodes see it, or else in an object store, from where they are fetched.
+A task reserves the cores of its run and spawns the same worker as the executor "processes", so that
+a run is executed in the same way everywhere, and its failure does not affect others. Ray only
+returns the worker's exit code. Results are files: in the campaign's directory, if all nodes see it,
+or else in an object store, from which they are fetched.
 """
 
 from __future__ import annotations
@@ -31,23 +31,23 @@ __all__ = ["RayCluster"]
 
 RETRIES = 3  # of a task whose node or Ray worker is lost
 MEMORY = 80 * 2**20  # bytes of Ray's own object store, near the least that Ray allows
-COPY_EVERY = 120.0  # seconds between two copies of a run at work into the object store
+COPY_EVERY = 120.0  # seconds between two copies of a running run into the object store
 
 
 class RayCluster:
     """A Ray task per run, here or on a cluster.
 
     Args:
-        cores: that jobs may use together; None for all that the cluster has.
-        address: of a cluster that is running, "auto" or "HOST:PORT"; None begins one on this
-            machine, which ends with this executor. conevo must be installed on all nodes.
+        cores: that jobs may use together; None for all cores of the cluster.
+        address: of a running cluster, "auto" or "HOST:PORT"; None starts one on this machine, which
+            ends with this executor. conevo must be installed on all nodes.
         store: address of an object store, if the nodes do not see the campaign's directory.
-        devices: of its jobs: "cpu", "cuda" for a GPU per task, or "auto", which is "cuda" where a
-            node has a GPU.
+        devices: of its jobs: "cpu", "cuda" for a GPU per task, or "auto", which is "cuda" if a node
+            has a GPU.
 
     Raises:
-        UsageError: Ray is not installed, the object store's address is none, or other devices.
-        EnvironmentFailure: there is no cluster at the address, or it has no GPU.
+        UsageError: Ray is not installed, a wrong address of the object store, or other devices.
+        EnvironmentFailure: no cluster at the address, or it has no GPU.
     """
 
     name: ClassVar[str] = "ray"
@@ -77,25 +77,21 @@ class RayCluster:
             options |= {"include_dashboard": False}
         try:
             self._ray.init(address or "local", **options)
+            nodes = [int(n["Resources"].get("CPU", 0)) for n in self._ray.nodes() if n["Alive"]]
+            if not any(nodes):
+                raise RuntimeError("no node has CPU cores")
+            self._has_gpus = bool(self._ray.cluster_resources().get("GPU"))
+            if "cuda" in devices and not self._has_gpus:
+                raise RuntimeError("no node has a GPU, for --device cuda")
         except Exception as error:  # Ray raises bare ones, as when a node is slow to start
             self._ray.shutdown()
             line = " ".join(str(error).split())
             raise EnvironmentFailure(f"Ray at {address or 'this machine'}: {line}") from error
-        nodes = [int(n["Resources"].get("CPU", 0)) for n in self._ray.nodes() if n["Alive"]]
-        if not any(nodes):
-            self._ray.shutdown()
-            raise EnvironmentFailure(f"Ray at {address or 'this machine'}: no node has CPU cores")
-        self._has_gpus = bool(self._ray.cluster_resources().get("GPU"))
-        if "cuda" in devices and not self._has_gpus:
-            self._ray.shutdown()
-            raise EnvironmentFailure(
-                f"Ray at {address or 'this machine'}: no node has a GPU, for --device cuda"
-            )
         self._widest = max(nodes)
         self.cores = min(cores or sum(nodes), sum(nodes))
 
     def submit(self, job: RunJob) -> None:
-        """Hand a task to the cluster; it never asks for more cores than one node has."""
+        """Submit a task; it never asks for more cores than one node has."""
         threads = min(job.threads, self._widest)
         job = replace(job, root=job.root.resolve(), threads=threads)
         uri = ""
@@ -110,7 +106,7 @@ class RayCluster:
         self._tasks[task.remote(str(job.root), job.label, threads, uri, job.device)] = job
 
     def wait(self, seconds: float) -> list[Ending]:
-        """Return the workers that are gone; their files have been fetched by then."""
+        """Return the workers that have left, after their files have been fetched."""
         waiting = list(self._tasks)
         if not waiting:
             return []
@@ -119,7 +115,7 @@ class RayCluster:
         return [self._end(task) for task in gone]
 
     def stop(self) -> None:
-        """Cancel all tasks, wait for what their workers still write, and leave the cluster."""
+        """Cancel all tasks, wait until their workers have written their files, and disconnect."""
         try:
             for task in self._tasks:
                 self._ray.cancel(task, force=False)
@@ -142,7 +138,7 @@ class RayCluster:
 
 
 def _carry(root: str, label: str, threads: int, store: str, device: str | None = None) -> int:
-    """Carry a run on, on the node where this is called, and return the worker's exit code."""
+    """Execute a run on the node where this is called; return the worker's exit code."""
     if not store:
         return _supervise(RunJob(Path(root), label, threads, device))
     copies = ObjectStore(store)
@@ -167,7 +163,7 @@ def _supervise(job: RunJob, copies: ObjectStore | None = None) -> int:
     try:
         copied = time.monotonic()
         while worker.poll() is None:
-            time.sleep(0.05)  # not wait: Ray's cancelling does not interrupt that
+            time.sleep(0.05)  # Ray's cancelling does not interrupt wait()
             if copies is not None and time.monotonic() - copied > COPY_EVERY:
                 with suppress(EnvironmentFailure):  # the last copy decides
                     copies.put_run(job.root, job.label)

@@ -26,16 +26,16 @@ def make_executor(
 
     Args:
         name: of ``EXECUTORS``.
-        cores: that its jobs may use together; by default all usable ones, of a cluster all it has.
+        cores: that its jobs may use together; by default all usable ones, or all of a cluster.
         address: of an existing Ray cluster, or "auto"; by default Ray is started here.
         store: address of an object store ("s3://BUCKET/PATH") for Ray's nodes, if they do not see
             the campaign's directory.
-        devices: that its jobs will name.
+        devices: of its jobs.
 
     Raises:
-        UsageError: there is no such executor, what it needs is not installed, it has no address, or
-            devices that it does not choose among.
-        EnvironmentFailure: it does not have such a device.
+        UsageError: an unknown executor, a missing package, an option that this executor does not
+            have, or a device that it cannot choose.
+        EnvironmentFailure: it does not have one of the devices.
     """
     if name not in EXECUTORS:
         raise unknown_name("executor", name, EXECUTORS)
