@@ -26,12 +26,14 @@ CHECKED = (
     "examples/*.md",
     "examples/*.py",
     "src/conevo/*.py",
+    "src/conevo/campaigns/**/*.py",
     "src/conevo/cli/*.py",
     "src/conevo/controllers/*.py",
     "src/conevo/evolution/**/*.py",
     "src/conevo/kernels/*.py",
     "src/conevo/runs/*.py",
     "src/conevo/specialization/*.py",
+    "src/conevo/watch/*.py",
     "src/conevo/worlds/**/*.py",
 )
 # Each phrase, a regular expression in which a space is any white space, and what to write.

@@ -160,7 +160,7 @@ def test_any_other_path_is_refused_in_one_line(server, path):
     status, headers, body = ask(server, path)
     assert status == 404
     assert headers["Content-Type"] == "text/plain; charset=utf-8"
-    assert body == "there is nothing at this address\n"
+    assert body == "nothing is at this address\n"
 
 
 @pytest.mark.parametrize("method", ["POST", "PUT", "DELETE", "OPTIONS", "TRACE", "CONNECT", "what"])

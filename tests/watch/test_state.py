@@ -78,7 +78,7 @@ def test_details_have_every_generation(tmp_path):
         "hi": [0, 0, 3],
     }
     assert found["status"] == "interrupted"
-    with pytest.raises(UsageError, match="there is no run 'other' here"):
+    with pytest.raises(UsageError, match="no run here is called 'other'"):
         watched.details("other")
 
 
@@ -366,7 +366,7 @@ def test_a_run_that_was_named_and_goes_away_is_one_line(tmp_path):
     one(watched)
     shutil.rmtree(path)
     run = one(watched)
-    assert (run["status"], run["problem"]) == ("damaged", "there is no run here any more")
+    assert (run["status"], run["problem"]) == ("damaged", "the run has been removed")
     assert run["generation"] == 0
     write_run(path, 1)
     assert (one(watched)["problem"], one(watched)["generation"]) == ("", 1)

@@ -1,1 +1,1 @@
-"""A local page that follows runs: the state of their files, and the server that shows it."""
+"""A local page that follows runs: the state of their files, and its server."""

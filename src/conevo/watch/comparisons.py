@@ -1,4 +1,4 @@
-"""Methods side by side: the curve of every run, and the median of each method's."""
+"""Methods side by side: the curve of every run, and the median of each method."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ class CurvePanel:
     """The runs of one environment that are compared with each other.
 
     Args:
-        title: the environment, and what else the runs have in common.
-        series: run -> what it is compared by, a method or a variant.
+        title: the environment, and other properties that the runs share.
+        series: run -> its method or its variant, whichever is compared.
     """
 
     def __init__(self, title: Mapping[str, Any], series: Mapping[Subject, str]) -> None:
@@ -39,10 +39,10 @@ class CurvePanel:
         self._data: dict[str, Any] = {}
 
     def look(self, n_runs: int) -> dict[str, Any]:
-        """Return the panel as it stands: the same object until one of its runs changes.
+        """Return the panel: the same object until one of its runs changes.
 
         Args:
-            n_runs: on the whole page, which decides how fine curves are drawn.
+            n_runs: on the whole page; curves have fewer points if it is large.
         """
         points = int(np.clip(ALL // max(n_runs, 1), FEWEST, MOST))
         key = (points, *(subject.version for subject in self._series))
@@ -59,14 +59,14 @@ class CurvePanel:
 
     @property
     def _measure(self) -> Measure:
-        """The main measure of task performance; of no world while no run has come to one."""
+        """The main measure of task performance; without unit until a run has a value of one."""
         for one in self._series:
             if name := next(iter(one.summary["performance"]), ""):
                 return one.measures.get(name, Measure(name))
         return Measure("performance")
 
     def _row(self, series: str) -> dict[str, Any]:
-        """Return how the runs of a series stand, and the medians of what they came to last."""
+        """Return the states of a series' runs, and the medians of their last values."""
         runs = [one.summary for one, name in self._series.items() if name == series]
         sound = [run for run in runs if run["status"] != "damaged"]
         values = {
@@ -120,8 +120,8 @@ class CurvePanel:
 def panels_of(subjects: Sequence[Subject], group: str) -> list[CurvePanel]:
     """Return the panels of runs that belong together, an environment each.
 
-    Methods are compared where their settings are the same; the settings, where there is one
-    method. Runs of different presets are never compared.
+    Methods are compared if their settings are the same, and settings if all runs have one method.
+    Runs of different presets are never compared.
     """
     by_task: dict[tuple[str, str], list[Subject]] = {}
     for one in subjects:
@@ -149,23 +149,23 @@ def panels_of(subjects: Sequence[Subject], group: str) -> list[CurvePanel]:
 
 
 def _steps(x: Floats, y: Floats, grid: Floats) -> Floats:
-    """Return at each place of the grid what the last generation before it came to; NaN before."""
+    """Return y [G] at each point of a grid: that of the last x up to it; NaN before the first."""
     at = np.searchsorted(x, grid, side="right") - 1
     values = np.append(y, np.nan)
     return np.where(at >= 0, values[at], np.nan)
 
 
 def _until_end(values: Floats, x: Floats, grid: Floats) -> Floats:
-    """Return values up to the first place of the grid at or after the last x."""
+    """Return values up to the first point of the grid at or after the last x, then NaN."""
     last = int(np.searchsorted(grid, x[-1])) if len(x) else -1
     return np.where(np.arange(len(grid)) <= last, values, np.nan)
 
 
 def _median(rows: Sequence[Floats], size: int) -> tuple[Floats, npt.NDArray[np.int64]]:
-    """Return the median of rows [n, G] and of how many it is.
+    """Return the median of rows [n, G], and the number of runs at each point.
 
-    It is that of the runs that have got so far, and there is none where these are fewer than half
-    of those that have begun: a run that has ended is not carried on as if it had not changed.
+    Only runs that have reached a point count there. The median is NaN where these are fewer than
+    half of the runs that have begun: a run that has ended is not extended as a constant.
     """
     if not rows:
         return np.full(size, np.nan), np.zeros(size, np.int64)
@@ -178,7 +178,7 @@ def _median(rows: Sequence[Floats], size: int) -> tuple[Floats, npt.NDArray[np.i
 
 
 def _plain(values: Floats) -> list[float | None]:
-    """Return numbers as JSON has them, none for what is not finite."""
+    """Return numbers as JSON has them, None if not finite."""
     finite = np.abs(values[np.isfinite(values)])
     most = float(finite.max()) if finite.size else 0.0
     places = DIGITS - 1 - int(np.floor(np.log10(most))) if most > 0 else 0

@@ -1,4 +1,4 @@
-"""What belongs together on a live page: the runs of a folder, or those of a campaign."""
+"""Groups of runs on a live page: the runs of a folder, or those of a campaign."""
 
 from __future__ import annotations
 
@@ -13,23 +13,24 @@ from conevo.campaigns.campaign import Campaign
 from conevo.campaigns.estimate import remaining_seconds
 from conevo.campaigns.inputs import shown_as
 from conevo.campaigns.ledger import Entry
-from conevo.errors import ConevoError, UsageError
+from conevo.errors import UsageError
 from conevo.evolution.methods.registry import name_in
 from conevo.kernels.threads import usable_cores
 from conevo.runs.directory import kind_of
 from conevo.runs.outline import span
 from conevo.watch.comparisons import CurvePanel, panels_of
+from conevo.watch.settings import free_label
 from conevo.watch.subjects import Subject
-from conevo.watch.tail import Stamp, readable, stamp
+from conevo.watch.tail import Stamp, problem_of, readable, stamp
 
 __all__ = ["Experiment", "Followed", "Names", "FollowedRuns", "children"]
 
 GoOn = Callable[[], bool]
-PLACES = ("task", "preset", "method", "variant")  # what decides in which panel a run is
+PLACES = ("task", "preset", "method", "variant")  # these decide in which panel a run is
 
 
 class Names:
-    """Labels of runs: no two are the same, and a run keeps the one that it has."""
+    """Labels of runs: no two are the same, and a run keeps its label."""
 
     def __init__(self) -> None:
         self._of: dict[Path, str] = {}
@@ -38,12 +39,8 @@ class Names:
     def of(self, path: Path, wanted: str) -> str:
         """Return the label of the run at ``path``, the one wanted if it is free."""
         if path not in self._of:
-            free = label = readable(wanted)
-            n = 2
-            while label in self._taken:
-                label, n = f"{free} ({n})", n + 1
-            self._of[path] = label
-            self._taken.add(label)
+            self._of[path] = free_label(readable(wanted), self._taken)
+            self._taken.add(self._of[path])
         return self._of[path]
 
 
@@ -53,6 +50,9 @@ class Followed:
     Attributes:
         subjects: the runs, in order.
         panels: their comparisons.
+        is_running: whether any of them is running.
+        ends_at: time when all will be finished, seconds since 1970; None if it is not known.
+        problem: what is wrong with the group, "" if nothing is.
         is_named: whether it is shown while it has no runs.
     """
 
@@ -65,36 +65,37 @@ class Followed:
             "name": readable(name),
         }
         self._about["title"] = self._about["name"]
-        self._failure = ""
         self.subjects: list[Subject] = []
         self.panels: list[CurvePanel] = []
+        self.is_running = False
+        self.ends_at: float | None = None
+        self.problem = ""
         self._places: Hashable = ()
 
     @property
     def about(self) -> dict[str, Any]:
-        """What is said of the group."""
-        counts = Counter(one.summary["status"] for one in self.subjects)
-        found = self._about | {"counts": dict(counts)} | self._prospects(counts)
-        return found | {"problem": self._failure or found["problem"]}
+        """The description of the group on the page."""
+        return self._about | {
+            "counts": dict(Counter(one.summary["status"] for one in self.subjects)),
+            "running": self.is_running,
+            "ends_at": self.ends_at,
+            "problem": self.problem,
+        }
 
     def look_safely(self, go_on: GoOn) -> None:
-        """Read what has changed; whatever goes wrong is this group's, and others are shown."""
+        """Read what has changed; an error is this group's problem, and others are shown."""
         try:
             self.look(go_on)
-            self._failure = ""
         except Exception as error:
             line = " ".join(str(error).split())[:200]
-            self._failure = readable(f"cannot be shown: {type(error).__name__}: {line}")
+            self.problem = readable(f"cannot be shown: {type(error).__name__}: {line}")
 
     def look(self, go_on: GoOn) -> None:
-        """Read what has changed."""
-        raise NotImplementedError
-
-    def _prospects(self, counts: Counter[str]) -> dict[str, Any]:
+        """Read what has changed, while ``go_on`` returns true."""
         raise NotImplementedError
 
     def _arrange(self) -> None:
-        """Make the panels anew if there are other runs, or more is known of them."""
+        """Make the panels again if the runs, or what is known of them, have changed."""
         places = tuple(
             (one.label, one.apart, *(one.summary[name] for name in PLACES)) for one in self.subjects
         )
@@ -107,7 +108,7 @@ class FollowedRuns(Followed):
     """Runs and shapings.
 
     Attributes:
-        listing: their directories; may be replaced between two looks.
+        listing: their directories, which may be replaced between two looks.
     """
 
     def __init__(self, path: Path | None, name: str, names: Names) -> None:
@@ -117,7 +118,8 @@ class FollowedRuns(Followed):
         self._known: dict[Path, Subject] = {}
 
     def look(self, go_on: GoOn) -> None:
-        """Read what has changed."""
+        """Read what has changed, while ``go_on`` returns true."""
+        self.problem = ""
         self._known = {
             path: self._known.get(path) or Subject(self._names.of(path, path.name), path)
             for path in self.listing
@@ -125,19 +127,14 @@ class FollowedRuns(Followed):
         self.subjects = list(self._known.values())
         for one in self.subjects:
             one.look(None, go_on)
+        shown = [one.summary for one in self.subjects]
+        self.is_running = any(one["status"] == "running" for one in shown)
+        self.ends_at = max((one["ends_at"] for one in shown if one["ends_at"]), default=None)
         self._arrange()
-
-    def _prospects(self, counts: Counter[str]) -> dict[str, Any]:
-        ends = [one.summary["ends_at"] for one in self.subjects if one.summary["ends_at"]]
-        return {
-            "running": bool(counts["running"]),
-            "ends_at": max(ends, default=None),
-            "problem": "",
-        }
 
 
 class Experiment(Followed):
-    """A campaign: what its plan and its ledger say, and the files of its runs."""
+    """A campaign: its plan, its ledger, and the files of its runs."""
 
     is_named = True
 
@@ -149,20 +146,10 @@ class Experiment(Followed):
         self._ledger: Hashable = None
         self._entries: dict[str, Entry] = {}
         self._by_label: dict[str, Subject] = {}
-        self._versions = -1
-        self._is_running = False
-        self._ends_at: float | None = None
-        self._problem = ""
 
     def look(self, go_on: GoOn) -> None:
-        """Read what has changed; whatever is wrong with the campaign is its problem."""
-        try:
-            self._read()
-            self._problem = ""
-        except ConevoError as error:
-            self._problem = readable(str(error))
-        except Exception as error:  # whatever the files hold: all others are shown
-            self._problem = readable(f"is damaged: {' '.join(repr(error).split())[:200]}")
+        """Read what has changed, while ``go_on`` returns true."""
+        self.problem = problem_of(self._read)
         for label, one in self._by_label.items():
             one.look(self._entries.get(label, Entry(label)), go_on)
         self._arrange()
@@ -173,19 +160,19 @@ class Experiment(Followed):
             self._open()
             self._plan, self._ledger = files, None
         assert self._campaign is not None
-        self._is_running = self._campaign.is_running
+        self.is_running = self._campaign.is_running
         versions = sum(one.version for one in self.subjects)
-        ledger = (stamp(self._campaign.ledger.path), self._is_running, versions)
+        ledger = (stamp(self._campaign.ledger.path), self.is_running, versions)
         if ledger != self._ledger:
             self._entries = self._campaign.standings()
             self._ledger = ledger
-            self._ends_at = self._judge(self._campaign) if self._is_running else None
+            self.ends_at = self._judge(self._campaign) if self.is_running else None
 
     def _open(self) -> None:
         """Read the plan.
 
         Raises:
-            UsageError: it is damaged, or its runs lie elsewhere.
+            UsageError: it is damaged, or its runs are elsewhere.
         """
         campaign = Campaign(self._path)
         folder = campaign.path / "runs"
@@ -211,24 +198,16 @@ class Experiment(Followed):
     def _judge(self, campaign: Campaign) -> float | None:
         """Return when the campaign will be finished, seconds since 1970; None if unknown.
 
-        By the cores at work now: those of the machine say nothing of runs that are carried out
-        elsewhere.
+        Judged by the cores in use now: runs may be on other machines.
         """
         at = time.time()
         cores = sum(one.threads for one in self._entries.values() if one.state == "running")
         left = remaining_seconds(campaign, self._entries, cores or usable_cores(), at)
         return None if left is None else round(at + left, 1)
 
-    def _prospects(self, counts: Counter[str]) -> dict[str, Any]:
-        return {
-            "running": self._is_running,
-            "ends_at": self._ends_at,
-            "problem": self._problem,
-        }
-
 
 def children(folder: Path) -> list[tuple[Path, str]]:
-    """Return what a folder holds by name: directories and their kind; "" for links to some."""
+    """Return a folder's directories by name, each with its kind; "" for links."""
     found = []
     try:
         with os.scandir(folder) as entries:
@@ -239,5 +218,5 @@ def children(folder: Path) -> list[tuple[Path, str]]:
                 if kind := kind_of(path):
                     found.append((path, "" if entry.is_symlink() else kind))
     except OSError:
-        return []  # not there yet, or just removed
+        return []  # it does not exist yet, or was just removed
     return sorted(found)

@@ -32,7 +32,7 @@ __all__ = ["LiveServer", "serve"]
 HOST = "127.0.0.1"
 PATIENCE = 1.0  # seconds that a request for the state may take to read what is new
 ASKING = 60.0  # seconds from one answer to the end of the next request
-SENDING = 60.0  # seconds for an answer, and as many more as it takes at
+SENDING = 60.0  # seconds for an answer, in addition to the time that it takes at
 SLOWEST = 20_000  # bytes per second
 MOST = 100  # connections at once
 POLICY = (
@@ -61,9 +61,9 @@ def serve(
     """Serve the live page until the reader presses Ctrl-C.
 
     Args:
-        watched: what is followed.
-        port: of the server; any that is free for None or 0.
-        replay: gives the page with the replay of a label's fittest team so far; called for one
+        watched: the runs that are followed.
+        port: of the server; any free one for None or 0.
+        replay: returns the page with the replay of a label's fittest team so far; called for one
             label at a time.
         on_ready: called with the page's address when it can be opened.
 
@@ -103,12 +103,12 @@ class LiveServer(ThreadingHTTPServer):
         watched.snapshot(PATIENCE)  # so that labels are known
         self._deadlines: dict[socket.socket, float] = {}
         self._waiting = threading.Lock()
-        self._session = secrets.token_hex(4)  # versions of another server mean something else
+        self._session = secrets.token_hex(4)  # another server has other versions
         self._encoding = threading.Lock()
         self._encoded: tuple[int, bytes] = (0, b"")
 
     def state(self) -> tuple[str, bytes]:
-        """Return the tag and the text of the present state."""
+        """Return the tag and the text of the current state."""
         state = self.watched.snapshot(PATIENCE)
         version = state["version"]
         with self._encoding:
@@ -116,15 +116,15 @@ class LiveServer(ThreadingHTTPServer):
                 self._encoded = version, _as_json(state)
             return f'"{self._session}-{version}"', self._encoded[1]
 
-    # --- clients that take their time -------------------------------------------------------------
+    # --- slow clients -----------------------------------------------------------------------------
 
     def expect(self, connection: socket.socket, seconds: float) -> None:
-        """End a connection unless it has come further after so many seconds."""
+        """Set the time until a connection is ended, unless it is called again before."""
         with self._waiting:
             self._deadlines[connection] = time.monotonic() + seconds
 
     def verify_request(self, request: Any, client_address: Any) -> bool:
-        """Refuse a connection where there are too many."""
+        """Refuse a connection if the server has too many."""
         with self._waiting:
             is_welcome = len(self._deadlines) < MOST
         if is_welcome:
@@ -147,7 +147,7 @@ class LiveServer(ThreadingHTTPServer):
         super().shutdown_request(request)
 
     def handle_error(self, request: Any, client_address: Any) -> None:
-        """Let a client go that has gone; tell of anything else as Python does."""
+        """Ignore a client that has gone; print other errors as Python does."""
         if not isinstance(sys.exception(), OSError):
             super().handle_error(request, client_address)
 
@@ -160,30 +160,30 @@ class Handler(BaseHTTPRequestHandler):
     server_version, sys_version = "conevo", ""
 
     def handle_one_request(self) -> None:
-        """Read a request within some time, whatever comes piece by piece, and answer it."""
+        """Read a request, within ``ASKING`` seconds in all, and answer it."""
         self.server.expect(self.connection, ASKING)
         super().handle_one_request()
 
     def do_GET(self) -> None:
         """Answer a request."""
-        self.server.expect(self.connection, math.inf)  # making a replay takes its time
+        self.server.expect(self.connection, math.inf)  # a replay takes long
         if (refusal := self._refusal()) is not None:
             self.send_error(HTTPStatus.FORBIDDEN, refusal)
             return
         if {"Content-Length", "Transfer-Encoding"} & set(self.headers):
-            self.close_connection = True  # what follows is no request
+            self.close_connection = True  # the following bytes are not a request
         path, _, query = self.path.partition("?")
         try:
             self._answer(path, query)
         except UnknownAddress:
-            self.send_error(HTTPStatus.NOT_FOUND, "there is nothing at this address")
+            self.send_error(HTTPStatus.NOT_FOUND, "nothing is at this address")
         except ConevoError as error:
             self.send_error(HTTPStatus.CONFLICT, str(error))
 
     do_HEAD = do_GET  # without the body, see _send
 
     def _refusal(self) -> str | None:
-        """Return why a request does not count, None if it does."""
+        """Return why a request is refused, None if it is not."""
         if self.headers.get_all("Host", []) not in [[host] for host in self.server.hosts]:
             port = self.server.port
             return (
@@ -221,7 +221,7 @@ class Handler(BaseHTTPRequestHandler):
         """Return the label of a run that is watched.
 
         Raises:
-            UnknownAddress: none is called so.
+            UnknownAddress: none has this label.
         """
         if label not in self.server.watched.labels:
             raise UnknownAddress
@@ -248,7 +248,7 @@ class Handler(BaseHTTPRequestHandler):
             self.wfile.write(body)
 
     def send_error(self, code: int, message: str | None = None, explain: str | None = None) -> None:
-        """Send one line of plain text; whatever the request still holds is not read."""
+        """Send one line of plain text; the rest of the request is not read."""
         status = HTTPStatus(code)
         if status == HTTPStatus.NOT_IMPLEMENTED:
             status, message = HTTPStatus.METHOD_NOT_ALLOWED, "only GET and HEAD are answered"
@@ -258,11 +258,11 @@ class Handler(BaseHTTPRequestHandler):
         self._send(TEXT, f"{line}\n".encode(errors="replace"), status)
 
     def log_message(self, format: str, *args: Any) -> None:  # noqa: A002 (its name there)
-        """Say nothing of single requests."""
+        """Print nothing about single requests."""
 
 
 class UnknownAddress(Exception):
-    """Nothing is at the address that was asked for."""
+    """Nothing is at the requested address."""
 
 
 def _as_json(value: Any) -> bytes:

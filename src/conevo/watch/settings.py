@@ -1,18 +1,18 @@
-"""By what runs differ, settings, origin and code: only runs that are alike have a common median."""
+"""Differences between runs, in settings, origin and code: only similar runs share a median."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 
 from conevo.watch.tail import readable
 
-__all__ = ["CODE", "FROM", "Choices", "choices_of", "comparisons", "differences"]
+__all__ = ["CODE", "FROM", "Choices", "choices_of", "comparisons", "differences", "free_label"]
 
 Choices = tuple[tuple[str, str], ...]  # key and value of all but names and seed
 NAMES = ("run.world", "run.method", "run.preset", "run.seed")
 METHOD = "method."
-FROM, CODE = "run.from", "run.code"  # the origin of a run, and what evolved it
-LISTED = 4  # settings that a label names
+FROM, CODE = "run.from", "run.code"  # the origin of a run, and the code that evolved it
+LISTED = 4  # settings in a label
 LONGEST = 120  # characters of a label
 
 
@@ -22,7 +22,9 @@ def choices_of(settings: Mapping[str, object]) -> Choices:
 
 
 def differences(methods: Sequence[str], settings: Sequence[Choices]) -> list[dict[str, str]]:
-    """Return what sets runs apart: settings of worlds and runs, and of runs of the same method.
+    """Return the settings that distinguish runs.
+
+    Those of methods are compared among the runs of a method, all others among all runs.
 
     Args:
         methods: of the runs.
@@ -43,13 +45,13 @@ def differences(methods: Sequence[str], settings: Sequence[Choices]) -> list[dic
 
 
 def comparisons(parts: Sequence[Mapping[str, str]]) -> list[tuple[str, list[int]]]:
-    """Return which runs are compared, and what sets them apart from the others.
+    """Return groups of runs to be compared, with the settings that distinguish each group.
 
     A setting that only runs of one method have is compared with the other runs at each of its
     values, as in a plan.
 
     Args:
-        parts: of every run the settings by which runs differ.
+        parts: of every run the settings that are not the same in all.
 
     Returns:
         For every comparison a label, "gst=0.2" or "", and the numbers of its runs.
@@ -60,14 +62,23 @@ def comparisons(parts: Sequence[Mapping[str, str]]) -> list[tuple[str, list[int]
         if any(one.items() < other.items() for other in distinct):
             continue
         members = [k for k, part in enumerate(parts) if part.items() <= one.items()]
-        found[_label(one, found)] = members
+        found[free_label(_label(one), found)] = members
     return list(found.items())
 
 
-def _differing(tables: Sequence[Mapping[str, str]]) -> list[dict[str, str]]:
-    """Return of each table what is not the same in all.
+def free_label(wanted: str, taken: Container[str]) -> str:
+    """Return a label that is not taken: the one wanted, or with a number, "gst=0.2 (2)"."""
+    label, n = wanted, 1
+    while label in taken:
+        n += 1
+        label = f"{wanted} ({n})"
+    return label
 
-    A run that has not begun has no code yet, and goes with runs of any.
+
+def _differing(tables: Sequence[Mapping[str, str]]) -> list[dict[str, str]]:
+    """Return the part of each table that is not the same in all.
+
+    A run that has not begun has no code yet, and is compared with runs of any code.
     """
     keys = dict.fromkeys(key for table in tables for key in table)
     values = {key: {table.get(key) for table in tables} for key in keys}
@@ -78,18 +89,13 @@ def _differing(tables: Sequence[Mapping[str, str]]) -> list[dict[str, str]]:
     ]
 
 
-def _label(settings: Mapping[str, str], taken: Iterable[str]) -> str:
-    """Return settings as a label that is not taken yet."""
+def _label(settings: Mapping[str, str]) -> str:
     names = [f"{_short(k)}={v}" if v else f"no {_short(k)}" for k, v in settings.items()]
     more = f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
-    text = label = readable(", ".join(names[:LISTED]))[:LONGEST] + more
-    n = 2
-    while label in taken:
-        label, n = f"{text} ({n})", n + 1
-    return label
+    return readable(", ".join(names[:LISTED]))[:LONGEST] + more
 
 
 def _short(key: str) -> str:
-    """Return a setting's name without its table; that of a stage keeps the stage."""
+    """Return a setting's name without its table, but with its stage."""
     stage = key.partition(".")[0] if key.startswith("stage-") else ""
     return f"{stage} {key.rpartition('.')[2]}".strip()

@@ -1,6 +1,6 @@
-"""What a live page shows: runs, shapings and campaigns as they stand, from their files alone.
+"""The state that a live page shows: runs, shapings and campaigns, from their files alone.
 
-Nothing is written and no link is followed. What is wrong with a run is one line of that run.
+Nothing is written and no link is followed. A problem with a run is one line of that run.
 """
 
 from __future__ import annotations
@@ -27,15 +27,15 @@ FORMAT = 1
 
 
 class Watched:
-    """What is followed.
+    """The runs, shapings and campaigns that are followed.
 
     Args:
-        paths: directories of runs, shapings or campaigns.
-        folders: in which all of these are followed, also those that appear later.
+        paths: their directories.
+        folders: all directories in these are followed, also those that appear later.
         title: of the page.
 
     Raises:
-        UsageError: a path holds nothing that can be followed.
+        UsageError: a path is none of the three.
     """
 
     def __init__(
@@ -64,11 +64,11 @@ class Watched:
         self._version = 0
 
     def snapshot(self, patience: float = math.inf) -> dict[str, Any]:
-        """Return how everything stands, as JSON has it: the same object until something changes.
+        """Return the state as JSON has it: the same object until something changes.
 
         Args:
-            patience: seconds after which what has not been read yet is left for the next time
-                (``reading`` counts those runs).
+            patience: seconds after which further reading is left for the next time (``reading``
+                counts the runs with unread parts).
         """
         with self._lock:
             until = time.monotonic() + patience
@@ -88,7 +88,7 @@ class Watched:
             return self._subject(label).details()
 
     def champion(self, label: str) -> tuple[Path, int]:
-        """Return the directory of the run that a label's fittest team so far is of, its generation.
+        """Return the run directory and the generation of a label's fittest team so far.
 
         Raises:
             UsageError: no run has this label, or no generation has finished yet.
@@ -96,7 +96,7 @@ class Watched:
         with self._lock:
             found = self._subject(label).champion
         if found is None:
-            raise UsageError(f"{label} has no finished generation yet, so there is no team to show")
+            raise UsageError(f"{label} has no finished generation yet, so it has no team to show")
         return found
 
     @property
@@ -106,7 +106,7 @@ class Watched:
 
     def _subject(self, label: str) -> Subject:
         if label not in self._by_label:
-            raise UsageError(f"there is no run {label!r} here")
+            raise UsageError(f"no run here is called {label!r}")
         return self._by_label[label]
 
     def _look(self, go_on: Callable[[], bool]) -> dict[str, Any]:
@@ -131,7 +131,7 @@ class Watched:
         }
 
     def _list(self, folder: Path) -> None:
-        """Find what is in a folder now."""
+        """Find the runs and campaigns that are in a folder now."""
         kinds = dict(children(folder))
         group = self._groups.setdefault(folder, FollowedRuns(folder, folder.name, self._names))
         assert isinstance(group, FollowedRuns)
@@ -145,7 +145,7 @@ class Watched:
 
 
 def _methods(names: Iterable[str]) -> dict[str, dict[str, str]]:
-    """Return title and colour of methods, those of the registry first."""
+    """Return the title and the colour of methods, those of the registry first."""
     titles = {entry.name: entry.title for entry in METHODS.values()}
     titles |= {name: title_of(name) for name in sorted(set(names) - set(METHODS) - {""})}
     looks = method_looks(titles)
@@ -153,7 +153,7 @@ def _methods(names: Iterable[str]) -> dict[str, dict[str, str]]:
 
 
 def _castes(runs: Iterable[Mapping[str, Any]]) -> dict[str, dict[str, str]]:
-    """Return the colour of every caste of every world, the one that it has in a replay."""
+    """Return the colour of every caste of every world, the same as in a replay."""
     seen: dict[str, set[str]] = {}
     for run in runs:
         seen.setdefault(run["task"].partition("/")[0], set()).update(run["castes"])

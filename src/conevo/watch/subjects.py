@@ -1,4 +1,4 @@
-"""A run or a shaping as it stands by its files: how far, until when, and its last generation."""
+"""A run or a shaping, from its files: its progress, its end, and its last generation."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from conevo.campaigns.ledger import Entry
 from conevo.campaigns.plan import levels_of
-from conevo.errors import ConevoError, UsageError
+from conevo.errors import UsageError
 from conevo.runs import locks
 from conevo.runs.directory import CONFIG, LOCK, SEAL, SHAPING, kind_of
 from conevo.runs.outline import Outline, flattened, span
@@ -24,25 +24,25 @@ from conevo.runs.run import Run
 from conevo.runs.shaping import Shaping
 from conevo.runs.store import GENERATIONS, PROVENANCE
 from conevo.watch.settings import CODE, FROM, Choices, choices_of
-from conevo.watch.tail import Log, Whole, readable, stamp
+from conevo.watch.tail import Log, Whole, problem_of, readable, stamp
 from conevo.worlds.measures import Measure
 
 __all__ = ["Subject", "plain"]
 
 SHOWN = 2000  # generations of a run in its details, at most
 LAST = ("fitness", "best", "specialization", "favourite_share", "sst", "gst")
-COLUMN = {"fitness": "team_fitness", "best": "best_fitness"}  # where it is called otherwise
+COLUMN = {"fitness": "team_fitness", "best": "best_fitness"}  # other names in a log
 
 
 @dataclass(frozen=True)
 class Declared:
-    """What the files of a run say of it; no world is loaded, so that no Python file is run.
+    """The declarations in a run's files; no world is loaded, so no Python file is executed.
 
     Attributes:
-        outline: what names it.
+        outline: its names and length.
         choices: its settings.
-        measures: by name; none of a run that conevo 0.1.0 made.
-        origin: the run whose populations or champion it began with, and their digest, or nothing.
+        measures: by name; empty for runs of conevo 0.1.0.
+        origin: the run whose populations or champion it started with, and their digest, or "".
         codes: every conevo that evolved it.
     """
 
@@ -54,10 +54,10 @@ class Declared:
 
     @staticmethod
     def of(path: Path) -> Declared:
-        """Return what the files of a run say.
+        """Return the declarations in the files of a run.
 
         Raises:
-            UsageError: they are damaged, or were changed since it was started.
+            UsageError: they are damaged, or have changed since it was started.
         """
         run = Run(path)
         provenance = run.provenance
@@ -93,7 +93,7 @@ class Stage:
         """Read what has changed.
 
         Raises:
-            ConevoError: it is damaged, or cannot be read; a damaged log has a problem instead.
+            ConevoError: it is damaged, or cannot be read; of a damaged log its ``problem`` is set.
         """
         self.about = None
         self.about = self._files.read()
@@ -101,21 +101,22 @@ class Stage:
 
     @property
     def done(self) -> Done:
-        """What it has finished."""
+        """Its finished generations and team evaluations."""
         spent = self.log.generations.numbers["team_evaluations"]
         return Done(len(spent), int(spent[-1]) if spent else 0)
 
 
 class Subject:
-    """A run or a shaping that is followed. A shaping's stages are numbered through.
+    """A run or a shaping that is followed. Generations are counted through a shaping's stages.
 
     Args:
         label: its name on the page.
         path: its directory.
-        about: what is known before it has begun: task, method, seed, variant.
+        about: known before it has begun, from a plan: task, method, preset, seed, variant.
 
     Attributes:
         version: changes whenever something that is shown does.
+        is_behind: whether a part of its logs has not been read yet.
     """
 
     def __init__(self, label: str, path: Path, about: Mapping[str, Any] | None = None) -> None:
@@ -134,21 +135,18 @@ class Subject:
     # --- looking ----------------------------------------------------------------------------------
 
     def look(self, entry: Entry | None = None, go_on: Callable[[], bool] = lambda: True) -> None:
-        """Read what has changed; whatever is wrong becomes the run's problem.
+        """Read what has changed; an error becomes the run's problem.
 
         Args:
-            entry: what a campaign's ledger says.
-            go_on: asked before each further piece of a log.
+            entry: its entry in a campaign's ledger.
+            go_on: reading of logs continues while it returns true.
         """
-        self._problem = ""
-        try:
-            self._read(go_on)
-        except ConevoError as error:
-            self._problem = readable(str(error).replace(f"{self.path}/", ""))
-        except Exception as error:  # whatever the files hold: all others are shown
-            self._problem = readable(f"is damaged: {' '.join(repr(error).split())[:200]}")
+        problem = problem_of(lambda: self._read(go_on))
         logs = [stage.log for stage in self._stages]
-        self._problem = next((log.problem for log in logs if log.problem), self._problem)
+        self._problem = next(
+            (log.problem for log in logs if log.problem),
+            problem.replace(readable(f"{self.path}/"), ""),
+        )
         self.is_behind = any(log.is_behind for log in logs)
         self._status, self._reason = self._stand(entry)
         key = (
@@ -172,7 +170,7 @@ class Subject:
             if not (kind := kind_of(self.path)):
                 if self._is_planned:
                     return
-                raise UsageError("there is no run here any more")
+                raise UsageError("the run has been removed")
             if kind == "campaign":
                 raise UsageError("is a campaign, not a run")
             self._kind = kind
@@ -213,28 +211,23 @@ class Subject:
             return "running", ""
         return ("pending" if entry is not None and not self._n_generations else "interrupted"), ""
 
-    # --- what is said -----------------------------------------------------------------------------
+    # --- what is shown ----------------------------------------------------------------------------
 
     @property
     def summary(self) -> dict[str, Any]:
-        """What the table says of it; the same object until something changes."""
+        """Its row of the table; the same object until something changes."""
         if not self._summary:
             self._summary = self._about_now() | self._last() | self._prospects()
         return self._summary
 
     def _about_now(self) -> dict[str, Any]:
-        found: dict[str, Any] = {
-            "label": self.label,
-            "path": readable(str(self.path)),
-            "variant": "",
-        }
+        found: dict[str, Any] = {"label": self.label, "path": readable(str(self.path))}
+        found |= dict.fromkeys(("variant", "task", "method", "preset"), "") | {"seed": None}
         found |= self._about
         if self._outlines:
             last = self._outlines[-1]
             found |= {"task": span([one.task for one in self._outlines]), "method": last.method}
             found |= {"preset": last.preset, "seed": last.seed}
-        for name, none in (("task", ""), ("method", ""), ("preset", ""), ("seed", None)):
-            found.setdefault(name, none)
         return found | {
             "status": self._status,
             "reason": self._reason,
@@ -264,7 +257,7 @@ class Subject:
         }
 
     def _prospects(self) -> dict[str, Any]:
-        """Return how far it is, and the time (seconds since 1970) when it will be finished."""
+        """Return its progress, and the time (seconds since 1970) when it will be finished."""
         logs = [stage.log for stage in self._stages]
         done = [stage.done for stage in self._stages]
         budgets = [one.budget_evaluations for one in self._outlines]
@@ -280,7 +273,7 @@ class Subject:
         }
 
     def _ends_at(self, done: Sequence[Done]) -> float | None:
-        """Return when it will be finished; None if it is not running, or nothing is known yet."""
+        """Return when it will be finished; None if it is not running, or has no generation yet."""
         if self._status != "running" or self._fittest is None:
             return None
         at = self._fittest[0]
@@ -292,7 +285,7 @@ class Subject:
 
     @property
     def measures(self) -> Mapping[str, Measure]:
-        """The measures that it declares, by name; of a shaping those of its last stage begun."""
+        """The measures that it declares, by name; of a shaping those of its newest stage."""
         return about.measures if (about := self._last_about) else {}
 
     @property
@@ -301,13 +294,14 @@ class Subject:
 
     @property
     def apart(self) -> Choices:
-        """What sets it apart from runs of the same names: settings, origin and code.
+        """Its differences from runs of the same names: settings, origin and code.
 
-        Of a plan only its factors, instead of all settings. A shaping has those of every stage.
+        In a campaign these are the plan's factors only, not all settings. A shaping has the
+        settings of every stage.
         """
         made = []
         if (about := self._last_about) is not None:
-            # The stages of a shaping begin with each other's populations.
+            # Each stage of a shaping starts with the populations of the previous one.
             origin = "" if self._shaping else about.origin
             made = [(k, v) for k, v in ((FROM, origin), (CODE, about.codes)) if v]
         if self._is_planned:
@@ -334,8 +328,8 @@ class Subject:
     def _fittest(self) -> tuple[int, int] | None:
         """The stage, from 0, and the generation of the fittest team so far.
 
-        Of a shaping the last stage's that has one. As the run itself chooses it: the highest mean
-        credit, the earlier one if equal.
+        It is the one that the run itself chooses, with the highest mean credit; ties go to the
+        earlier. Of a shaping it is that of the last stage that has one.
         """
         for number in reversed(range(len(self._stages))):
             fitness = np.array(self._stages[number].log.generations.numbers["team_fitness"])
@@ -348,7 +342,7 @@ class Subject:
 
         Args:
             quantity: "performance" (the main measure) or "fitness" (of the fittest team).
-            over: "generation" (finished ones) or "evaluations" (of teams so far).
+            over: "generation" (number finished) or "evaluations" (of teams so far).
         """
         xs, ys, before = [np.zeros(0)], [np.zeros(0)], 0.0
         for stage in self._stages:
@@ -367,9 +361,9 @@ class Subject:
         return np.concatenate(xs), np.concatenate(ys)
 
     def details(self) -> dict[str, Any]:
-        """Return the summary and every generation, evenly spaced ones if there are very many.
+        """Return the summary and every generation.
 
-        Of more than ``SHOWN`` generations evenly spaced ones, the first and the last among them.
+        Of more than ``SHOWN`` generations it returns evenly spaced ones, with the first and last.
         """
         n = self._n_generations
         shown = (
@@ -394,7 +388,7 @@ class Subject:
         }
 
     def _columns(self, kind: str, none: float) -> Iterator[tuple[str, npt.NDArray[np.float64]]]:
-        """Yield the columns of all stages, one after the other."""
+        """Yield the columns of all stages, stage by stage."""
         parts: list[tuple[int, Mapping[str, Sequence[float]]]] = [
             (len(found), getattr(found, kind))
             for found in (stage.log.generations for stage in self._stages)
@@ -412,7 +406,7 @@ class Subject:
 
 
 def plain(values: npt.NDArray[np.float64]) -> list[float | None]:
-    """Return numbers as JSON has them, to six digits; none for what is not finite."""
+    """Return numbers as JSON has them, to six digits; None if not finite."""
     return [None if not math.isfinite(v) else float(f"{v:.6g}") for v in values.tolist()]
 
 

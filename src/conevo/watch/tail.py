@@ -1,6 +1,6 @@
-"""Files that others write, read again only where they have changed. Nothing is ever written.
+"""Files that other processes write: only changes are read again, and nothing is ever written.
 
-Links, pipes and devices are never opened: what is read lies in the folder that is watched.
+Links, pipes and devices are never opened: all files read are in the watched folder.
 """
 
 from __future__ import annotations
@@ -13,14 +13,14 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
-from conevo.errors import UsageError
+from conevo.errors import ConevoError, UsageError
 from conevo.reading import parse_json, read_part
 from conevo.runs.records import Generation
 
-__all__ = ["Generations", "Log", "Stamp", "Whole", "readable", "stamp"]
+__all__ = ["Generations", "Log", "Stamp", "Whole", "problem_of", "readable", "stamp"]
 
 T = TypeVar("T")
-Stamp = tuple[int, int, int]  # when it was last changed (ns), its size (bytes), its inode
+Stamp = tuple[int, int, int]  # last change (ns), size (bytes), inode
 
 CHUNK = 2**20  # bytes of a log that are read at once
 LARGEST = 1e100
@@ -40,7 +40,7 @@ NUMBERS = (
 
 
 def stamp(path: Path) -> Stamp | None:
-    """Return what changes whenever a file does, None if there is no regular file."""
+    """Return a value that changes whenever a file does, None if it is not a regular file."""
     try:
         found = os.lstat(path)
     except (OSError, ValueError):
@@ -49,11 +49,11 @@ def stamp(path: Path) -> Stamp | None:
 
 
 class Whole(Generic[T]):
-    """What is made of files that are replaced whole.
+    """An object made of files that are replaced whole.
 
     Args:
-        paths: the files; without the first one there is nothing to read.
-        read: makes something of them.
+        paths: the files; without the first one it does not exist.
+        read: makes it.
     """
 
     def __init__(self, paths: Sequence[Path], read: Callable[[], T]) -> None:
@@ -63,7 +63,7 @@ class Whole(Generic[T]):
         self._problem: UsageError | None = None
 
     def read(self) -> T | None:
-        """Return what is in the files, None if there are none.
+        """Return the object, None without the first file.
 
         Raises:
             UsageError: they are damaged.
@@ -83,13 +83,13 @@ class Whole(Generic[T]):
 
 
 class Generations:
-    """A column [n] for each number of every generation of a log; NaN for none.
+    """The numbers of a log's generations, a column [n] each; NaN for missing ones.
 
     Attributes:
         numbers: of the record, by name; ``neurons`` is the mean over the team.
         performance: measures by name.
         castes: robots of each caste by name, in the order in which they appeared.
-        favourites: robots by their favourite setting, the same way; none of earlier versions.
+        favourites: robots by their favourite setting, likewise; empty in logs of earlier versions.
     """
 
     def __init__(self) -> None:
@@ -114,7 +114,7 @@ class Generations:
 def _extend(
     columns: dict[str, array[float]], row: Mapping[str, float | None], n: int, none: float
 ) -> None:
-    """Append a row to columns of n values; a column that it lacks gets ``none``."""
+    """Append a row to columns of n values; ``none`` to a column that it lacks."""
     for name in row:
         if name not in columns:
             columns[name] = array("d", [none]) * n
@@ -125,15 +125,16 @@ def _extend(
 
 
 class Log:
-    """A log of generations that grows: only what was appended is read.
+    """A log of generations that grows: only new lines are read.
 
-    A torn last line does not count. A damaged one ends what is read until the file is replaced.
+    A torn last line does not count. Lines after a damaged one are not read until the file is
+    replaced.
 
     Attributes:
         generations: read so far.
         problem: what is wrong with the file, "" if nothing is.
         version: changes whenever the two others do.
-        is_behind: whether there is more to be read.
+        is_behind: whether it has more to be read.
     """
 
     def __init__(self, path: Path) -> None:
@@ -150,11 +151,11 @@ class Log:
 
     @property
     def written(self) -> float:
-        """When the file was last written, seconds since 1970; 0 if it never was."""
+        """Time of the last change to the file, seconds since 1970; 0 without a file."""
         return self._stamp[0] / 1e9 if self._stamp else 0.0
 
     def read(self, go_on: Callable[[], bool] = lambda: True) -> None:
-        """Read what is new; ``go_on`` is asked before each further piece."""
+        """Read what is new, while ``go_on`` returns true."""
         now, before = stamp(self.path), self._stamp
         if now == before and not self.is_behind:
             return
@@ -170,7 +171,7 @@ class Log:
                 self._take(piece)
 
     def _take(self, piece: bytes) -> None:
-        """Add the whole lines of what was read; keep the rest for the next time."""
+        """Add the whole lines of a piece; keep the rest for the next time."""
         *lines, self._rest = (self._rest + piece).split(b"\n")
         self.version += 1
         for line in lines:
@@ -194,5 +195,16 @@ def _has_grown(before: Stamp, now: Stamp, offset: int) -> bool:
 
 
 def readable(name: str) -> str:
-    """Return a file's name as text that can be written: bytes that are none by their numbers."""
+    """Return a file's name as valid text: other bytes by their numbers."""
     return name.encode("utf-8", "backslashreplace").decode()
+
+
+def problem_of(read: Callable[[], None]) -> str:
+    """Read files; return what is wrong with them in one line, "" if nothing is."""
+    try:
+        read()
+    except ConevoError as error:
+        return readable(str(error))
+    except Exception as error:  # of any damage: all other runs are shown
+        return readable(f"is damaged: {' '.join(repr(error).split())[:200]}")
+    return ""
