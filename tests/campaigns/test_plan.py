@@ -108,7 +108,7 @@ def test_named_levels_may_be_of_some_runs_only(tmp_path):
     ("old", "new", "says"),
     [
         ('["small", "large"]', '["small", "lage"]', "level of ranges 'lage'.*mean 'large'"),
-        ("[levels.ranges]", "[levels.range]", "levels.range in .*: has no factor 'range'"),
+        ("[levels.ranges]", "[levels.range]", "levels.range in .*: the plan has no factor 'range'"),
         ("[levels.ranges]", "[levels.method]", "levels.method .* needs its own name"),
         ("[levels.ranges]", '[levels."a.b"]', "levels.a.b .* needs its own name"),
         ("large =", '"so, large" =', "levels.ranges.so, large .*letters, digits"),

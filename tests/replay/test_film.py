@@ -78,7 +78,7 @@ def test_a_gif_read_again_shows_every_frame_for_its_time(tmp_path):
     painter = Painter([playback()], SIZE)
     frames = [0, 1, 1, GONE, GONE + 4, 39]
     told = []
-    film.write_gif(painter, path, frames, 20, lambda done, total: told.append((done, total)))
+    film.write_film(painter, path, frames, 20, lambda done, total: told.append((done, total)))
     assert told == [(k, 6) for k in range(1, 7)]
     with Image.open(path) as gif:
         assert (gif.n_frames, gif.size, gif.info["loop"]) == (5, painter.size, 0)
@@ -95,7 +95,7 @@ def test_a_gif_read_again_shows_every_frame_for_its_time(tmp_path):
 def test_colours_of_a_gif_do_not_flicker(tmp_path):
     path = tmp_path / "epoch.gif"
     painter = Painter([playback(rings=())], SIZE)
-    film.write_gif(painter, path, list(range(0, T, 4)))
+    film.write_film(painter, path, list(range(0, T, 4)))
     panel = Panel(playback(), SIZE, "action", alone=True)
     x0, y0, x1, _ = panel.world
     scale = (x1 - x0) / 10
@@ -114,7 +114,7 @@ def test_colours_of_a_gif_do_not_flicker(tmp_path):
 
 
 def test_a_gif_is_no_faster_than_gifs_can_be(tmp_path):
-    film.write_gif(Painter([playback()], SIZE), tmp_path / "a.gif", [0, 1], fps=100)
+    film.write_film(Painter([playback()], SIZE), tmp_path / "a.gif", [0, 1], fps=100)
     with Image.open(tmp_path / "a.gif") as gif:
         assert gif.info["duration"] == 20
 
@@ -160,7 +160,7 @@ def test_an_mp4_read_again_shows_the_frames(tmp_path):
 @needs_ffmpeg
 def test_the_same_film_has_the_same_bytes(tmp_path):
     for name in ("a.mp4", "b.mp4"):
-        film.write_mp4(Painter([playback()], SIZE), tmp_path / name, range(0, T, 3))
+        film.write_film(Painter([playback()], SIZE), tmp_path / name, range(0, T, 3))
     assert (tmp_path / "a.mp4").read_bytes() == (tmp_path / "b.mp4").read_bytes()
 
 
@@ -186,7 +186,7 @@ def failing(monkeypatch, tmp_path, script):
 def test_an_ffmpeg_that_fails_is_one_line_and_no_file(monkeypatch, tmp_path, script):
     path = failing(monkeypatch, tmp_path, script)
     with pytest.raises(EnvironmentFailure, match=r"could not write [^[]*No space left") as caught:
-        film.write_mp4(Painter([playback()], SIZE), path, range(T))
+        film.write_film(Painter([playback()], SIZE), path, range(T))
     assert "\n" not in str(caught.value)
     assert list(path.parent.iterdir()) == []
 
@@ -205,7 +205,7 @@ def test_an_interrupt_ends_ffmpeg_and_leaves_nothing(monkeypatch, tmp_path):
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        film.write_mp4(Painter([playback()], SIZE), path, range(T), progress=interrupt)
+        film.write_film(Painter([playback()], SIZE), path, range(T), progress=interrupt)
     assert list(path.parent.iterdir()) == []
     with pytest.raises(ProcessLookupError):
         os.kill(int((tmp_path / "pid").read_text()), signal.SIG_DFL)
@@ -214,7 +214,7 @@ def test_an_interrupt_ends_ffmpeg_and_leaves_nothing(monkeypatch, tmp_path):
 def test_without_ffmpeg_it_is_said_what_helps(monkeypatch, tmp_path):
     monkeypatch.setattr(film, "find_ffmpeg", lambda: None)
     with pytest.raises(UsageError, match=r"conevo\[video\].*--gif"):
-        film.write_mp4(Painter([playback()], SIZE), tmp_path / "a.mp4", [0])
+        film.write_film(Painter([playback()], SIZE), tmp_path / "a.mp4", [0])
 
 
 # --- all files ------------------------------------------------------------------------------------
@@ -248,18 +248,18 @@ def test_an_interrupted_gif_leaves_nothing(tmp_path):
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        film.write_gif(Painter([playback()], SIZE), tmp_path / "a.gif", [0, 1], progress=interrupt)
+        film.write_film(Painter([playback()], SIZE), tmp_path / "a.gif", [0, 1], progress=interrupt)
     assert list(tmp_path.iterdir()) == []
 
 
 def test_a_place_that_cannot_be_written_is_one_line(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(EnvironmentFailure, match=r"cannot write .*a\.gif"):
-        film.write_gif(Painter([playback()], SIZE), tmp_path / "file" / "a.gif", [0])
+        film.write_film(Painter([playback()], SIZE), tmp_path / "file" / "a.gif", [0])
 
 
 def test_a_film_without_frames_is_refused(tmp_path):
-    for write in (film.write_gif, film.write_mp4):
+    for name in ("a.gif", "a.mp4"):
         with pytest.raises(UsageError):
-            write(Painter([playback()], SIZE), tmp_path / "a.gif", [])
+            film.write_film(Painter([playback()], SIZE), tmp_path / name, [])
     assert list(tmp_path.iterdir()) == []

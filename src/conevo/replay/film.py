@@ -1,7 +1,7 @@
-"""Films of what a team does: GIF by Pillow, MP4 by ffmpeg, and single pictures.
+"""Films of a team: GIF by Pillow, MP4 by ffmpeg, and single pictures.
 
-A file appears all at once: until it is finished it has a hidden name beside its own, and what ends
-early leaves neither. Nothing is written over another file.
+A file appears all at once: until it is finished it has a hidden name in the same folder, and an
+interrupted one leaves nothing. Existing files are never overwritten.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -34,8 +34,6 @@ __all__ = [
     "find_ffmpeg",
     "frames_of",
     "write_film",
-    "write_gif",
-    "write_mp4",
     "write_poster",
 ]
 
@@ -43,21 +41,21 @@ Progress = Callable[[int, int], None]
 
 FPS = {"gif": 20, "mp4": SPEED}  # Choice: browsers show a GIF no faster
 SIZES = {"gif": 480, "mp4": 720, "png": 720}  # Choice: of a world in pixels; GIFs are for slides
-GIF_FRAMES = 250  # Choice: a GIF has about so many frames unless told otherwise
+GIF_FRAMES = 250  # Choice: frames of a GIF by default, about
 _SAMPLES = 16  # frames that a GIF's colours are taken from
 _EXACT = 64  # of its 255 colours
 _NO_FFMPEG = "MP4 needs ffmpeg: install it, or conevo[video], or make a GIF with --gif"
 
 
 def choose_format(out: str | None, wanted: str = "") -> str:
-    """Return what to make: "gif", "mp4" or "png".
+    """Return the format: "gif", "mp4" or "png".
 
     Args:
-        out: the file's name if there is one.
-        wanted: one of the three, or "": what the name ends in, else an MP4 if ffmpeg is there.
+        out: name of the file, if it is given.
+        wanted: one of the three, or "": that of the name, else MP4 if ffmpeg is installed.
 
     Raises:
-        UsageError: the name ends in something else, or ffmpeg is wanted and missing.
+        UsageError: the name ends differently, or ffmpeg is needed and missing.
     """
     ending = Path(out).suffix[1:].lower() if out else ""
     kind = wanted or ending or ("mp4" if find_ffmpeg() else "gif")
@@ -79,17 +77,17 @@ def frames_of(
     first: int | None = None,
     last: int | None = None,
 ) -> list[int]:
-    """Return the frames of a film, the last one always among them.
+    """Return the frames of a film, always with the last one.
 
     Args:
         iterations: of the epoch.
-        kind: "mp4" shows every iteration unless told otherwise, "gif" 250 of them or a few less.
+        kind: by default "mp4" shows every iteration, "gif" 250 of them or a few less.
         every: iterations from one frame to the next.
         first: iteration, from 0.
         last: iteration, by default the epoch's.
 
     Raises:
-        UsageError: nothing is left to be shown.
+        UsageError: no frames are left.
     """
     begin = 0 if first is None else first
     end = iterations - 1 if last is None else last
@@ -112,98 +110,48 @@ def write_film(
     fps: int | None = None,
     progress: Progress | None = None,
 ) -> None:
-    """Write a GIF or an MP4, as the file's name says.
+    """Write a GIF or an MP4, according to the file's name.
 
     Args:
         painter: of the frames.
-        path: where to.
+        path: of the file.
         frames: their numbers, at least one.
         fps: frames per second; GIF counts in hundredths of a second, so 50 at most.
-        progress: told the frames done and all.
+        progress: called with the number of finished frames and of all.
 
     Raises:
-        UsageError: no frames, something is at ``path`` already, or ffmpeg is needed and missing.
+        UsageError: no frames, ``path`` exists, or ffmpeg is needed and missing.
         EnvironmentFailure: ffmpeg fails, or the file cannot be written.
     """
     kind = choose_format(str(path))
-    write = {"gif": write_gif, "mp4": write_mp4}[kind]
-    write(painter, path, frames, fps or FPS[kind], progress)
+    fps = fps or FPS[kind]
+    if not frames:
+        raise UsageError("the film has no frames")
+
+    def pictures() -> Iterator[Image.Image]:
+        for done, t in enumerate(frames, start=1):
+            yield painter.frame(t)
+            if progress:
+                progress(done, len(frames))
+
+    with _appearing(path) as draft:
+        if kind == "gif":
+            samples = (painter.frame(t) for t in frames[:: -(-len(frames) // _SAMPLES)])
+            _save_gif(pictures(), _palette(samples), fps, draft)
+        else:
+            _save_mp4(pictures(), _command(painter.size, fps, draft), path, draft)
 
 
 def write_poster(painter: Painter, path: Path, t: int) -> None:
     """Write the picture of one iteration as PNG.
 
     Raises:
-        UsageError: no such iteration, or something is at ``path`` already.
+        UsageError: no such iteration, or ``path`` exists.
         EnvironmentFailure: it cannot be written.
     """
     picture = painter.frame(t)
     with _appearing(path) as draft, draft.open("xb") as file:
         picture.save(file, "PNG", optimize=True)
-
-
-def write_gif(
-    painter: Painter,
-    path: Path,
-    frames: Sequence[int],
-    fps: int = FPS["gif"],
-    progress: Progress | None = None,
-) -> None:
-    """Write an animated GIF that repeats for ever; arguments and errors as of ``write_film``.
-
-    All frames share 255 colours, so none flickers; equal ones in a row become one that lasts
-    longer. Until they are written all are in memory, about a megabyte each.
-    """
-    if not frames:
-        raise UsageError("the film has no frames")
-    palette = _palette(painter.frame(t) for t in frames[:: -(-len(frames) // _SAMPLES)])
-
-    def pictures() -> Iterator[Image.Image]:
-        for done, t in enumerate(frames, start=1):
-            yield painter.frame(t).quantize(palette=palette, dither=Image.Dither.NONE)
-            if progress:
-                progress(done, len(frames))
-
-    with _appearing(path) as draft, draft.open("xb") as file:
-        rest = pictures()
-        next(rest).save(
-            file, "GIF", save_all=True, append_images=rest, loop=0, disposal=1, optimize=True,
-            duration=10 * max(round(100 / fps), 2),
-        )  # fmt: skip
-
-
-def write_mp4(
-    painter: Painter,
-    path: Path,
-    frames: Sequence[int],
-    fps: int = FPS["mp4"],
-    progress: Progress | None = None,
-) -> None:
-    """Write an MP4 that players of all kinds show: H.264, yuv420p, its index at the beginning.
-
-    Arguments and errors are those of ``write_film``. The same frames give the same bytes with the
-    same ffmpeg, a process of its own that has ended when this returns or raises.
-    """
-    ffmpeg = find_ffmpeg()
-    if ffmpeg is None:
-        raise UsageError(_NO_FFMPEG)
-    if not frames:
-        raise UsageError("the film has no frames")
-    with _appearing(path) as draft, tempfile.TemporaryFile() as said:
-        command = _command(ffmpeg, painter.size, fps, draft)
-        with _running(command, said) as process:
-            pipe = process.stdin
-            assert pipe is not None
-            with suppress(BrokenPipeError):  # it reads no more: what it said tells why
-                for done, t in enumerate(frames, start=1):
-                    pipe.write(painter.frame(t).tobytes())
-                    if progress:
-                        progress(done, len(frames))
-                pipe.close()
-            process.wait()
-        if process.returncode != 0:
-            said.seek(0)
-            raise EnvironmentFailure(_why(path, said.read().decode(errors="replace"), draft))
 
 
 def find_ffmpeg() -> str | None:
@@ -217,7 +165,7 @@ def find_ffmpeg() -> str | None:
         return None
     try:
         exe: str = get_ffmpeg_exe()
-    except RuntimeError:  # the package is there, without an ffmpeg
+    except RuntimeError:  # the package is installed, without an ffmpeg
         return None
     return exe
 
@@ -227,7 +175,7 @@ def find_ffmpeg() -> str | None:
 
 @contextmanager
 def _appearing(path: Path) -> Iterator[Path]:
-    """Yield a hidden place; the file that is written there then becomes ``path``."""
+    """Yield a hidden path; the file that is written there then becomes ``path``."""
     refuse_file(path)
     with writing(path):
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -242,8 +190,11 @@ def _appearing(path: Path) -> Iterator[Path]:
 # --- MP4 ------------------------------------------------------------------------------------------
 
 
-def _command(ffmpeg: str, size: tuple[int, int], fps: int, draft: Path) -> list[str]:
-    """Return the call of ffmpeg that reads frames in red, green and blue from its input."""
+def _command(size: tuple[int, int], fps: int, draft: Path) -> list[str]:
+    """Return the call of ffmpeg that reads frames in red, green and blue from its input.
+
+    It writes H.264 in yuv420p with the index at the beginning, which all players can show.
+    """
     frames = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size[0]}x{size[1]}"]
     colours = ["-vf", "scale=flags=accurate_rnd:out_color_matrix=bt709:out_range=tv,format=yuv420p"]
     colours += ["-color_range", "tv", "-colorspace", "bt709"]
@@ -254,37 +205,47 @@ def _command(ffmpeg: str, size: tuple[int, int], fps: int, draft: Path) -> list[
     video += ["-x264-params", "me=dia:subme=1"]
     exact = ["-map_metadata", "-1", "-fflags", "+bitexact", "-flags:v", "+bitexact"]
     return [
-        *(ffmpeg, "-nostdin", "-hide_banner", "-loglevel", "error", "-y"),
+        *(find_ffmpeg() or "ffmpeg", "-nostdin", "-hide_banner", "-loglevel", "error", "-y"),
         *(*frames, "-r", str(fps), "-i", "pipe:0", *colours),
         *(*video, *exact, "-movflags", "+faststart"),
         *("-f", "mp4", f"file:{draft.absolute()}"),
     ]
 
 
-@contextmanager
-def _running(command: list[str], said: IO[bytes]) -> Iterator[subprocess.Popen[bytes]]:
-    """Yield a process that reads what is written to it; it has ended afterwards in any case."""
-    process = subprocess.Popen(
-        command,
-        stdin=subprocess.PIPE,
-        stdout=subprocess.DEVNULL,
-        stderr=said,
-        process_group=0,  # an interrupt is for us, who then end it
-    )
-    try:
-        yield process
-    finally:
-        if process.poll() is None:
+def _save_mp4(pictures: Iterable[Image.Image], command: list[str], path: Path, draft: Path) -> None:
+    """Have ffmpeg write a draft of ``path``; its process has ended when this returns or raises.
+
+    The same pictures give the same bytes with the same ffmpeg.
+    """
+    with tempfile.TemporaryFile() as errors:
+        process = subprocess.Popen(
+            command,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.DEVNULL,
+            stderr=errors,
+            process_group=0,  # Ctrl-C is for this process, which then ends ffmpeg
+        )
+        pipe = process.stdin
+        assert pipe is not None
+        try:
+            with suppress(BrokenPipeError):  # ffmpeg has failed: its errors give the reason
+                for picture in pictures:
+                    pipe.write(picture.tobytes())
+                pipe.close()
+            process.wait()
+        finally:
             process.kill()
             process.wait()
-        if process.stdin is not None:
             with suppress(OSError):
-                process.stdin.close()
+                pipe.close()
+        if process.returncode != 0:
+            errors.seek(0)
+            raise EnvironmentFailure(_why(path, errors.read().decode(errors="replace"), draft))
 
 
-def _why(path: Path, said: str, draft: Path) -> str:
+def _why(path: Path, output: str, draft: Path) -> str:
     """Return one line about why ffmpeg failed."""
-    lines = [line.strip() for line in said.splitlines() if line.strip()]
+    lines = [line.strip() for line in output.splitlines() if line.strip()]
     reason = re.sub(r"^\[[^]]*\] ", "", lines[0]) if lines else "it gave no reason"
     reason = reason.replace(f"file:{draft.absolute()}", str(path)).replace(str(draft), str(path))
     return f"ffmpeg could not write {path}: {reason}"
@@ -293,10 +254,24 @@ def _why(path: Path, said: str, draft: Path) -> str:
 # --- GIF ------------------------------------------------------------------------------------------
 
 
+def _save_gif(pictures: Iterable[Image.Image], palette: Image.Image, fps: int, draft: Path) -> None:
+    """Write a GIF that repeats for ever.
+
+    All frames have the colours of one palette, so none flickers. Equal ones in a row become one
+    that lasts longer. Pillow keeps all in memory until it writes them.
+    """
+    frames = (one.quantize(palette=palette, dither=Image.Dither.NONE) for one in pictures)
+    with draft.open("xb") as file:
+        next(frames).save(
+            file, "GIF", save_all=True, append_images=frames, loop=0, disposal=1, optimize=True,
+            duration=10 * max(round(100 / fps), 2),
+        )  # fmt: skip
+
+
 def _palette(samples: Iterable[Image.Image]) -> Image.Image:
     """Return a picture whose palette has at most 255 colours, the most frequent of some pictures.
 
-    The first of them serve areas, text and robots, and are found again exactly: Pillow looks up the
+    The first of them are those of areas, text and robots, and stay exact: Pillow looks up the
     colour that is nearest to the lower corner of a cube of 4 x 4 x 4. Others are well apart.
     """
     counts: Counter[Any] = Counter()
