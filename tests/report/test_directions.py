@@ -12,7 +12,7 @@ from conevo.campaigns.schema import SCHEMA
 from conevo.campaigns.tables import Tables
 from conevo.report.exhibits import Exhibit, Section
 from conevo.report.sections.comparisons import comparisons
-from conevo.report.sections.interventions import lesions
+from conevo.report.sections.interventions import interventions
 from conevo.report.sections.performance import performance
 from conevo.report.sections.scope import scopes
 from report.claims.known_truth import Cell, write_tables
@@ -41,7 +41,7 @@ def pairs_of(section: Section) -> Exhibit:
 def test_the_smaller_of_two_distances_is_the_better(tmp_path: Path) -> None:
     with Tables(directed(tmp_path, TRUTH)) as tables:
         (scope,) = scopes(tables)
-        section, reached, lost = comparisons(scope), performance(scope), lesions(scope)
+        section, reached, lost = comparisons(scope), performance(scope), interventions(scope)[0]
     assert reached.title == "Task performance: value (cm, smaller is better)"
     assert section is not None
     table = pairs_of(section)
@@ -59,7 +59,7 @@ def test_the_smaller_of_two_distances_is_the_better(tmp_path: Path) -> None:
 def test_more_is_lost_where_more_is_better(tmp_path: Path) -> None:
     with Tables(write_tables(tmp_path, "rover-v2", TRUTH, 10, 0.05)) as tables:
         (scope,) = scopes(tables)
-        section, lost = comparisons(scope), lesions(scope)
+        section, lost = comparisons(scope), interventions(scope)[0]
     assert section is not None
     assert pairs_of(section).rows[0]["verdict"] == "better"
     assert all(row["lost"] == pytest.approx(20, abs=2) for row in lost.exhibits[0].rows)

@@ -21,7 +21,7 @@ from conevo.report.learning_curves import read_histories
 from conevo.report.sections.behaviours import behaviours
 from conevo.report.sections.castes import castes
 from conevo.report.sections.champions import champions
-from conevo.report.sections.interventions import lesions
+from conevo.report.sections.interventions import interventions
 from conevo.report.sections.scope import scopes
 from report.finished_runs import Cell, cells, mean_of, write_campaign
 
@@ -226,7 +226,7 @@ def test_intervals_of_losses_end_where_losses_do(tmp_path) -> None:
             "UPDATE scores SET value = CASE WHEN team = 'whole' THEN 1 WHEN contains(run, '-s1')"
             " THEN 0.5 ELSE 0 END WHERE study = 'lesion'"
         )
-        figure, table = lesions(scopes(tables)[0]).exhibits
+        figure, table = interventions(scopes(tables)[0])[0].exhibits
     ends = [row["interval"] for row in table.rows if row["n"] > 1 and row["interval"][0]]
     assert max(high for _, high in ends) == 100.0
     assert min(low for low, _ in ends) >= -100.0

@@ -9,9 +9,11 @@ import csv
 import io
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Generic
+
+from typing_extensions import TypeVar
 
 from conevo import numbers
 from conevo.numbers import decimals
@@ -27,10 +29,12 @@ __all__ = [
     "number",
     "p_value",
     "plain",
+    "rows_of",
     "slug",
     "with_values",
 ]
 
+Item = TypeVar("Item", default=Any)
 Row = Mapping[str, Any]
 NOTHING = "–"
 MOST_OPEN = 12  # rows of a table that a page shows without being asked
@@ -61,20 +65,22 @@ def plain(value: Any) -> str:
 
 
 @dataclass(frozen=True)
-class Column:
+class Column(Generic[Item]):
     """A column of a table.
 
     Attributes:
         key: of the rows, and its name in CSV (a pair gets two: KEY_low, KEY_high).
-        title: above it.
+        title: its heading; empty if only CSV has the column.
         show: makes the text of a cell.
         is_wide: whether it holds sentences, which need a width of their own.
+        of: returns its value for an item (``rows_of``).
     """
 
     key: str
-    title: str
+    title: str = ""
     show: Callable[[Any], str] = number
     is_wide: bool = False
+    of: Callable[[Item], Any] = field(default=lambda _: None, kw_only=True)
 
     @property
     def is_text(self) -> bool:
@@ -114,7 +120,7 @@ class Exhibit:
     name: str
     title: str
     note: str
-    columns: Sequence[Column]
+    columns: Sequence[Column[Any]]
     rows: Sequence[Row]
     numbers: Sequence[Row] = field(default=(), kw_only=True)
 
@@ -145,6 +151,20 @@ class Table(Exhibit):
     """
 
     is_folded: bool | None = None
+
+    @classmethod
+    def of(
+        cls,
+        name: str,
+        title: str,
+        note: str,
+        columns: Sequence[Column[Item]],
+        items: Iterable[Item],
+        is_folded: bool | None = None,
+    ) -> Table:
+        """Return a table with a row per item."""
+        shown = [column for column in columns if column.title]
+        return cls(name, title, note, shown, rows_of(columns, items), is_folded)
 
     @property
     def is_open(self) -> bool:
@@ -193,7 +213,12 @@ class Section:
         return [*self.exhibits, *(one for part in self.sections for one in part.all_exhibits())]
 
 
-def with_values(columns: Sequence[Column], rows: Sequence[Row]) -> list[Column]:
+def rows_of(columns: Sequence[Column[Item]], items: Iterable[Item]) -> list[dict[str, Any]]:
+    """Return a row of numbers for each item: the value of every column."""
+    return [{column.key: column.of(item) for column in columns} for item in items]
+
+
+def with_values(columns: Sequence[Column[Item]], rows: Sequence[Row]) -> list[Column[Item]]:
     """Return the columns that have a value in one of the rows."""
     return [
         column

@@ -43,7 +43,7 @@ from conevo.report.sections.champions import champions
 from conevo.report.sections.claims import claims
 from conevo.report.sections.comparisons import comparisons
 from conevo.report.sections.composed import composed
-from conevo.report.sections.interventions import clones, lesions, rotations
+from conevo.report.sections.interventions import interventions
 from conevo.report.sections.learning import learning
 from conevo.report.sections.metrics import definitions, metrics
 from conevo.report.sections.overview import overview, repetition
@@ -124,9 +124,7 @@ def _about(scope: Scope, title: str, spent: Spent) -> Section:
         learning(scope, histories),
         signal(scope),
         castes(scope, histories),
-        lesions(scope),
-        clones(scope),
-        rotations(scope),
+        *interventions(scope),
         composed(scope),
         metrics(scope),
         behaviours(scope),

@@ -28,7 +28,6 @@ becomes "-" in measures and "," becomes ";" in algorithms, because the library c
 
 from __future__ import annotations
 
-from collections import defaultdict
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -86,40 +85,37 @@ def left_out(tables: Tables) -> list[str]:
 
 def _environments(tables: Tables) -> dict[str, Cells]:
     """Return all runs that have a test and a curve, by environment."""
-    tests: dict[str, list[float]] = defaultdict(list)
-    rows = tables.query(
-        "SELECT run, s.value FROM scores s JOIN runs r USING (run) WHERE s.study = 'test' AND"
-        " s.team = 'champion' AND s.measure = r.measure ORDER BY run, s.scenario"
-    )[1]
-    for run, value in rows:
-        tests[run].append(value)
-    curves: dict[str, tuple[list[int], list[float]]] = defaultdict(lambda: ([], []))
-    rows = tables.query("SELECT run, team_steps, value FROM generations ORDER BY run, generation")[
-        1
-    ]
-    for run, team_steps, value in rows:
-        curves[run][0].append(team_steps)
-        curves[run][1].append(value)
     found: dict[str, Cells] = {}
     rows = tables.query(
-        "SELECT run, seed, world, family, preset, environment, method, variant, measure,"
-        " coalesce(larger_is_better, true) FROM runs LEFT JOIN measures USING (run, measure)"
-        " ORDER BY world, family, preset, number, environment, method, variant, seed, run"
+        """
+        WITH tests AS (
+            SELECT run, list(s.value ORDER BY s.scenario) AS test
+            FROM scores s JOIN runs r USING (run, measure)
+            WHERE s.study = 'test' AND s.team = 'champion' GROUP BY run
+        ), curves AS (
+            SELECT run, list(team_steps ORDER BY generation) AS team_steps,
+                   list(value ORDER BY generation) AS reached
+            FROM generations GROUP BY run
+        )
+        SELECT run, seed, world, family, preset, environment, method, variant, measure,
+               coalesce(larger_is_better, true), curves.team_steps, reached, test
+        FROM runs JOIN tests USING (run) JOIN curves USING (run)
+             LEFT JOIN measures USING (run, measure)
+        ORDER BY world, family, preset, number, environment, method, variant, seed, run
+        """
     )[1]
-    for run, seed, world, family, preset, task, method, variant, measure, larger in rows:
-        if run not in tests or run not in curves:
-            continue
-        if not np.isfinite(np.array(tests[run] + curves[run][1], dtype=float)).all():
+    for run, seed, world, family, preset, task, method, variant, measure, larger, *curve in rows:
+        steps, values, test = curve
+        if not np.isfinite(np.array(values + test, dtype=float)).all():
             continue
         environment = " ".join(part for part in (world, family, preset) if part)
         algorithm = " ".join(part for part in (method, variant) if part).replace(",", ";")
-        steps, values = curves[run]
-        one = _Run(run, seed, measure.replace("_", "-"), steps, values, tests[run])
+        one = _Run(run, seed, measure.replace("_", "-"), steps, values, test)
         if not larger:
             one = one._replace(
                 measure=f"negated-{one.measure}",
-                values=[-value for value in one.values],
-                test=[-value for value in one.test],
+                values=[-value for value in values],
+                test=[-value for value in test],
             )
         found.setdefault(environment, {}).setdefault(task, {}).setdefault(algorithm, []).append(one)
     return found

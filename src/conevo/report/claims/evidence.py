@@ -228,19 +228,22 @@ def _exchange(sample: Sample, runs: Sequence[RunOf]) -> Exchange:
     """Return what runs exchanged between populations, in the mean; nothing unless all could."""
     if not QUANTITIES[sample.quantity].needs_exchange:
         return None, None
-    made = [one.exchanges for one in runs if one.exchanges is not None]
-    shares = [one.exchange_share for one in runs if one.exchange_share is not None]
-    if not runs or len(made) < len(runs) or len(shares) < len(runs):
-        return None, None
-    return math.fsum(made) / len(runs), math.fsum(shares) / len(runs)
+    made = _mean_of_all([one.exchanges for one in runs])
+    share = _mean_of_all([one.exchange_share for one in runs])
+    return (None, None) if made is None or share is None else (made, share)
 
 
 def _reliability(sample: Sample, runs: Sequence[RunOf]) -> float | None:
     """Return the mean reliability of fitness in runs; None unless all have a study of it."""
     if not QUANTITIES[sample.quantity].needs_signal:
         return None
-    known = [one.reliability for one in runs if one.reliability is not None]
-    return math.fsum(known) / len(runs) if runs and len(known) == len(runs) else None
+    return _mean_of_all([one.reliability for one in runs])
+
+
+def _mean_of_all(values: Sequence[float | None]) -> float | None:
+    """Return the mean of values; None without any, or if one is missing."""
+    known = [value for value in values if value is not None]
+    return math.fsum(known) / len(known) if known and len(known) == len(values) else None
 
 
 def _usual(of: Mapping[str, list[Valued]]) -> str:

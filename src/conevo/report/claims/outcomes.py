@@ -82,6 +82,18 @@ class Answer:
         return one is not None and one.mean_a == 0 and one.mean_b == 0
 
     @property
+    def sizes(self) -> str:
+        """The number of runs of each sample."""
+        return ", ".join(str(len(sample)) for sample in self.gathered.samples)
+
+    @property
+    def value(self) -> float | None:
+        """The difference, share or mean."""
+        if self.comparison is not None:
+            return self.comparison.difference
+        return self.estimate.value if self.estimate else None
+
+    @property
     def interval(self) -> tuple[float | None, float | None]:
         """The 95 % interval of the difference, share or mean."""
         found = self.comparison or self.estimate

@@ -60,6 +60,8 @@ SIMILAR = f"""
     SELECT run, (avg(gst) <= {SIMILAR_BELOW})::INTEGER FROM generations
     WHERE gst IS NOT NULL GROUP BY run
 """
+RARELY = f"SELECT run, (exchange_share <= {RARE})::INTEGER FROM runs"
+NO_EXCHANGE = "no exchange between populations"
 CASTES = "SELECT run, ({condition})::INTEGER FROM robots GROUP BY run"
 HAS_ANY = "bool_or(caste = 'non-specialized')"
 SPECIALIZED = "count(DISTINCT caste) FILTER (WHERE caste NOT IN ('non-specialized', 'move'))"
@@ -122,26 +124,25 @@ def _cloned(teams: str, lacks: str) -> Quantity:
     return Quantity(_query(played + BEST.format(teams=teams)), lacks, needs_exchange=False)
 
 
+def _is(sql: str, lacks: str) -> Quantity:
+    """Return whether a condition holds in a run."""
+    return Quantity(_query(sql), lacks, is_share=True)
+
+
 def _castes(condition: str) -> Quantity:
     """Return whether the castes of a team fulfil a condition."""
-    read = _query(CASTES.format(condition=condition))
-    return Quantity(read, "no castes recorded", is_share=True)
+    return _is(CASTES.format(condition=condition), "no castes recorded")
 
 
-def _collective(behaviour: str) -> Quantity:
-    read = _query(SEEN.format(kind="collective", behaviour=behaviour))
-    return Quantity(read, "no behaviours recorded", is_share=True)
-
-
-def _captures(behaviour: str) -> Quantity:
-    return Quantity(_query(CAPTURES.format(behaviour=behaviour)), "no behaviours recorded")
+def _seen(kind: str, behaviour: str) -> Quantity:
+    """Return whether a behaviour was seen in a run, "individual" or "collective"."""
+    return _is(SEEN.format(kind=kind, behaviour=behaviour), "no behaviours recorded")
 
 
 def _members(*behaviours: str) -> Quantity:
     """Return whether robots are specialized to these collective behaviours, and others to none."""
     names = " and ".join(sorted(("non-specialized", *behaviours)))
-    read = _query(MEMBERS.format(behaviours=names))
-    return Quantity(read, "no members of behaviours recorded", is_share=True)
+    return _is(MEMBERS.format(behaviours=names), "no members of behaviours recorded")
 
 
 def _when_shaped(is_shaped: bool) -> Reading:
@@ -151,15 +152,9 @@ def _when_shaped(is_shaped: bool) -> Reading:
     }
 
 
-def _exchanged(value: str, is_share: bool = False) -> Quantity:
-    read = _query(f"SELECT run, {value} FROM runs")
-    return Quantity(
-        read,
-        "no exchange between populations",
-        is_share,
-        needs_exchange=False,
-        needs_signal=False,
-    )
+def _exchanged(sql: str, lacks: str, is_share: bool) -> Quantity:
+    """Return something about the exchange itself, which no exchange and no signal invalidate."""
+    return Quantity(_query(sql), lacks, is_share, needs_exchange=False, needs_signal=False)
 
 
 COLLECTIVES = ("entrapment", "pursuer-blocker", "spiders-fly", "role-switcher")
@@ -209,13 +204,14 @@ QUANTITIES: dict[str, Quantity] = {
         f"constructors of {kind}": _castes(f"bool_or(caste = '{kind}-constructor')")
         for kind in "ABC"
     },
-    "idle predators": Quantity(
-        _query(SEEN.format(kind="individual", behaviour="idle")),
-        "no behaviours recorded",
-        is_share=True,
-    ),
-    **{behaviour: _collective(behaviour) for behaviour in COLLECTIVES},
-    **{f"captures by {behaviour}": _captures(behaviour) for behaviour in COLLECTIVES},
+    "idle predators": _seen("individual", "idle"),
+    **{behaviour: _seen("collective", behaviour) for behaviour in COLLECTIVES},
+    **{
+        f"captures by {name}": Quantity(
+            _query(CAPTURES.format(behaviour=name)), "no behaviours recorded"
+        )
+        for name in COLLECTIVES
+    },
     "members of nothing": _members(),
     "members of pursuer-blocker and spiders-fly": _members("pursuer-blocker", "spiders-fly"),
     "members of spiders-fly and role-switcher": _members("spiders-fly", "role-switcher"),
@@ -223,18 +219,10 @@ QUANTITIES: dict[str, Quantity] = {
     "delivered after shaping": Quantity(_when_shaped(True), "no shaping", is_apart=True),
     "delivered directly": Quantity(_when_shaped(False), "no direct evolution", is_apart=True),
     "change": Quantity(changed, "no runs of changed and unchanged settings"),
-    "exchange": _exchanged("exchange_share"),
-    "rare exchange": _exchanged(f"(exchange_share <= {RARE})::INTEGER", is_share=True),
-    "similar genotypes": Quantity(
-        _query(SIMILAR),
-        "no threshold of similarity",
-        is_share=True,
-        needs_exchange=False,
-        needs_signal=False,
-    ),
-    "three hidden neurons": Quantity(
-        _query(HIDDEN.format(n=3)), "no champion recorded", is_share=True
-    ),
+    "exchange": _exchanged("SELECT run, exchange_share FROM runs", NO_EXCHANGE, False),
+    "rare exchange": _exchanged(RARELY, NO_EXCHANGE, True),
+    "similar genotypes": _exchanged(SIMILAR, "no threshold of similarity", True),
+    "three hidden neurons": _is(HIDDEN.format(n=3), "no champion recorded"),
 }
 """Name -> what it is; ``rover``, ``pursuit`` and ``gacc`` say what claims make of them.
 

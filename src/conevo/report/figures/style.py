@@ -12,9 +12,6 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
-import numpy as np
-import numpy.typing as npt
-
 from conevo.report.figures.lettering import (
     FONT,
     LINE,
@@ -223,11 +220,6 @@ def spread_of(i: int, n: int) -> float:
 def marker_size(cells: int) -> float:
     """Return the size of points for a number of cells next to each other."""
     return 4.0 if cells <= 10 else 3.0 if cells <= 30 else 2.2
-
-
-def numbers(values: Sequence[float | None]) -> npt.NDArray[np.float64]:
-    """Return values with NaN for None."""
-    return np.array([math.nan if value is None else value for value in values], dtype=np.float64)
 
 
 def ticks_of(

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections import Counter
-from typing import Any
 
 from conevo.campaigns.tables import Tables
 from conevo.report.claims import Verdict, verdicts
+from conevo.report.claims.outcomes import Answer
 from conevo.report.claims.wording import place_of, what_of
-from conevo.report.exhibits import Column, Section, Table, interval, number, p_value, plain
+from conevo.report.exhibits import Column, Section, Table, interval, p_value, plain
 from conevo.studies.exchange import per_generation
 from conevo.studies.repeatability import LEAST_RELIABILITY
 
@@ -38,19 +38,8 @@ def claims(tables: Tables) -> Section:
         + "."
         + (f" {rest}" if absent else "")
     ]
-    columns = [
-        Column("place", "claim", plain),
-        *_level(found),
-        Column("claim", "claim of the thesis", plain, is_wide=True),
-        Column("effect", "effect", plain, is_wide=True),
-        Column("interval", "95 % interval", interval),
-        Column("n", "n", plain),
-        Column("exchanges", "exchange", plain),
-        Column("how", "tests; budget", plain, is_wide=True),
-        Column("verdict", "verdict", plain, is_wide=True),
-        Column("reasons", "why", plain, is_wide=True),
-    ]
-    levels = "Levels: of the runs that a verdict is about. " if _level(found) else ""
+    has_levels = any(one.variant for one in found)
+    levels = "Levels: of the runs that a verdict is about. " if has_levels else ""
     note = (
         f"{levels}n: runs per sample. Exchange: pairs of sub-populations of CONE that recombined "
         "between populations in a generation, and of those that could have; where that is next to "
@@ -62,81 +51,59 @@ def claims(tables: Tables) -> Section:
         "and the interval of the difference inside ±15 % of the larger mean. Power: how often "
         "methods that are exactly alike would be found so, with as many runs that scatter as much."
     )
-    rows = [_row(one) for one in found]
-    table = Table("claims", title, note, columns, rows, is_folded=False)
-    return Section(title, [*text, INCONSISTENT], [table, _statements(found)])
+    table = Table.of("claims", title, note, _columns(has_levels), found, is_folded=False)
+    return Section(title, [*text, INCONSISTENT], [table, _statements(found, has_levels)])
 
 
-def _row(one: Verdict) -> dict[str, Any]:
-    """Return a claim's row."""
-    reasons = [one.caution, one.why]
-    if one.alone != one.verdict:
-        reasons.insert(1, f"by itself: {one.alone}")
-    exchanges, share = one.exchange
-    return {
-        "id": one.id,
-        "place": f"{one.id} ({one.source})",
-        "variant": one.variant or None,
-        "claim": one.claim,
-        "source": one.source,
-        "effect": one.effect,
-        "interval": (one.low, one.high),
-        "n": one.n,
-        "exchanges": per_generation(exchanges, share),
-        "budget": one.budget,
-        "tests": one.tests,
-        "how": f"{one.tests}; {one.budget}",
-        "verdict": one.verdict,
-        "power": one.power,
-        "reasons": "; ".join(reason for reason in reasons if reason),
-    }
+def _columns(has_levels: bool) -> list[Column[Verdict]]:
+    """Return the columns of a claim; levels are shown if the campaign has any."""
+    return [
+        Column("id", of=lambda one: one.id),
+        Column("place", "claim", plain, of=lambda one: f"{one.id} ({one.source})"),
+        Column("variant", "levels" * has_levels, plain, of=lambda one: one.variant or None),
+        Column("claim", "claim of the thesis", plain, is_wide=True, of=lambda one: one.claim),
+        Column("source", of=lambda one: one.source),
+        Column("effect", "effect", plain, is_wide=True, of=lambda one: one.effect),
+        Column("interval", "95 % interval", interval, of=lambda one: (one.low, one.high)),
+        Column("n", "n", plain, of=lambda one: one.n),
+        Column("exchanges", "exchange", plain, of=lambda one: per_generation(*one.exchange)),
+        Column("budget", of=lambda one: one.budget),
+        Column("tests", of=lambda one: one.tests),
+        Column(
+            "how", "tests; budget", plain, is_wide=True, of=lambda one: f"{one.tests}; {one.budget}"
+        ),
+        Column("verdict", "verdict", plain, is_wide=True, of=lambda one: one.verdict),
+        Column("power", of=lambda one: one.power),
+        Column("reasons", "why", plain, is_wide=True, of=_reasons),
+    ]
 
 
-def _level(found: list[Verdict]) -> list[Column]:
-    """Return the column of the levels that verdicts belong to, if the campaign has any."""
-    has_any = any(one.variant for one in found)
-    return [Column("variant", "levels", plain)] if has_any else []
+def _reasons(one: Verdict) -> str:
+    alone = "" if one.alone == one.verdict else f"by itself: {one.alone}"
+    return "; ".join(reason for reason in (one.caution, alone, one.why) if reason)
 
 
-def _statements(found: list[Verdict]) -> Table:
+def _statements(found: list[Verdict], has_levels: bool) -> Table:
     """Return every comparison and share that a verdict was made of."""
-    rows: list[dict[str, Any]] = []
-    for one in found:
-        for cell in one.cells:
-            if not cell.has_runs:
-                continue
-            result, estimate = cell.comparison, cell.estimate
-            value = result.difference if result else estimate.value if estimate else None
-            rows.append(
-                {
-                    "id": one.id,
-                    "variant": one.variant or None,
-                    "environment": place_of(cell.statement),
-                    "what": what_of(cell.statement),
-                    "n": ", ".join(str(len(sample)) for sample in cell.gathered.samples),
-                    "value": value,
-                    "interval": cell.interval,
-                    "p_t": result.p_t if result else None,
-                    "p_mann_whitney": result.p_mann_whitney if result else None,
-                    "p_holm": cell.p_holm,
-                    "by_t": cell.by_t.name.lower(),
-                    "by_rank": cell.by_rank.name.lower(),
-                    "budget": one.budget,
-                }
-            )
-    columns = [
-        Column("id", "claim", plain),
-        *_level(found),
-        Column("environment", "environment", plain),
-        Column("what", "what", plain, is_wide=True),
-        Column("n", "n", plain),
-        Column("value", "difference or share", number),
-        Column("interval", "95 % interval", interval),
-        Column("p_t", "p (t)", p_value),
-        Column("p_holm", "p (MW, Holm)", p_value),
-        Column("by_t", "by t-test", plain),
-        Column("by_rank", "by Mann-Whitney", plain),
+    columns: list[Column[tuple[Verdict, Answer]]] = [
+        Column("id", "claim", plain, of=lambda one: one[0].id),
+        Column("variant", "levels" * has_levels, plain, of=lambda one: one[0].variant or None),
+        Column("environment", "environment", plain, of=lambda one: place_of(one[1].statement)),
+        Column("what", "what", plain, is_wide=True, of=lambda one: what_of(one[1].statement)),
+        Column("n", "n", plain, of=lambda one: one[1].sizes),
+        Column("value", "difference or share", of=lambda one: one[1].value),
+        Column("interval", "95 % interval", interval, of=lambda one: one[1].interval),
+        Column("p_t", "p (t)", p_value, of=lambda one: one[1].comparison and one[1].comparison.p_t),
+        Column(
+            "p_mann_whitney",
+            of=lambda one: one[1].comparison and one[1].comparison.p_mann_whitney,
+        ),
+        Column("p_holm", "p (MW, Holm)", p_value, of=lambda one: one[1].p_holm),
+        Column("by_t", "by t-test", plain, of=lambda one: one[1].by_t.name.lower()),
+        Column("by_rank", "by Mann-Whitney", plain, of=lambda one: one[1].by_rank.name.lower()),
+        Column("budget", of=lambda one: one[0].budget),
     ]
     note = "n: runs of each sample; intervals as in the claim's row."
     title = "Every statement that the verdicts are made of"
-    return Table("claims-statements", title, note, columns, rows, is_folded=True)
+    items = [(one, answer) for one in found for answer in one.cells if answer.has_runs]
+    return Table.of("claims-statements", title, note, columns, items, is_folded=True)

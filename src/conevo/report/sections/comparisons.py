@@ -3,13 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
-from conevo.report.comparison import (
-    Cell,
-    Pair,
-    compare_all,
-)
+from conevo.report.comparison import Cell, Pair, compare_all
 from conevo.report.exhibits import (
     Column,
     Exhibit,
@@ -19,6 +14,7 @@ from conevo.report.exhibits import (
     interval,
     p_value,
     plain,
+    rows_of,
 )
 from conevo.report.figures import tiles
 from conevo.report.power import power_of_pair
@@ -46,6 +42,23 @@ TESTS = (
     "the same, corrected by Holm for all {n} pairs of this table; A12: probability that a run of "
     "the first is better than one of the second (Vargha and Delaney)."
 )
+
+COLUMNS: list[Column[Pair]] = [
+    Column("environment", "environment", plain, of=lambda pair: pair.environment),
+    Column("first", "first", plain, of=lambda pair: pair.a.title),
+    Column("second", "second", plain, of=lambda pair: pair.b.title),
+    Column("n_first", of=lambda pair: pair.result.n_a),
+    Column("n_second", of=lambda pair: pair.result.n_b),
+    Column("n", "n", plain, of=lambda pair: f"{pair.result.n_a}, {pair.result.n_b}"),
+    Column("difference", "difference", of=lambda pair: pair.result.difference),
+    Column("interval", "95 % interval", interval, of=lambda p: (p.result.low, p.result.high)),
+    Column("p_t", "p (t)", p_value, of=lambda pair: pair.result.p_t),
+    Column("p_welch", "p (Welch)", p_value, of=lambda pair: pair.result.p_welch),
+    Column("p_mann_whitney", "p (MW)", p_value, of=lambda pair: pair.result.p_mann_whitney),
+    Column("p_holm", "p (MW, Holm)", p_value, of=lambda pair: pair.p_holm),
+    Column("a12", "A12", of=lambda pair: pair.a12),
+    Column("smallest_p", of=lambda pair: pair.result.smallest_p),
+]
 
 
 def comparisons(scope: Scope) -> Section | None:
@@ -119,7 +132,7 @@ def _map(scope: Scope, pairs: Sequence[Pair]) -> list[Figure]:
         f"Mann-Whitney's p after Holm's correction over {pairs[0].n_tests} pairs. {size} per "
         "sample.",
         (),
-        [_pair_row(scope, pair) for pair in pairs],
+        rows_of([*COLUMNS, Column("verdict", of=lambda pair: pair.verdict)], pairs),
         drawing=tiles.heat_map(rows, list(places.values()), cells, legend, x_label=scope.axis),
     )
     return [figure]
@@ -131,35 +144,10 @@ def _cell_text(pair: Pair) -> str:
     return f"{sign} {p.removeprefix('0')}" if p[0] in "0" else f"{sign} {p}"
 
 
-def _pair_row(scope: Scope, pair: Pair) -> dict[str, Any]:
-    result = pair.result
-    return {
-        "environment": pair.environment,
-        "first": pair.a.title,
-        "second": pair.b.title,
-        "n_first": result.n_a,
-        "n_second": result.n_b,
-        "n": f"{result.n_a}, {result.n_b}",
-        "difference": result.difference,
-        "interval": (result.low, result.high),
-        "p_t": result.p_t,
-        "p_welch": result.p_welch,
-        "p_mann_whitney": result.p_mann_whitney,
-        "p_holm": pair.p_holm,
-        "a12": pair.a12,
-        "smallest_p": result.smallest_p,
-        "verdict": pair.verdict,
-    }
-
-
-def _judged(pair: Pair, untested: Mapping[Cell, str]) -> dict[str, Any]:
-    """Return a pair's verdict, with what it does not test, and the power of "alike"."""
+def _why_untested(pair: Pair, untested: Mapping[Cell, str]) -> list[str]:
+    """Return why a comparison does not test methods; nothing if it does."""
     both = (Cell(pair.environment, one) for one in (pair.a, pair.b))
-    why = sorted({untested[cell] for cell in both if cell in untested})
-    return {
-        "verdict": ", ".join([pair.verdict, *why]),
-        "power": power_of_pair(pair.samples[0], pair.samples[1]),
-    }
+    return sorted({untested[cell] for cell in both if cell in untested})
 
 
 def _pair_table(
@@ -171,21 +159,6 @@ def _pair_table(
     *,
     is_folded: bool | None = None,
 ) -> Table:
-    columns = [
-        Column("environment", "environment", plain),
-        Column("first", "first", plain),
-        Column("second", "second", plain),
-        Column("n", "n", plain),
-        Column("difference", "difference"),
-        Column("interval", "95 % interval", interval),
-        Column("p_t", "p (t)", p_value),
-        Column("p_welch", "p (Welch)", p_value),
-        Column("p_mann_whitney", "p (MW)", p_value),
-        Column("p_holm", "p (MW, Holm)", p_value),
-        Column("a12", "A12"),
-        Column("verdict", "verdict", plain),
-        Column("power", "power"),
-    ]
     tests = TESTS.format(n=pairs[0].n_tests if pairs else 0, exact=EXACT_RUNS)
     note = (
         f"{measure.direction.capitalize()}. Difference: mean of the first less that of the second; "
@@ -194,12 +167,15 @@ def _pair_table(
         "probability that two exactly alike methods, with this number and spread of runs, are "
         "found alike." + "".join(f" {NOTES[why]}" for why in sorted(set(untested.values())))
     )
-    rows = [_pair_row(scope, pair) | _judged(pair, untested) for pair in pairs]
-    return Table(
-        f"{stem}-comparisons",
-        f"Every two methods compared: {measure.axis}",
-        note,
-        columns,
-        rows,
-        is_folded,
-    )
+    columns = [
+        *COLUMNS,
+        Column(
+            "verdict",
+            "verdict",
+            plain,
+            of=lambda pair: ", ".join([pair.verdict, *_why_untested(pair, untested)]),
+        ),
+        Column("power", "power", of=lambda pair: power_of_pair(*pair.samples)),
+    ]
+    title = f"Every two methods compared: {measure.axis}"
+    return Table.of(f"{stem}-comparisons", title, note, columns, pairs, is_folded)

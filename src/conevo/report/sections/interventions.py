@@ -27,7 +27,7 @@ from conevo.report.figures import charts as figures
 from conevo.report.sections.scope import KEYS, Scope, named, sizes
 from conevo.report.statistics import compare, mean_interval, with_holm
 
-__all__ = ["clones", "lesions", "rotations"]
+__all__ = ["interventions"]
 
 MOST = 100.0  # percent that can be lost, and gained: of the larger of two performances
 ROTATED = "rotated"  # the study without castes
@@ -56,56 +56,57 @@ class _Team(NamedTuple):
         return 100 * lost / self.scale
 
 
-def lesions(scope: Scope) -> Section:
-    """Return what is left when all robots of a caste are replaced by heuristic ones."""
-    return _section(
-        scope,
-        "lesion",
+class _Study(NamedTuple):
+    """An intervention: the title of its section, what is changed, and how."""
+
+    title: str
+    what: str
+    note: str
+
+
+STUDIES = {
+    "lesion": _Study(
         "Lesions",
         "a caste replaced by heuristic robots",
         "All robots of a caste replaced by the heuristic controller that matches it; compared with "
         "the same team unlesioned in the same fresh scenarios.",
-    )
-
-
-def clones(scope: Scope) -> Section:
-    """Return what teams of clones of a caste's fittest robot reach."""
-    return _section(
-        scope,
-        "clones",
+    ),
+    "clones": _Study(
         "Behavioural validation: clones",
         "a caste cloned",
         "A team of clones of the caste's fittest robot; compared with the evolved team in the same "
         "fresh scenarios.",
-    )
-
-
-def rotations(scope: Scope) -> Section | None:
-    """Return what is left when controllers change places; None if no run was studied so."""
-    if not _teams(scope, ROTATED)[0]:
-        return None
-    return _section(
-        scope,
-        ROTATED,
+    ),
+    ROTATED: _Study(
         "Roles: controllers that change places",
         "controllers moved to other robots",
         "Every robot with the controller of the one K before it (conevo test RUN --rotate K), mean "
         "over all K from 1 to R - 1, so also over moves to robots of the same caste; compared with "
         "the evolved team in the same fresh scenarios. Nothing is lost where robots are alike, "
         "much where each has a role, also one that S and favourites do not see.",
-    )
+    ),
+}
 
 
-def _section(scope: Scope, study: str, title: str, what: str, note: str) -> Section:
-    cells, lost = _teams(scope, study)
+def interventions(scope: Scope) -> list[Section]:
+    """Return a section per study; none on changed places if no run was studied in that way."""
+    return [
+        _section(scope, name, cells, lost)
+        for name in STUDIES
+        for cells, lost in [_teams(scope, name)]
+        if cells or name != ROTATED
+    ]
+
+
+def _section(scope: Scope, study: str, cells: dict[Cell, list[_Team]], lost: int) -> Section:
     text = []
     if lost:
         text.append(f"Teams left out, as neither they nor the unchanged ones scored: {lost}.")
     if not cells:
-        return Section(title, text or ["None of these runs has an intervention study."])
-    rows = _rows(scope, cells)
-    figure, table = _figure(scope, study, what, note, cells), _table(scope, study, what, note, rows)
-    return Section(title, text, [figure, table])
+        none = "None of these runs has an intervention study."
+        return Section(STUDIES[study].title, text or [none])
+    exhibits = [_figure(scope, study, cells), _table(scope, study, _rows(scope, cells))]
+    return Section(STUDIES[study].title, text, exhibits)
 
 
 def _teams(scope: Scope, study: str) -> tuple[dict[Cell, list[_Team]], int]:
@@ -135,10 +136,9 @@ def _teams(scope: Scope, study: str) -> tuple[dict[Cell, list[_Team]], int]:
     return kept, len(found) - sum(map(len, kept.values()))
 
 
-def _figure(
-    scope: Scope, study: str, what: str, note: str, cells: dict[Cell, list[_Team]]
-) -> Exhibit:
+def _figure(scope: Scope, study: str, cells: dict[Cell, list[_Team]]) -> Exhibit:
     """Draw a point per run: the mean over its castes."""
+    _, what, note = STUDIES[study]
     means: dict[Cell, list[float]] = {}
     for cell, teams in cells.items():
         of_run = defaultdict(list)
@@ -212,7 +212,8 @@ def _percent(changed: float | None, whole: float | None) -> float | None:
     return 100 * changed / whole if changed is not None and whole else None
 
 
-def _table(scope: Scope, study: str, what: str, note: str, rows: list[dict[str, Any]]) -> Table:
+def _table(scope: Scope, study: str, rows: list[dict[str, Any]]) -> Table:
+    _, what, note = STUDIES[study]
     columns = [
         *KEYS,
         *_by_caste(study),
