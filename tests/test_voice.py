@@ -32,7 +32,9 @@ CHECKED = (
     "src/conevo/evolution/**/*.py",
     "src/conevo/kernels/*.py",
     "src/conevo/runs/*.py",
+    "src/conevo/report/**/*.py",
     "src/conevo/specialization/*.py",
+    "src/conevo/studies/*.py",
     "src/conevo/watch/*.py",
     "src/conevo/worlds/**/*.py",
 )

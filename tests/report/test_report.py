@@ -325,7 +325,7 @@ def test_budgets_stand_apart(tmp_path) -> None:
 def test_odd_campaigns_have_a_report_too(of, tmp_path) -> None:
     root = write_campaign(tmp_path / "c", of, 1, 2, without=["behaviours", "robots", "castes"])
     text = write_report(Campaign(root), tmp_path / "out").read_text()
-    assert text.count("There is one run per cell: no deviation, no interval, and nothing") == 1
+    assert text.count("One run per cell: no deviation, no interval, and nothing") == 1
     assert "Mann-Whitney" not in re.sub(r"(?s)<section id=.section-claims.*?</section>", "", text)
     assert "95 % interval" not in re.sub(r"(?s)<section id=.section-claims.*?</section>", "", text)
 

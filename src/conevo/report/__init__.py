@@ -1,1 +1,1 @@
-"""What a campaign shows: claims judged, statistics, tables and figures, on a page and for LaTeX."""
+"""The report of a campaign: verdicts on claims, statistics, tables and figures."""

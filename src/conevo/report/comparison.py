@@ -1,4 +1,4 @@
-"""What treatments reached, and every two of them compared: samples of runs, one value per run.
+"""The results of treatments, and every two of them compared: samples of runs, one value per run.
 
 A treatment is a method with the levels of a campaign's further factors. Runs are compared within a
 task and a budget only (``frames.Tables``); tasks of one family and budget make a ``Group``.
@@ -69,7 +69,7 @@ def agree(a: str, b: str) -> bool:
 
 
 class Group(NamedTuple):
-    """Tasks of one family, run at one budget: what may stand in one table."""
+    """Tasks of one family, run at one budget, which may share a table."""
 
     world: str
     family: str
@@ -77,7 +77,7 @@ class Group(NamedTuple):
 
     @property
     def condition(self) -> str:
-        """Which rows of runs with their budgets are its own, in SQL."""
+        """Its rows among the runs with their budgets, as a condition in SQL."""
         world, family, budget = (part.replace("'", "''") for part in self)
         return f"world = '{world}' AND family = '{family}' AND budget = '{budget}'"
 
@@ -91,7 +91,7 @@ class Cell(NamedTuple):
 
 @dataclass(frozen=True)
 class Summary:
-    """What the runs of a cell reached in one measure.
+    """The results of the runs of a cell in one measure.
 
     Attributes:
         values: of the runs, by seed.
@@ -131,7 +131,7 @@ class Pair:
 
     @property
     def gain(self) -> float:
-        """By how much the first is better than the second, below 0 if it is worse."""
+        """The advantage of the first over the second, below 0 if it is worse."""
         difference = self.result.difference or 0.0
         return difference if self.larger_is_better else -difference
 
@@ -159,7 +159,7 @@ class Pair:
 
     @property
     def verdict(self) -> str:
-        """What the tests say of the first: better, worse, alike or undecided."""
+        """The result for the first: better, worse, alike or undecided."""
         side = "better" if self.gain > 0 else "worse"
         if self.by_thesis and self.by_ranks:
             return side
@@ -205,7 +205,7 @@ def group_values(values: Iterable[RunValue]) -> dict[Group, dict[Cell, list[RunV
 
 
 def summarize(runs: Sequence[RunValue]) -> Summary:
-    """Return what the runs of a cell reached."""
+    """Return the results of the runs of a cell."""
     values = tuple(run.value for run in runs)
     sd = float(np.std(values, ddof=1)) if len(values) > 1 else None
     return Summary(values, mean_interval(values), sd, normality(values))

@@ -110,11 +110,11 @@ class Exhibit:
 
     Attributes:
         name: of its files, without an ending.
-        title: what it shows.
+        title: its subject.
         note: how to read it, with sizes and tests.
         columns: of its numbers.
         rows: its numbers; keys beyond those of the columns are written to CSV too.
-        numbers: what CSV has if that is not the rows.
+        numbers: rows of the CSV file if they differ from those of the table.
     """
 
     name: str
@@ -192,7 +192,7 @@ class Section:
         text: paragraphs.
         exhibits: tables and figures in order.
         sections: parts of it.
-        preformatted: text that stands as it is, such as commands.
+        preformatted: text shown unchanged, such as commands.
         name: where links go, if not after the title.
     """
 

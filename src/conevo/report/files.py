@@ -1,4 +1,4 @@
-"""Everything that a campaign says: one page, its tables as LaTeX, its figures, the numbers.
+"""The files of a report: one page, its tables as LaTeX, its figures, the numbers.
 
 ::
 

@@ -1,8 +1,8 @@
 """Tables and figures of a report for LaTeX: booktabs, captions that a paper can take.
 
-A table is no wider than ``TEXT_WIDTH``: its letters are those of Computer Modern, its headings are
-broken into lines, sentences into paragraphs, and what is still too wide is split by columns, each
-part with the columns that name its rows. Tables need the packages array and booktabs, figures
+A table is at most as wide as ``TEXT_WIDTH``, in letters of Computer Modern. Headings are broken
+into lines, sentences into paragraphs. A table that is still too wide is split by columns, and each
+part repeats the columns that name its rows. Tables need the packages array and booktabs, figures
 graphicx, and the document of all of them hyperref.
 """
 
@@ -201,7 +201,7 @@ def _set(
 ) -> _Part | None:
     """Return how columns are set in letters of a size; None if they are too wide together.
 
-    What is wider than a paragraph may be becomes one; with ``force`` paragraphs may be narrow.
+    Text wider than ``LEAST`` may become a paragraph; with ``force`` paragraphs may be narrower.
     """
     size, points, gap = letters
     natural = [
@@ -274,7 +274,7 @@ def _pages(lines: Sequence[int]) -> list[range]:
 
 
 def _body(rows: Sequence[Sequence[str]], columns: Sequence[int]) -> list[str]:
-    """Return rows: what the first cell repeats is left out, with room between its groups."""
+    """Return rows: a repeated first cell is left out, with room between its groups."""
     lines: list[str] = []
     last = None
     groups = len({row[columns[0]] for row in rows}) < len(rows)

@@ -41,7 +41,7 @@ STEPS = 20
 
 
 class _Run(NamedTuple):
-    """What is told about one run: its learning curve and its test."""
+    """The learning curve and the test of one run."""
 
     run: str
     seed: int
@@ -77,10 +77,12 @@ def export(tables: Tables) -> dict[str, Any]:
 
 
 def left_out(tables: Tables) -> list[str]:
-    """Return the runs of a campaign that ``export`` does not tell about, in alphabetical order."""
-    told = {one.run for cells in _environments(tables).values() for one in _runs(_rectangle(cells))}
+    """Return the runs of a campaign that ``export`` leaves out, in alphabetical order."""
+    exported = {
+        one.run for cells in _environments(tables).values() for one in _runs(_rectangle(cells))
+    }
     every = tables.query("SELECT run FROM runs ORDER BY run")[1]
-    return [run for (run,) in every if run not in told]
+    return [run for (run,) in every if run not in exported]
 
 
 def _environments(tables: Tables) -> dict[str, Cells]:

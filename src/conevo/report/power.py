@@ -1,9 +1,9 @@
-"""How likely it is that methods which are exactly alike are found alike: the power of that rule.
+"""The power of "alike": the probability of finding methods alike that are exactly alike.
 
-Absence of evidence is not evidence, so "alike" asks for an interval inside +-15 % of the larger
-mean (``statistics.is_alike``). Few runs that scatter rarely meet it even where it is true. Here
-campaigns are drawn in which it is: normal samples of the same mean, as many and as scattered as the
-runs are; only their means and variances are drawn, which are independent.
+Absence of evidence is not evidence, so "alike" needs an interval inside +-15 % of the larger mean
+(``statistics.is_alike``). Few runs that scatter rarely meet it even where it is true. Here
+campaigns in which it is true are drawn: normal samples of the same mean, with the number and
+scatter of the runs. Only their means and variances are drawn, which are independent.
 
 Choice: without the ranks. Mann-Whitney refuses a true "alike" less often than the t-test does, and
 nearly always together with it.
@@ -80,6 +80,6 @@ def found_alike(a: Redrawn, b: Redrawn, margin: float = 0.15) -> npt.NDArray[np.
 
 
 def power_of_pair(a: Sequence[float], b: Sequence[float]) -> float | None:
-    """Return how likely two methods that are exactly alike are found alike, None if unknown."""
+    """Return the probability of finding two equal methods alike, None if unknown."""
     one, other = draw(a, 0), draw(b, 1)
     return None if one is None or other is None else float(found_alike(one, other).mean())

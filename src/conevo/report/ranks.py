@@ -1,4 +1,4 @@
-"""Which of two samples of runs is above the other: ranks, and nothing but ranks."""
+"""Which of two samples of runs is above the other, by ranks only."""
 
 from __future__ import annotations
 

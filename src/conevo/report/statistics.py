@@ -1,15 +1,16 @@
 """Statistics of runs: as the thesis does them, and as readers expect them today.
 
 Nitschke 2009, sections 4.5, 5.4, 6.4 and appendices A, C, D: a Kolmogorov-Smirnov test of each data
-set, then an independent t-test of two, significant below 0.05. Beside these: the Lilliefors test,
+set, then an independent t-test of two, significant below 0.05. In addition: the Lilliefors test,
 Welch's test and interval, Mann-Whitney, Vargha-Delaney's A12, Holm's correction.
 
 The unit of every sample is a run, never a scenario. Choice: a value that is not finite is left
-out; the sizes returned count what was used. What a sample cannot answer is None, never a warning.
+out; the sizes returned count the values used. A result that a sample does not allow is None, never
+a warning.
 
-Choice: two runs are the least for a mean's error, three for a test of normality. Choice: samples
-without any spread have no t-test and no interval, however equal or different they are: there is no
-error to judge them by.
+Choice: the error of a mean needs two runs, a test of normality three. Choice: samples without any
+spread have no t-test and no interval, however equal or different they are, because they have no
+error to compare with.
 """
 
 from __future__ import annotations

@@ -1,1 +1,1 @@
-"""What a finished team does: its behaviours, lesions, clones, and how repeatable fitness is."""
+"""Studies of a finished team: behaviours, lesions, clones, and how repeatable fitness is."""

@@ -1,4 +1,4 @@
-"""What CONE's populations exchanged, in words: without it CONE is MESP with type C fitness."""
+"""The exchange of CONE's populations: without it CONE is MESP with type C fitness."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ FEW_PAIRS, FEW_SHARE = 1.0, 0.1
 
 
 def exchanged(records: Sequence[Mapping[str, Any]]) -> tuple[float | None, float | None]:
-    """Return the pairs recombined in a generation's mean, and of those that could have been.
+    """Return the mean number of recombined pairs per generation, and their share of possible pairs.
 
     A sub-population recombines with one other at most, so that half of them could be pairs. None
     for methods without thresholds for it, which never exchange.
@@ -27,7 +27,7 @@ def exchanged(records: Sequence[Mapping[str, Any]]) -> tuple[float | None, float
 
 
 def is_idle(exchanges: float | None, share: float | None) -> bool:
-    """Return whether an exchange between populations hardly ran; False where there is none to run.
+    """Return whether an exchange between populations hardly ran; False for methods without one.
 
     Choice: if in the mean of a generation fewer than one pair of sub-populations recombined, and
     fewer than a tenth of the pairs that could have; in a team of twenty rovers a hundred could.
@@ -42,7 +42,7 @@ def is_idle(exchanges: float | None, share: float | None) -> bool:
 
 
 def per_generation(exchanges: float | None, share: float | None) -> str:
-    """Return "0.3 pairs (0.3 %)"; nothing of methods that never exchange."""
+    """Return "0.3 pairs (0.3 %)"; empty for methods that never exchange."""
     if exchanges is None or share is None:
         return ""
     return f"{exchanges:.3g} pairs ({100 * share:.2g} %)"

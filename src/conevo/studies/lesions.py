@@ -1,4 +1,4 @@
-"""Teams with one caste replaced, of one robot's clones, of several castes', or in other places.
+"""Teams with one caste replaced, of clones, of several castes, or with robots in other places.
 
 Nitschke 2009, sections 4.6.5, 4.6.6, 5.5.3, 5.5.4, 6.5.4 and 6.5.5, and figure 4.12; the last is
 ours. Nothing is adapted: the teams that are compared meet the same scenarios, and differ in whose
@@ -44,7 +44,7 @@ def lesion(
     castes: Sequence[str],
     scenarios: Scenarios,
 ) -> Compared:
-    """Play a team, and it with all robots of each caste replaced by a heuristic controller.
+    """Play a team, and the team with all robots of each caste replaced by a heuristic controller.
 
     Args:
         simulator: of the team's world.
@@ -69,9 +69,9 @@ def clone(
     castes: Sequence[str],
     scenarios: Scenarios,
 ) -> Compared:
-    """Play a team, and for each caste one of nothing but clones of its fittest robot.
+    """Play a team, and for each caste a team of clones of its fittest robot.
 
-    Choice: as many clones as the team has robots ("cloned 20 times" of thirty robots, 6.5.5).
+    Choice: a team of clones has the size of the team ("cloned 20 times" of thirty robots, 6.5.5).
 
     Args:
         simulator: of the team's world.
@@ -91,10 +91,10 @@ def clone(
 
 
 def rotate(simulator: Simulator, team: Team, scenarios: Scenarios) -> Compared:
-    """Play a team, and it with controllers moved on by 1, 2, ... robots, which counts as one team.
+    """Play a team, and the team with controllers moved by 1, 2, ... robots, counted as one team.
 
-    What is lost tells how far robots have roles of their own, whatever they are: clones lose
-    nothing. S and favourites do not see roles of robots that do the same at different places.
+    The loss shows how far robots have roles of their own, whatever these are: clones lose nothing.
+    S and favourites do not detect roles of robots that do the same at different places.
 
     Args:
         simulator: of the team's world.

@@ -1,4 +1,4 @@
-"""What each robot was seen to do in all epochs: shares of behaviours, S and the label.
+"""The behaviours of each robot in all epochs: their shares, S and the label.
 
 Nitschke 2009, sections 3.2.1 and 4.6.4: the specialization metric with behaviours for actions.
 """

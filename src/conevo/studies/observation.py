@@ -1,7 +1,7 @@
-"""The fittest team of a run, watched: what its robots are seen to do besides their actions.
+"""The behaviours of the robots of a run's fittest team, in addition to their actions.
 
-A world's study tells behaviours from recorded epochs (``worlds.study``). What follows from them is
-the same for all worlds: each robot's S and caste, and how many robots and teams do what.
+A world's study identifies behaviours in recorded epochs (``worlds.study``). The results are of the
+same kind in all worlds: each robot's S and caste, and the number of robots and teams per behaviour.
 """
 
 from __future__ import annotations
@@ -33,9 +33,9 @@ class Observed:
 
     Attributes:
         study: of its world.
-        seen: what the study saw.
+        seen: the results of the study.
         team: its controllers.
-        lab: what simulates it.
+        lab: simulates it.
         seed: the scenarios' root.
     """
 
@@ -124,7 +124,7 @@ def observe(
         scenarios: how many.
         seed: draws other scenarios than those of the run's own testing phase.
         threads, device: as for ``Run.resume``.
-        rules: by which behaviours are told, those of the study by default.
+        rules: that identify behaviours, those of the study by default.
 
     Raises:
         UsageError: another world, no generation has finished yet, or made with other kernels.

@@ -1,4 +1,4 @@
-"""What files in ``studies/`` hold, as models that they are checked against when they are read."""
+"""The contents of files in ``studies/``, as models that validate them when they are read."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Count = Annotated[int, Ge(0)]
 
 
 class ScoreRow(TypedDict):
-    """What a team of a comparison reached in one scenario."""
+    """The performance of a team of a comparison in one scenario."""
 
     study: str
     team: str

@@ -1,4 +1,4 @@
-"""How much of one trial's fitness is the genotype's own: intra-class correlation, and what follows.
+"""The part of one trial's fitness that is the genotype's own: the intra-class correlation.
 
 Every genotype of a population is tried K times; in the k-th trial all meet the same scenario. Of
 the variance of their fitness a part belongs to the genotypes, the rest to partners and luck; how
@@ -102,14 +102,14 @@ def _icc(fitness: Floats, played: Mask) -> float | None:
     within = float((rest**2).sum()) - between
     square, error = between / freedom, max(within, 0.0) / (freedom * (n_trials - 1))
     whole = square + (n_trials - 1) * error
-    # Rounding leaves something of equal numbers: it is no variance.
+    # Rounding leaves something of equal numbers, which is not a variance.
     if whole <= 1e-20 * float((values**2).mean()):
         return None
     return (square - error) / whole
 
 
 def spearman_brown(icc: float, n_trials: float) -> float:
-    """Return the reliability of the mean of so many trials; 0 of an ICC below 0."""
+    """Return the reliability of the mean of that number of trials; 0 for an ICC below 0."""
     r = max(icc, 0.0)
     return n_trials * r / (1 + (n_trials - 1) * r)
 
@@ -124,8 +124,8 @@ def trials_for(icc: float | None, reliability: float = 0.5) -> float | None:
 def has_signal(reliability: float | None) -> bool:
     """Whether fitness of this reliability selects genotypes at all.
 
-    Choice: from .05 on. What selection gains grows with the square root of reliability: at .05 it
-    is 22 % of what it would be if fitness were exact.
+    Choice: from .05 on. The gain of selection grows with the square root of reliability: at .05 it
+    is 22 % of the gain of an exact fitness.
 
     Args:
         reliability: of a genotype's fitness in generation 0, by the method's scheme; None if all

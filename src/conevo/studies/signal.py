@@ -1,9 +1,9 @@
-"""The signal of a method: how far the fitness that it selects by is the genotypes' own.
+"""The signal of a method: the part of its fitness that is the genotypes' own.
 
 A method whose state is ``evolution.generation.Populations`` tries the same genotypes over and over:
-their genes are held, every trial has a root, and so partners, of its own, and is played in a
-scenario of its own, which all genotypes meet. What fitness a trial gives is the method's own
-business: its ``ask`` and ``tell`` are used. ``repeatability`` makes the numbers.
+their genes stay the same, every trial has its own root, and so its own partners, and is played in
+its own scenario, which all genotypes meet. The method's own ask and tell compute the fitness of a
+trial. ``repeatability`` computes the numbers.
 
 - Choice: one trial is one team evaluation of one epoch; a scheme has rounds x epochs of them.
   Elite trials (type C) are left out: they rank a few genotypes again.
@@ -54,7 +54,7 @@ class _Subject:
 
     Attributes:
         generation: "first" or "last".
-        method: with as many genotypes as are tried, one trial each.
+        method: with the genotypes that are tried, one trial each.
         state: with these genotypes, before they are tried.
         of: genotypes of each slot in all.
     """
@@ -86,14 +86,14 @@ def measure_signal(
     device: str = "cpu",
     announce: Announce | None = None,
 ) -> Record:
-    """Measure the signal of the populations that a run would begin with; writes nothing.
+    """Measure the signal of the populations that a run would start with; writes nothing.
 
     Args:
         config: of the run.
         units: genotypes that are tried of each population or, of neurons, each sub-population.
         trials: of each genotype.
         threads, device: as for ``conevo.evolve``; they change no result.
-        announce: told what it costs before it starts.
+        announce: called with the cost before the start.
 
     Returns:
         As ``signal_of_run``, with the generation "first" only.
@@ -115,7 +115,7 @@ def signal_of_run(
     device: str | None = None,
     announce: Announce | None = None,
 ) -> Record:
-    """Measure the signal of the populations that a run began with, and of its last ones.
+    """Measure the signal of the first and the last populations of a run.
 
     Args:
         run: finished or not; its last populations are those of its newest checkpoint.
@@ -191,7 +191,7 @@ def _subject(lab: Lab, generation: str, state: State, units: int | None) -> _Sub
         raise Unmeasured(
             f"{title} has no populations whose genotypes could be tried one by one (its state is "
             f"not a {Populations.__module__}.{Populations.__name__}), so its signal cannot be "
-            f"measured; what it says of itself, if anything, is in 'conevo show RUN'"
+            f"measured; see 'conevo show RUN' for the method's own measures, if it has any"
         )
     of, there = state.genes.shape[2], {field.name for field in dataclasses.fields(config)}
     is_alone = "evaluation" in there and getattr(state, "partners", np.empty(0)).size > 0
@@ -220,7 +220,7 @@ def _subject(lab: Lab, generation: str, state: State, units: int | None) -> _Sub
 
 
 def _price(lab: Lab, subjects: list[_Subject], trials: int) -> str:
-    """Return what will be tried, and the team evaluations that it takes."""
+    """Return the genotypes and trials, and their cost in team evaluations."""
     one = subjects[0]
     n_populations, _, n, _ = one.state.genes.shape
     plays = lab.config.run.plays(lab.world.n_robots)
@@ -237,7 +237,7 @@ def _price(lab: Lab, subjects: list[_Subject], trials: int) -> str:
 
 
 def _row(lab: Lab, subject: _Subject, trials: int) -> Record:
-    """Return what is found of one subject."""
+    """Return the results of one subject."""
     state, run = subject.state, lab.config.run
     fitness, is_clones = _try(lab, subject, trials)
     if state.fitness.ndim == 2:
@@ -293,8 +293,9 @@ def _try(lab: Lab, subject: _Subject, trials: int) -> tuple[npt.NDArray[np.float
             graded: Any = getattr(told, "fitness", 0.0)
             if np.shape(graded) != state.fitness.shape:
                 raise Unmeasured(
-                    f"{subject.method.title}: tell leaves no fitness {list(state.fitness.shape)} "
-                    f"after one request, so its signal cannot be measured"
+                    f"{subject.method.title}: ask and tell leave no fitness "
+                    f"{list(state.fitness.shape)} after one request, so its signal cannot be "
+                    f"measured"
                 )
             found.append(np.asarray(graded, dtype=np.float64))
             is_clones = is_clones and bool((trial.teams == trial.teams[:, :1]).all())

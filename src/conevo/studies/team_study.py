@@ -1,15 +1,15 @@
-"""What the fittest team of a run does, and what becomes of it without one of its castes.
+"""The castes of a run's fittest team, and its performance without one of them.
 
-Nitschke 2009, sections 4.6.4 to 4.6.6, 5.5.2 to 5.5.4, 6.5.4 and 6.5.5. One study holds it all as
-plain data: each robot's caste, S and fitness, measures of the team's specialization, caste lesions
-and teams of clones scenario by scenario, and what robots are seen to do where their world has more
-than actions to see (``studies.observation``).
+Nitschke 2009, sections 4.6.4 to 4.6.6, 5.5.2 to 5.5.4, 6.5.4 and 6.5.5. One study contains all of
+it as plain data: each robot's caste, S and fitness, measures of the team's specialization, caste
+lesions and teams of clones scenario by scenario, and the behaviours of robots in worlds that
+observe them (``studies.observation``).
 
-- Choice: castes are told in the scenarios of the testing phase, lesions and clones are played in
-  others, and all teams of a comparison meet the same ones: so that no caste is told by the luck
-  it is judged by.
+- Choice: castes are identified in the scenarios of the testing phase. Lesions and clones are played
+  in others, and all teams of a comparison meet the same ones, so that the luck that made a caste
+  does not judge it.
 - Choice: the fittest robot of a caste is the one with the highest private fitness in the scenarios
-  that the castes were told in, of the run's own fittest team (5.5.4 takes it from CONE's).
+  that identified the castes, of the run's own fittest team (5.5.4 takes it from CONE's).
 - A score that is not a finite number is left out, as in the testing phase; a fitness is None.
 """
 
@@ -43,10 +43,10 @@ NOT_CLONED = ("move", "idle")
 
 @dataclass(frozen=True)
 class _Portrait:
-    """Who is who in a team.
+    """The castes and fitness of a team's robots.
 
     Attributes:
-        activity: what they did in all scenarios, with S and caste of each robot.
+        activity: counts in all scenarios, with S and caste of each robot.
         names: of the columns of its counts.
         fitness: [R] private fitness, mean over the scenarios.
         castes: those with robots, in the world's order.
@@ -84,9 +84,9 @@ def study(
         favourite_setting and setting_share (its share of the settings used, 1 = always the same),
         affinity, favourite_action and action_share (of its time), independent (the S of
         independent draws), relative (S over it); None where a robot did none. actions: robot,
-        action (of ``World.castes``), count. metrics: those of ``specialization.team``, by what
-        castes are told by. behaviours (if observed): kind, behaviour, count; for the kind "team"
-        its most frequent collective behaviour, and all its captures.
+        action (of ``World.castes``), count. metrics: those of ``specialization.team``, of the
+        actions or behaviours that identify castes. behaviours (if observed): kind, behaviour,
+        count; for the kind "team" its most frequent collective behaviour, and all its captures.
 
     Raises:
         UsageError: no generation has finished yet, or made with other kernels.

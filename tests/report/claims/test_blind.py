@@ -1,4 +1,4 @@
-"""Statements about methods whose fitness tells nothing about genotypes are not tested."""
+"""Statements about methods whose fitness carries no information about genotypes are not tested."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_a_method_without_signal_in_generation_0_leaves_a_claim_untested(first, folder) -> None:
     found = verdict_of(folder, "cone", first)
     assert found.verdict == "not tested: no signal"
-    assert "not tested: no signal, fitness tells nothing about genotypes" in found.why
+    assert "not tested: no signal, fitness carries no information about genotypes" in found.why
 
 
 def test_with_signal_or_without_a_study_it_is_judged(folder) -> None:

@@ -1,4 +1,4 @@
-"""What the thesis claims, held against the tables of a campaign, claim by claim."""
+"""The claims of the thesis, each judged by the tables of a campaign."""
 
 from conevo.report.claims.catalogue import CLAIMS
 from conevo.report.claims.judgement import Verdict, verdicts

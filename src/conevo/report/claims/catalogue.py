@@ -1,14 +1,16 @@
-"""Claims C1 to C3: what CONE exchanges, and whether it specializes without need, in each world.
+"""Claims C1 to C3 about all worlds, and the list of all claims.
+
+C1 and C3 are about the exchange of CONE's populations, C2 about specialization without need.
 
 Nitschke 2009, section 7.1.2. The last letter of an id is that of the world.
 
-- Choice: recombination between populations is rare where at most a tenth of the pairs of
+- Choice: recombination between populations is rare if at most a tenth of the pairs of
   sub-populations that could recombine do so, in the mean of a run's generations.
-- Choice: genotypes had to be very similar where the mean threshold of their distance (GST) was at
-  most a quarter; those of independent populations are about a third apart.
-- Choice: rare and similar it is in an environment if it is so in more than half of the runs.
-- Choice: "no specialization" is that most champions have not two castes, in environments that 5.4.1
-  and 6.4.1 say do not encourage any.
+- Choice: genotypes had to be very similar if the mean threshold of their distance (GST) was at most
+  a quarter. Those of independent populations are about a third apart.
+- Choice: both are true in an environment if they are in more than half of the runs.
+- Choice: "no specialization" means that most champions do not have two castes, in environments that
+  do not encourage any according to 5.4.1 and 6.4.1.
 """
 
 from conevo.report.claims.gacc import GACC

@@ -3,14 +3,14 @@
 Nitschke 2009, sections 6.4 and 6.5, appendix D.
 
 - Choice: "in complex than in simple environments" compares environments of the same number (table
-  D-15), by the share of what could be delivered: they have not the same number of objects.
+  D-15), by the share of the objects delivered, because their numbers of objects differ.
 - Choice: "several castes" are at least two, as in R9.
-- Choice: clones are those of CONE's champions (6.5.5), the non-specialized among them; of each run
-  the best team of clones stands for all.
-- Choice: castes of a type are those that all of tables 6.11 to 6.13 have a number for; where they
-  have none (NA), most champions have no robot specialized to the type.
+- Choice: clones are those of CONE's champions (6.5.5), including the non-specialized; the best team
+  of clones represents its run.
+- Choice: castes of a type are those with a number in all of tables 6.11 to 6.13. Where they have
+  none (NA), most champions have no robot specialized to the type.
 - Choice: direct evolution fails where teams that learned the environments in turn deliver more. In
-  the first one both are the same.
+  the first environment both are the same.
 """
 
 from conevo.report.claims.vocabulary import read_claims

@@ -1,14 +1,14 @@
-"""Verdicts: claims held against evidence.
+"""Verdicts: claims judged by evidence.
 
-A claim is reproduced if its statements hold in all the environments that it needs, not reproduced
-if they are contradicted in too many for that, and undecided otherwise; not tested if all that is
-open depends on an exchange between populations that hardly ran, or on methods whose fitness told
-nothing about genotypes, not judged if the thesis says the
-opposite elsewhere, and decided by the world if teams that nothing evolved differ in the same way.
+A claim is reproduced if its statements are true in all the environments that it needs. It is not
+reproduced if they are contradicted in too many of them, and undecided otherwise. It is not tested
+if all that is open depends on an exchange between populations that hardly ran, or on methods whose
+fitness carried no information about genotypes. It is not judged if the thesis states the opposite
+elsewhere, and decided by the world if heuristic teams differ in the same way.
 
-- Choice: where the two tests lead to different verdicts the claim is undecided, and both are told.
-- Choice: the effect that is shown is that of the statement on which the verdict hangs: of the
-  contradicted ones, else the open ones, else all, the one furthest from what is claimed.
+- Choice: if the two tests lead to different verdicts, the claim is undecided, and both are shown.
+- Choice: the effect shown is that of the statement that decides the verdict: of the contradicted
+  ones, else the open ones, else all, the one furthest from the claim.
 """
 
 from __future__ import annotations
@@ -46,12 +46,12 @@ BY_WORLD = "decided by the world"
 
 @dataclass(frozen=True)
 class Verdict:
-    """What the runs of one preset (and variant) say about one claim.
+    """The verdict of the runs of one preset (and variant) on one claim.
 
     Attributes:
         id, claim, source: as in the catalogue.
-        effect: of the statement on which the verdict hangs, in words; empty without runs.
-        low, high: its 95 % interval, None where there is none.
+        effect: of the statement that decides the verdict, in words; empty without runs.
+        low, high: its 95 % interval, None without one.
         tests: names of the tests and intervals used.
         n: runs per sample, "20" or "3 to 20".
         budget: preset and team evaluations.
@@ -59,13 +59,13 @@ class Verdict:
         verdict: "reproduced", "not reproduced", "not tested: no exchange" or "no signal", "not
             judged: the thesis contradicts itself", "decided by the world", or "undecided: " and
             why.
-        alone: the verdict if nothing else in the thesis counted.
-        caution: what the thesis says elsewhere, what the verdict does not cover, what decides it.
-        power: how likely the claim's methods would be found alike if they were exactly so; None of
-            claims that ask for no likeness, or without runs.
+        alone: the verdict by the runs alone, whatever else the thesis states.
+        caution: a contradiction in the thesis, a limit of the verdict, or the other cause of it.
+        power: the probability of finding the claim's methods alike if they were exactly alike; None
+            for claims without "alike", or without runs.
         exchange: pairs of sub-populations of CONE that recombined between populations in a
             generation, and of those that could have: of the statement with the least.
-        why: what was counted, contradicted and missing.
+        why: statements counted, contradicted and missing.
         cells: every statement with its numbers.
     """
 
@@ -96,8 +96,8 @@ def verdicts(tables: Tables, claims: Sequence[Claim] = CLAIMS) -> list[Verdict]:
         claims: which.
 
     Returns:
-        In the order of the claims; for each, one for every preset and variant that has any of the
-        runs that it is about, or one without runs.
+        In the order of the claims: one for every preset and variant with any run that the claim is
+        about, or one without runs.
     """
     evidence = read_evidence(tables)
     judged: list[Verdict] = []
@@ -153,7 +153,7 @@ def judge(claim: Claim, evidence: Evidence) -> Verdict:
 
 
 def _marked(claim: Claim, alone: str) -> str:
-    """Return the verdict of a claim that something else than the runs speaks about."""
+    """Return the verdict, which more than the runs may decide."""
     return NOT_JUDGED if claim.contradiction else BY_WORLD if claim.decided else alone
 
 
@@ -191,14 +191,14 @@ def _verdict(
 
 
 def _by_part(claim: Claim, of: Sequence[T]) -> Iterator[tuple[Part, Sequence[T]]]:
-    """Yield the parts of a claim with what there is of each of their statements."""
+    """Yield the parts of a claim, each with the elements of ``of`` for its statements."""
     rest = iter(of)
     for part in claim.parts:
         yield part, [next(rest) for _ in part.statements]
 
 
 def _part(part: Part, outcomes: Sequence[Decision]) -> Decision:
-    """Return whether the statements of a part hold in as many environments as it needs."""
+    """Return whether the statements of a part are true in enough environments."""
     by_place: dict[tuple[str, ...], set[Decision]] = defaultdict(set)
     for statement, outcome in zip(part.statements, outcomes, strict=True):
         by_place[statement.environments].add(outcome)
@@ -220,7 +220,7 @@ def _part(part: Part, outcomes: Sequence[Decision]) -> Decision:
 
 
 def _power(claim: Claim, cells: Sequence[Answer]) -> float | None:
-    """Return how likely what is claimed to be alike is found so in campaigns where it is."""
+    """Return the power: in how many campaigns with all alike the claim would find it."""
     alike = [
         (part, own)
         for part, own in _by_part(claim, cells)
@@ -246,7 +246,7 @@ def _power(claim: Claim, cells: Sequence[Answer]) -> float | None:
 
 
 def _absence(cells: Sequence[Answer], evidence: Evidence) -> str:
-    """Return why no statement has runs of all that it compares."""
+    """Return why no statement has runs of all its samples."""
     for cell in cells:
         samples = cell.statement.samples
         if not all(_has_runs(sample, evidence) for sample in samples):
@@ -259,5 +259,5 @@ def _absence(cells: Sequence[Answer], evidence: Evidence) -> str:
 
 
 def _has_runs(sample: Sample, evidence: Evidence) -> bool:
-    """Whether there are runs of a sample, whatever is known of them."""
+    """Whether a sample has runs, with or without its quantity."""
     return any(evidence.has_runs(m, e) for m in sample.methods for e in sample.environments)

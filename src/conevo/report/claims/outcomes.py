@@ -1,16 +1,16 @@
-"""One statement of a claim against its runs: holds, contradicted, open, or not tested.
+"""One statement of a claim and its runs: it holds, is contradicted, open, or not tested.
 
 "Above" is contradicted by a significant difference the other way and by samples shown to be alike;
 "alike" by a significant difference. Each comparison is decided twice: by the t-test, as in the
 thesis, and by Mann-Whitney with Holm's correction over all comparisons of the claim.
 
-- Choice: a share holds if its 95 % interval (Clopper-Pearson; of a mean Student's t) lies inside
-  the range that the claim comes to, is contradicted if it lies outside, and else stays open.
+- Choice: a share holds if its 95 % interval (Clopper-Pearson; Student's t for a mean) lies inside
+  the claimed range, and is contradicted if it lies outside. Otherwise it is open.
 - Choice: a statement about CONE is not tested by runs in which it hardly exchanged anything between
-  its populations: there it is Multi-Agent ESP with type C fitness.
+  its populations: without exchange it is Multi-Agent ESP with type C fitness.
 - Choice: nor is a statement about a method whose fitness had next to no signal of genotypes, so
-  that it selected by luck; where runs have a study of it (``repeatability.has_signal``).
-- Choice: a statement about several environments together says nothing until all have runs.
+  that it selected by luck, if runs have a study of signal (``repeatability.has_signal``).
+- Choice: a statement about several environments together is open until all have runs.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ __all__ = ["Answer", "Decision", "measure"]
 
 
 class Decision(Enum):
-    """What runs say about a statement, in the order in which it is told."""
+    """The outcome of a statement; the first ones are shown first."""
 
     CONTRADICTED = 0
     OPEN = 1
@@ -50,7 +50,7 @@ class Decision(Enum):
 
 @dataclass(frozen=True)
 class Answer:
-    """One statement of a claim and what the runs say about it.
+    """One statement of a claim and its outcome.
 
     Attributes:
         statement: what is claimed.
@@ -77,7 +77,7 @@ class Answer:
 
     @property
     def is_zero(self) -> bool:
-        """Whether nothing was ever achieved in either sample."""
+        """Whether both samples are 0 throughout."""
         one = self.comparison
         return one is not None and one.mean_a == 0 and one.mean_b == 0
 
@@ -101,18 +101,18 @@ class Answer:
 
     @property
     def scale(self) -> float:
-        """The larger of two means, 0 where there are none."""
+        """The larger of two means, 0 without them."""
         if self.comparison is None:
             return 0.0
         return max(abs(self.comparison.mean_a or 0.0), abs(self.comparison.mean_b or 0.0))
 
     @property
     def weight(self) -> tuple[int, float]:
-        """How soon the cell is told: the worst outcome first, then the furthest from the claim."""
+        """Sorts answers for display: the worst outcome first, then the furthest from the claim."""
         return self.by_rank.value, self._slack()
 
     def _slack(self) -> float:
-        """Return how far inside what is claimed the interval lies; negative is outside."""
+        """Return how far the interval lies inside the claimed range; negative is outside."""
         low, high = self.interval
         if low is None or high is None:
             return -math.inf
@@ -176,8 +176,8 @@ def _estimate(statement: Statement, runs: Gathered) -> Estimate | None:
 def _decide(statement: Compare, found: Comparison, p: float | None, is_higher: bool) -> Decision:
     """Return the outcome of a comparison by one test: its p, and whether it puts a above b.
 
-    Choice: "alike" needs no difference by this test; but only samples that none of the tests tells
-    apart, uncorrected, contradict "above".
+    Choice: "alike" needs no difference by this test; but "above" is contradicted only by samples
+    between which none of the tests, uncorrected, finds a difference.
     """
     if p is None:
         return Decision.OPEN

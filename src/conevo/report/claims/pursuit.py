@@ -2,25 +2,26 @@
 
 Nitschke 2009, sections 4.3, 4.5 and 4.6, appendix A.
 
-- Choice: one prey and two are compared between team types with equally many predators.
-- Choice: a behaviour emerges in a run if its champion makes one capture by it; the share is that of
-  a method's runs of all team types together. A run may show several: the thesis' shares sum to more
-  than 100 %.
+- Choice: one prey and two are compared between team types with the same number of predators.
+- Choice: a behaviour emerges in a run if its champion makes one capture by it. The share is that of
+  a method's runs of all team types together. A run may show several behaviours: the thesis' shares
+  sum to more than 100 %.
 - Choice: idle predators appear in a team type if more than a fifth of CONE's champions have one,
   and do not if fewer have.
-- Choice: an exception (types 1, 6, 7 of P4) claims nothing about what is excepted.
-- Choice: complementary are evolved teams with predators of at least two behaviours; of each run's
-  teams of clones the best stands for all, and methods are pooled (figure 4.12 names none).
-- Choice: of a run's teams of clones the best stands for all in P13 too, methods pooled. Of type 1,
-  where two predators are too few (4.5.2, 4.5.4), nothing is claimed.
+- Choice: an exception (types 1, 6, 7 of P4) claims nothing about these types.
+- Choice: teams are complementary if their predators have at least two behaviours. The best team of
+  clones represents its run, and methods are pooled (figure 4.12 names none).
+- Choice: the same is true in P13. Nothing is claimed about type 1, where two predators are too few
+  (4.5.2, 4.5.4).
 - Choice: table 4.5 has one number for all team types, so P10 and P17 compare their runs together.
-- Choice: table 4.4 shows one team of each method. Claimed are the collective behaviours with
-  specialized members in most champions of teams with as many predators and one prey, not how many.
+- Choice: table 4.4 shows one team of each method. The claim is about the collective behaviours with
+  specialized members in most champions of teams with the same number of predators and one prey, not
+  about the number of members.
 - Choice: a behaviour works better where champions make more captures by it in the same number of
   scenarios, counting those that make none.
 - Choice: a behaviour fails with two predators if at most a fifth of the champions show it.
-- Choice: prey are fitter by the length of their path, in each experiment; three hidden neurons have
-  most of CONE's champions of those experiments whose prey predators were set on, 3 and 6.
+- Choice: prey are fitter by the length of their path, in each experiment. Most of CONE's champions
+  have three hidden neurons in experiments 3 and 6, whose prey the predators then met.
 """
 
 from conevo.report.claims.vocabulary import read_claims

@@ -1,4 +1,4 @@
-"""What is known of single runs, one value each: the quantities that claims are about."""
+"""The quantities that claims are about: one value per run."""
 
 from __future__ import annotations
 
@@ -72,17 +72,17 @@ Reading = Callable[[Tables], dict[str, float]]
 
 @dataclass(frozen=True)
 class Quantity:
-    """Something that is known of a run.
+    """A value of a run.
 
     Attributes:
         read: returns it by run, of the runs that have it.
-        lacks: what a run without it lacks, in words.
+        lacks: the reason for its absence, in words.
         is_share: 1 if something was seen in the run, else 0.
-        needs_exchange: whether a value of CONE's is one of CONE only if its populations exchanged;
-            not so what one of its robots does, and what was exchanged.
-        needs_signal: whether it says something of methods only if these select by more than luck;
-            not so what was exchanged.
-        is_apart: whether it is of runs whose budgets are not those of others: of a stage, say.
+        needs_exchange: whether a value of CONE counts as CONE's only if its populations exchanged;
+            not so the performance of one of its robots, nor the exchange itself.
+        needs_signal: whether it describes methods only if these select by more than luck; not so
+            the exchange itself.
+        is_apart: whether its runs have budgets of their own, such as that of a stage.
     """
 
     read: Reading
@@ -119,7 +119,7 @@ def _lesioned(value: str, measure: str = "r.measure") -> Quantity:
 
 
 def _cloned(teams: str, lacks: str) -> Quantity:
-    """Return the best of a run's teams of clones: what one of its robots does."""
+    """Return the best of a run's teams of clones: the performance of one of its robots."""
     played = PLAYED.format(study="clones", measure="r.measure")
     return Quantity(_query(played + BEST.format(teams=teams)), lacks, needs_exchange=False)
 
@@ -224,7 +224,7 @@ QUANTITIES: dict[str, Quantity] = {
     "similar genotypes": _exchanged(SIMILAR, "no threshold of similarity", True),
     "three hidden neurons": _is(HIDDEN.format(n=3), "no champion recorded"),
 }
-"""Name -> what it is; ``rover``, ``pursuit`` and ``gacc`` say what claims make of them.
+"""Name -> quantity; ``rover``, ``pursuit`` and ``gacc`` have the claims that use them.
 
 value, area, capture_time, delivered: of the testing phase. share of the optimum: of the world's
 main measure, in [0, 1]. whole, lesioned: of the lesion study, the latter the mean over castes.

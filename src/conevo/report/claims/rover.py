@@ -6,13 +6,12 @@ Nitschke 2009, sections 5.4 and 5.5, appendix C.
   have the same canals (table C-11).
 - Choice: "most environments" are more than half of them, each with all ten pairs of methods.
 - Choice: castes of rovers specialized to moving do not count (5.5.2).
-- Choice: clones are those of CONE's champions (5.5.4), of each run the best team of clones stands
-  for all; "of one specialist" leaves out the non-specialized.
+- Choice: clones are those of CONE's champions (5.5.4), and the best team of clones represents its
+  run. "Of one specialist" leaves out the non-specialized.
 - Choice: "multiple castes" are two or more of low, med, hi and non-specialized.
-- Choice: a caste that tables 5.11 to 5.15 give no number for (NA) is one that most champions have
-  not.
+- Choice: where tables 5.11 to 5.15 give no number for a caste (NA), most champions do not have it.
 - Choice: "environments [7, 10]" are 7 to 10, as in 5.5.3; environments in a list are these alone.
-- Choice: what is highest in environment 10 is significantly above each of the others.
+- Choice: a measure that is highest in environment 10 is significantly above each of the others.
 - Choice: an axis of a figure is the range in which the mean of every environment lies.
 """
 

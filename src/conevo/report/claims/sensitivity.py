@@ -1,14 +1,15 @@
-"""What a changed setting changes: runs of a plan whose factors are settings.
+"""The effect of a changed setting: runs of a plan whose factors are settings.
 
-Nitschke 2009, sections 4.2, 5.3.2 and 6.3.2. A claim about it is judged at each combination of
-levels by itself.
+Nitschke 2009, sections 4.2, 5.3.2 and 6.3.2. A claim about it is judged separately at each
+combination of levels.
 
 - Choice: unchanged is the middle one of a setting's levels in the campaign, by size; a factor with
   another number of levels than three, or of levels that are not numbers, has none.
-- Choice: what a run changes is compared with the run of the same seed at the unchanged levels, as a
-  share of the mean of those: the mean of these shares is that by which the means differ.
-- Choice: levels further away than the thesis changed a setting say nothing: a fifth, but in the
-  multi-rover task a quarter for generations and epochs, and 30 % for settings of the world.
+- Choice: a run is compared with the run of the same seed at the unchanged levels. The change is a
+  share of the unchanged runs' mean, so that the mean change is the difference of the means.
+- Choice: levels changed by more than in the thesis do not count. It changes settings by a fifth,
+  but in the multi-rover task generations and epochs by a quarter, and settings of the world by
+  30 %.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ Usual = Mapping[str, float]  # factor -> its unchanged level
 
 
 def changed(tables: Tables) -> dict[str, float]:
-    """Return by which share of the unchanged runs' mean a run differs, of those that count."""
+    """Return the change of each run that counts, as a share of the unchanged runs' mean."""
     groups: dict[tuple[str, ...], list[RunValue]] = defaultdict(list)
     for one in tables.values():
         groups[one.world, one.preset, one.environment, one.method].append(one)
@@ -70,7 +71,7 @@ def _usual(every: list[dict[str, str]]) -> Usual:
 
 
 def _counts(levels: Mapping[str, str], usual: Usual, is_rover: bool) -> bool:
-    """Whether something is changed, and nothing by more than the thesis changed it."""
+    """Whether something is changed, and nothing by more than in the thesis."""
     far = {name: _far(level, usual[name]) for name, level in levels.items()}
     return any(far.values()) and all(
         one <= _allowed(name, is_rover) + NEAR for name, one in far.items()

@@ -1,4 +1,4 @@
-"""The words that a claim is written in: samples of runs, comparisons of two, shares of one."""
+"""The elements of a claim: samples of runs, comparisons of two, shares of one."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Sample:
     """Runs: one value each.
 
     Attributes:
-        quantity: what of a run, a name in ``evidence.QUANTITIES``.
+        quantity: a name in ``quantities.QUANTITIES``.
         methods: the runs of these are pooled.
         environments: and of these.
     """
@@ -48,7 +48,7 @@ class Compare:
 
     @property
     def samples(self) -> tuple[Sample, ...]:
-        """What is compared."""
+        """Both samples."""
         return (self.a, self.b)
 
     @property
@@ -67,7 +67,7 @@ class Within:
 
     @property
     def samples(self) -> tuple[Sample, ...]:
-        """What is measured."""
+        """The only sample."""
         return (self.sample,)
 
     @property
@@ -102,9 +102,9 @@ class Claim:
         text: what is claimed.
         source: section of the thesis.
         parts: what has to hold.
-        contradiction: where the thesis says the opposite; such a claim is not judged.
-        decided: what decides it besides the methods; it then has a verdict of its own.
-        caution: what a verdict does not cover.
+        contradiction: where the thesis states the opposite; such a claim is not judged.
+        decided: a cause of the result other than the methods; the verdict is then its own kind.
+        caution: limits of a verdict.
         other_world: in which it is tested, without its version, if not in that of its letter.
     """
 

@@ -91,7 +91,9 @@ def counts(cells: Sequence[Answer]) -> list[str]:
         names = [f"{place_of(cell.statement)} {what_of(cell.statement)}" for cell in worst]
         told.append(f"{len(worst)} contradicted ({'; '.join(_few(names))})")
     if blind := of[Decision.BLIND]:
-        told.append(f"{len(blind)} not tested: no signal, fitness tells nothing about genotypes")
+        told.append(
+            f"{len(blind)} not tested: no signal, fitness carries no information about genotypes"
+        )
     if untested := of[Decision.UNTESTED]:
         told.append(f"{len(untested)} not tested: no exchange between populations")
     if of[Decision.OPEN]:

@@ -1,4 +1,4 @@
-"""Drawings of what runs reached: bars with deviations, and every run as a point.
+"""Drawings of results: bars with deviations, and every run as a point.
 
 Drawings are readable in grey, and the same bytes for the same numbers. Every method has one colour,
 hatch, line and marker, whatever else is drawn; colours differ in lightness. Each function returns
@@ -76,10 +76,10 @@ def bars(
     Args:
         panels: title of each panel -> method -> P bars; None: no runs.
         places: P names under the groups.
-        names: method -> what the legend says.
+        names: method -> its name in the legend.
         x_label: under the axes.
         y_label: left of the axes.
-        within: lowest and highest value that there can be; deviations end there.
+        within: lowest and highest possible value; deviations end there.
     """
     with style():
         figure, grid, slot = _panels_of(list(panels), places, names)
@@ -127,11 +127,11 @@ def points(
     Args:
         panels: title of each panel -> method -> P cells; None: no runs.
         places: P names.
-        names: method -> what the legend says.
+        names: method -> its name in the legend.
         x_label: under the axes.
         y_label: left of the axes.
         reference: a height with a line across.
-        within: lowest and highest value that there can be; intervals end there.
+        within: lowest and highest possible value; intervals end there.
     """
     with style():
         figure, grid, slot = _panels_of(list(panels), places, names)

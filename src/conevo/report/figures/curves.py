@@ -1,4 +1,4 @@
-"""Drawings of how runs went: lines with bands, and shares of a whole, in small panels."""
+"""Drawings over team evaluations: lines with bands, and shares of a whole, in small panels."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Band(NamedTuple):
 
 
 class Line(NamedTuple):
-    """Whose line it is: a method's, and of what, if there are several of each."""
+    """The method of a line, and the quantity if each method has several."""
 
     method: str
     part: str = ""
@@ -66,11 +66,11 @@ def lines(
 
     Args:
         panels: title of each panel -> line -> its course.
-        names: line -> what the legend says.
+        names: line -> its name in the legend.
         x_label: under the lowest panels.
         y_label: left of the panels.
         limits: of the vertical axis; from the data if not given.
-        within: lowest and highest value that there can be; bands end there.
+        within: lowest and highest possible value; bands end there.
     """
     with style():
         from matplotlib.collections import PolyCollection

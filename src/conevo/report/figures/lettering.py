@@ -68,7 +68,7 @@ def drawable(text: str) -> str:
 
 @cache
 def fitted(text: str, width: float, lines: int = 3, size: float = SIZE) -> str:
-    """Return a text in lines that are no wider than ``width``, the last shortened with "…".
+    """Return a text in lines of at most ``width``, the last shortened with "…".
 
     It is broken after spaces and signs; a word that does not fit is cut.
     """

@@ -1,7 +1,6 @@
-"""What all drawings of a report have in common: style, size, legends, formats.
+"""Style, size, legends and formats of all drawings of a report.
 
-With ``lettering``, ``figures``, ``curves``, ``tiles`` and ``panels`` the only place that knows
-Matplotlib.
+Matplotlib is used in this folder only.
 """
 
 from __future__ import annotations
@@ -120,7 +119,7 @@ def _shorter(number: re.Match[str]) -> str:
 
 
 def name_axes(figure: Figure, x_label: str, y_label: str = "") -> None:
-    """Write what the axes of all panels are, below and left of them, in lines that fit."""
+    """Write the names of the axes of all panels below and left of them, in lines that fit."""
     width, height = map(float, figure.get_size_inches())
     figure.supxlabel(fitted(x_label, 0.9 * width, 2), fontsize=SIZE)
     if y_label:
@@ -139,7 +138,7 @@ def mark_places(axes: Axes, places: Sequence[str], slot: float) -> None:
 
 
 def legend_of(names: Mapping[Key, str]) -> dict[Key, str]:
-    """Return what a legend says of each key: in lines that fit in a column of a page."""
+    """Return the text of each key in a legend, in lines that fit in a column of a page."""
     return {key: fitted(name, 0.7 * COLUMN, 2, SMALL) for key, name in names.items()}
 
 

@@ -1,4 +1,4 @@
-"""What the robots of a group are seen to do, in worlds with a study of it."""
+"""The behaviours of the robots of a group, in worlds with a study of them."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def behaviours(scope: Scope) -> Section | None:
 def _named(seen: Collection[str]) -> tuple[Sequence[str], StudyWords]:
     """Return the names of the study that collective behaviours are of, in order, and its words.
 
-    Worlds in files inherit a study, so that the behaviours tell which it is, not the world's name.
+    Worlds in files inherit a study, so the behaviours identify it, not the world's name.
     """
     for study in studies().values():
         if {*seen} <= {*study.COLLECTIVES}:

@@ -1,4 +1,4 @@
-"""What the runs of a group spent, in exact words, and headings that tell two budgets apart."""
+"""The exact cost of a group's runs in words, and headings that distinguish two budgets."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ __all__ = ["Spent", "headings", "spent_by"]
 
 
 class Spent(NamedTuple):
-    """What the runs of a group spent.
+    """The cost of the runs of a group.
 
     runs: finished ones. is_stage: whether they are stages of shapings. evaluations, steps: team
     evaluations and team-steps of a run, lowest, highest and mean. ended: why runs ended, with how
@@ -47,7 +47,7 @@ class Spent(NamedTuple):
 
     @property
     def short(self) -> str:
-        """What tells this budget from another one of the same preset."""
+        """The words that distinguish this budget from another one of the same preset."""
         low, high, _ = self.evaluations
         of = round(self.steps[2] / max(self.evaluations[2], 1))
         span = f"{low:,}" if low == high else f"{low:,} to {high:,}"
@@ -55,7 +55,7 @@ class Spent(NamedTuple):
 
 
 def spent_by(tables: Tables, group: Group) -> Spent:
-    """Return what the finished runs of a group spent."""
+    """Return the cost of the finished runs of a group."""
     rows = tables.query(
         "SELECT evaluations, team_steps, stopped_by, preset, conevo, contains(run, '/stage-')"
         f" FROM runs JOIN budgets USING (run) WHERE {group.condition} ORDER BY run"

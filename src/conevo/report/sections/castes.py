@@ -1,4 +1,4 @@
-"""What the fittest teams of a group are made of."""
+"""The castes of the fittest teams of a group."""
 
 from __future__ import annotations
 
@@ -69,8 +69,8 @@ def _over_generations(
         f"{scope.stem}-castes",
         "Castes of the fittest team over the generations",
         "Share of the robots in each caste, mean over runs, at equal numbers of team evaluations; "
-        f"a robot is in the caste of what it does most if S < 0.5 ({S_SCALE}). A panel is empty "
-        f"until the first generation has ended. {size} per panel.",
+        f"a robot is in the caste of its most frequent action if S < 0.5 ({S_SCALE}). A panel is "
+        f"empty until the first generation has ended. {size} per panel.",
         (),
         rows,
         drawing=curves.stacks(
@@ -200,7 +200,7 @@ def _by_setting(scope: Scope, members: Sequence[_Member]) -> Table:
         "All robots of the champions, in fresh scenarios, environments together (CSV: each of "
         "them). Share of it: of the actions with the favourite setting in all actions that have "
         f"settings, mean ({SHARE_SCALE}); robots above {MAJORITY:g}: those with more than half of "
-        "them. S tells how often a robot switches actions, and cannot see settings: one that "
+        "them. S shows how often a robot switches actions, and cannot see settings: one that "
         "moves and detects in turn has S = 1 and is non-specialized, even if it always detects "
         "with the same setting.",
         columns,

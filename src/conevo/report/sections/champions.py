@@ -1,4 +1,4 @@
-"""How much of what champions were chosen by is left in scenarios that did not choose them."""
+"""The performance of champions in the scenarios that selected them, and in fresh ones."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ NAMES = {
     ("clones", ""): "teams of clones",
     ("rotated", ""): "teams whose controllers changed places",
 }
-"""What a study, and where it matters its team, is called in a sentence."""
+"""Names of a study, and where it matters of its team, in a sentence."""
 
 
 def champions(scope: Scope) -> Section | None:

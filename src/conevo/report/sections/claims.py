@@ -1,4 +1,4 @@
-"""What the runs say about the claims of the thesis."""
+"""The verdicts of the runs on the claims of the thesis."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def claims(tables: Tables) -> Section:
         return Section(title, [rest])
     kinds = Counter(one.verdict.partition(":")[0] for one in found)
     text = [
-        "What the thesis claims and these runs can test, each claim judged by them alone: "
+        "The claims of the thesis that these runs can test, each judged by them alone: "
         + ", ".join(f"{n} {kind}" for kind, n in sorted(kinds.items()))
         + "."
         + (f" {rest}" if absent else "")

@@ -1,9 +1,9 @@
-"""What teams lose without a caste or in changed places, and what clones of a specialist do.
+"""Losses of teams without a caste or in changed places, and the performance of teams of clones.
 
-Nitschke 2009, sections 4.6.5, 4.6.6, 5.5.3, 5.5.4, 6.5.4, 6.5.5. Choice: what a run loses is told
-in percent of the larger of the two performances, as in the claims, so that a team that reached
-almost nothing before cannot outweigh all others; the thesis' percent of the unchanged team is that
-of the means. Of a measure of which smaller is better, what is added is lost.
+Nitschke 2009, sections 4.6.5, 4.6.6, 5.5.3, 5.5.4, 6.5.4, 6.5.5. Choice: the loss of a run is in
+percent of the larger of the two performances, as in the claims, so that a team that achieved almost
+nothing before cannot outweigh all others; the thesis' percent of the unchanged team is that of the
+means. If smaller values of a measure are better, an increase is a loss.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class _Team(NamedTuple):
 
     @property
     def lost(self) -> float:
-        """What is lost, in percent of the larger of the two: -100 to 100, below 0 if it gained."""
+        """The loss in percent of the larger of the two: -100 to 100, below 0 for a gain."""
         lost = self.whole - self.value if self.larger_is_better else self.value - self.whole
         return 100 * lost / self.scale
 
@@ -110,7 +110,7 @@ def _section(scope: Scope, study: str, cells: dict[Cell, list[_Team]], lost: int
 
 
 def _teams(scope: Scope, study: str) -> tuple[dict[Cell, list[_Team]], int]:
-    """Return the changed teams of each cell by run, and how many of them have nothing to lose."""
+    """Return the changed teams of each cell by run, and the number with nothing to lose."""
     found = [
         (cell, _Team(run, caste, whole, value, scope.main.larger_is_better))
         for cell, run, caste, whole, value in scope.rows(
@@ -208,7 +208,7 @@ def _by_caste(study: str) -> list[Column]:
 
 
 def _percent(changed: float | None, whole: float | None) -> float | None:
-    """Return what is left of the whole, None where there is none."""
+    """Return the changed value in percent of the whole, None without one."""
     return 100 * changed / whole if changed is not None and whole else None
 
 

@@ -1,4 +1,4 @@
-"""How the treatments of a group got where they are."""
+"""The learning curves of the treatments of a group."""
 
 from __future__ import annotations
 
@@ -131,6 +131,6 @@ def _course_table(
 
 
 def _at(course: Course, evaluations: float) -> float | None:
-    """Return where a course is after so many team evaluations; None before it begins."""
+    """Return the value of a course after that number of team evaluations; None before its start."""
     reached = course.x <= evaluations
     return float(course.mean[reached][-1]) if reached.any() else None

@@ -1,4 +1,4 @@
-"""What was run: the plan, its cost, what failed, and with which versions."""
+"""The runs of a campaign: their plan, cost, failures and versions."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ MOST_NAMES = 12  # of runs that a sentence may list
 
 
 def overview(tables: Tables, campaign: Campaign) -> Section:
-    """Return what was run, what it cost, what is missing, and with which versions."""
+    """Return the number of runs, their cost, failures, missing ones and versions."""
     runs = [run for (run,) in tables.query("SELECT run FROM runs ORDER BY run")[1]]
     finished = {run.partition("/")[0] for run in runs}
     failed, unread = failures(campaign.paths.ended("").parent)
@@ -54,7 +54,7 @@ def overview(tables: Tables, campaign: Campaign) -> Section:
 
 
 def _warnings(tables: Tables) -> list[str]:
-    """Return what makes runs of one comparison less comparable: the code that made them."""
+    """Return warnings about runs of one comparison that were made by different code."""
     text = []
     mixed = tables.query(
         "SELECT task FROM runs JOIN budgets USING (run) GROUP BY task, budget"

@@ -1,4 +1,4 @@
-"""What the treatments of a group reached."""
+"""The task performance of the treatments of a group."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ MOST_COLUMNS = 5  # of treatments that a table compares with each other
 
 
 def performance(scope: Scope) -> Section:
-    """Return what every cell reached."""
+    """Return the performance of every cell."""
     found = {cell: summarize(scope.cells[cell]) for cell in scope.ordered(scope.cells)}
     exchanges = scope.exchanges()
     rows = [_row(scope, cell, one, exchanges.get(cell)) for cell, one in found.items()]
@@ -101,7 +101,7 @@ def _drawn(
 
 
 def _table(scope: Scope, rows: Sequence[Mapping[str, Any]]) -> Table:
-    """Return what every cell reached, with what is known of it."""
+    """Return the performance of every cell, with its statistics."""
     shown = _performance_columns(rows)
     keys = {column.key for column in shown}
     notes = {
@@ -137,7 +137,7 @@ def _row(
     """Return the numbers of a cell.
 
     Args:
-        scope, cell, one: what its runs reached.
+        scope, cell, one: the cell and the results of its runs.
         made: pairs that exchanged in a generation, and their share; None if the method never does.
     """
     begun = [run.value for run in scope.first.get(cell, ())]
@@ -181,7 +181,7 @@ def _warnings(scope: Scope) -> list[str]:
     counts = [len(of) for of in scope.cells.values()]
     text = []
     if max(counts) < 2:
-        text.append("There is one run per cell: no deviation, no interval, and nothing is tested.")
+        text.append("One run per cell: no deviation, no interval, and nothing is tested.")
     elif min(counts) < 2:
         text.append("Cells with a single run have no deviation, no interval and no t-test.")
     if max(counts) < 20 and entry_of(scope.group.world):

@@ -1,4 +1,4 @@
-"""What all sections about a group of runs share: cells, treatments, names on axes."""
+"""The common data of all sections about a group of runs: cells, treatments, names on axes."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ Cells = Mapping[Cell, Sequence[RunValue]]
 
 @dataclass(frozen=True)
 class Scope:
-    """What all sections about a group share.
+    """The common data of all sections about a group.
 
     Attributes:
         tables: the campaign's.
@@ -72,7 +72,7 @@ class Scope:
 
     @property
     def within(self) -> tuple[float, float]:
-        """Least and largest value of the main measure; infinite where nothing is known."""
+        """Smallest and largest possible value of the main measure; infinite if unknown."""
         optima = [one.optimum for values in self.cells.values() for one in values]
         most = max((o for o in optima if o is not None), default=math.inf)
         low, high = self.main.low, self.main.high
@@ -91,7 +91,7 @@ class Scope:
 
     @property
     def axis(self) -> str:
-        """What stands under an axis of environments."""
+        """The name of an axis of environments."""
         short = self.group.world.rpartition("-v")[0] or self.group.world
         if place_names(self.environments) == self.environments:
             return f"{short} environment"
@@ -115,7 +115,7 @@ class Scope:
         return {one.run: cell for cell, values in self.cells.items() for one in values}
 
     def rows(self, sql: str) -> list[tuple[Any, ...]]:
-        """Return what a query has of the group's runs, each row after its cell.
+        """Return the rows of a query that are about the group's runs, each after its cell.
 
         Args:
             sql: its first column is a run.
@@ -129,7 +129,7 @@ class Scope:
         return [cell for cell in every if cell in cells]
 
     def exchanges(self) -> dict[Cell, tuple[float, float]]:
-        """Return what the populations of each cell exchanged, if its method's ever do.
+        """Return the exchange of the populations of each cell, if its method ever exchanges.
 
         Pairs of sub-populations that recombined between populations in a generation, and their
         share of those that could have, in the mean of the runs.

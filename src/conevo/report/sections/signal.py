@@ -1,4 +1,4 @@
-"""The signal of each treatment of a group: what its fitness tells about genotypes."""
+"""The signal of each treatment of a group: the information of fitness about genotypes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ __all__ = ["blind_cells", "signal"]
 
 
 class MeasuredSignal(NamedTuple):
-    """What was measured of a run's first or last populations; None where fitness was the same."""
+    """The signal of a run's first or last populations; None where all fitness was the same."""
 
     unit: str
     scheme: int
@@ -30,8 +30,8 @@ NOTE = (
     "Genotypes of the first and last populations, tried again and again with other partners, in "
     "other scenarios. ICC: intra-class correlation, the share of a trial's fitness that is the "
     "genotype's own, mean of the runs ± its standard error. Reliability: that of the mean of the "
-    "trials that the method gives each genotype, by Spearman-Brown; below {least} at first there "
-    "is no signal. Rounds for .5: rounds of which the mean would have a reliability of .5."
+    "trials that the method gives each genotype, by Spearman-Brown; below {least} at first a "
+    "method has no signal. Rounds for .5: rounds of which the mean would have a reliability of .5."
 )
 
 
@@ -72,7 +72,7 @@ def blind_cells(scope: Scope) -> set[Cell]:
 
 
 def _found(scope: Scope) -> dict[Cell, dict[str, list[MeasuredSignal]]]:
-    """Return what was measured of the runs of each cell that has any, "first" and "last"."""
+    """Return the signals of the runs of each cell that has any, "first" and "last"."""
     found: dict[Cell, dict[str, list[MeasuredSignal]]] = {}
     for cell, _, generation, *rest in scope.rows(
         "SELECT s.run, s.generation, unit, scheme, icc, standard_error, icc_of_scheme,"
