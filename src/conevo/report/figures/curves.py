@@ -9,7 +9,6 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from conevo.numbers import short
 from conevo.palette import method_looks
 from conevo.report.figures.lettering import LINE, drawable, fitted, lines_in, width_of
 from conevo.report.figures.small_multiples import Panels
@@ -128,8 +127,8 @@ def lines(
         for place, title in zip(used, titles, strict=False):
             field.title(*place, title)
         field.frame(used, closed=False)
-        field.ticks_below(used, x_ticks, [short(value) for value in x_ticks], inside=columns > 1)
-        field.ticks_beside(used, y_ticks, [short(value) for value in y_ticks])
+        field.ticks_below(used, x_ticks, inside=columns > 1)
+        field.ticks_beside(used, y_ticks)
         name_axes(figure, x_label, y_label)
         put_legend(figure, signs)
         return saved(figure)
@@ -193,7 +192,7 @@ def stacks(
         for k, side in enumerate(sides):
             field.side(k, side)
         field.frame(used, closed=True)
-        field.ticks_below(used, limits, [short(value) for value in limits], inside=True)
+        field.ticks_below(used, limits, inside=True)
         name_axes(figure, x_label, y_label)
         put_legend(figure, part_handles(colours))
         return saved(figure)

@@ -6,13 +6,14 @@ A page may have a hundred panels; real axes for each would take most of a report
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+from conevo.numbers import short
 from conevo.report.figures.lettering import LINE, SMALL
 from conevo.typing import Floats
 
@@ -20,6 +21,7 @@ __all__ = ["Panels"]
 
 GAP_X = 0.1  # between panels, in panels
 TICK = 0.025
+BLACK: dict[str, Any] = {"color": "black", "linewidth": 0.6, "clip_on": False}
 
 
 class Panels:
@@ -80,62 +82,32 @@ class Panels:
             left, foot = self.corner(row, column)
             x += [*(left + dx for dx, _ in corners), np.nan]
             y += [*(foot + dy for _, dy in corners), np.nan]
-        self.axes.plot(x, y, color="black", linewidth=0.6, clip_on=False, solid_joinstyle="miter")
+        self.axes.plot(x, y, **BLACK, solid_joinstyle="miter")
 
     def ticks_below(
-        self,
-        used: Sequence[tuple[int, int]],
-        values: Sequence[float],
-        names: Sequence[str],
-        *,
-        inside: bool = False,
+        self, used: Sequence[tuple[int, int]], values: Sequence[float], *, inside: bool = False
     ) -> None:
         """Mark values on the horizontal axes, and name them under the lowest panel of a column.
 
         With ``inside`` the names of both ends stay under their own panel.
         """
-        long = TICK / self.shape[1]
-        marks: list[tuple[Floats, Floats]] = []
-        lowest = {column: max(r for r, c in used if c == column) for _, column in used}
-        for row, column in used:
-            for value, name in zip(values, names, strict=True):
-                x, y = self.at(row, column, np.array(value), np.array(self.y[0]))
-                marks += [(x, x), (y, y - long)]
-                if lowest[column] == row:
-                    side = "left" if value == self.x[0] else "right"
-                    self.axes.text(
-                        float(x),
-                        float(y) - 1.6 * long,
-                        name,
-                        ha=side if inside and value in self.x else "center",
-                        va="top",
-                        fontsize=SMALL,
-                    )
-        self._mark(marks)
+        long, ends = TICK / self.shape[1], dict(zip(self.x, ("left", "right"), strict=True))
+        marks, foot = np.array(values, dtype=np.float64), np.full(len(values), self.y[0])
+        x, y = np.hstack([self.at(row, column, marks, foot) for row, column in used])
+        self.axes.vlines(x, y - long, y, **BLACK)
+        for row, column in {column: (row, column) for row, column in sorted(used)}.values():
+            for value, across, up in zip(values, *self.at(row, column, marks, foot), strict=True):
+                side = ends.get(value, "center") if inside else "center"
+                low = up - 1.6 * long
+                self.axes.text(across, low, short(value), ha=side, va="top", fontsize=SMALL)
 
-    def ticks_beside(
-        self, used: Sequence[tuple[int, int]], values: Sequence[float], names: Sequence[str]
-    ) -> None:
+    def ticks_beside(self, used: Sequence[tuple[int, int]], values: Sequence[float]) -> None:
         """Mark values on the vertical axes, and name them left of the first column."""
         long = TICK / self.shape[0]
-        marks: list[tuple[Floats, Floats]] = []
-        for row, column in used:
-            for value, name in zip(values, names, strict=True):
-                x, y = self.at(row, column, np.array(self.x[0]), np.array(value))
-                marks += [(x, x - long), (y, y)]
-                if column == 0:
-                    self.axes.text(
-                        float(x) - 1.6 * long,
-                        float(y),
-                        name,
-                        ha="right",
-                        va="center_baseline",
-                        fontsize=SMALL,
-                    )
-        self._mark(marks)
-
-    def _mark(self, marks: Sequence[tuple[Floats, Floats]]) -> None:
-        """Draw short lines: x and y of both ends, in turns."""
-        x = [end for pair in marks[::2] for end in (*map(float, pair), np.nan)]
-        y = [end for pair in marks[1::2] for end in (*map(float, pair), np.nan)]
-        self.axes.plot(x, y, color="black", linewidth=0.6, clip_on=False)
+        marks, left = np.array(values, dtype=np.float64), np.full(len(values), self.x[0])
+        x, y = np.hstack([self.at(row, column, left, marks) for row, column in used])
+        self.axes.hlines(y, x - long, x, **BLACK)
+        about: dict[str, Any] = {"ha": "right", "va": "center_baseline", "fontsize": SMALL}
+        for row in {row for row, column in used if column == 0}:
+            for value, across, up in zip(values, *self.at(row, 0, left, marks), strict=True):
+                self.axes.text(across - 1.6 * long, up, short(value), **about)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -95,13 +95,12 @@ def _champions(scope: Scope) -> dict[Cell, list[dict[str, int]]]:
 
 def _devoted(scope: Scope) -> dict[Cell, float]:
     """Return how many robots of a champion do more than half of their work in one setting, mean."""
-    found: dict[Cell, list[int]] = defaultdict(list)
-    for cell, _, robots in scope.rows(
-        f"SELECT run, count(*) FILTER (setting_share > {MAJORITY}) FROM robots"
-        " GROUP BY run HAVING count(setting_share) > 0"
-    ):
-        found[cell].append(robots)
-    return {cell: float(np.mean(of)) for cell, of in found.items()}
+    found = scope.per_cell(
+        f"SELECT cell, avg(n) FROM (SELECT run, count(*) FILTER (setting_share > {MAJORITY}) AS n"
+        " FROM robots GROUP BY run HAVING count(setting_share) > 0) JOIN own USING (run)"
+        " GROUP BY cell"
+    )
+    return dict(found)
 
 
 def _of_champions(scope: Scope, teams: Mapping[Cell, Sequence[Mapping[str, int]]]) -> Table:
@@ -154,16 +153,13 @@ class _Member(NamedTuple):
 
 def _members(scope: Scope) -> list[_Member]:
     """Return who is in which caste with which favourite; of studies that have favourites."""
-    found: dict[tuple[Cell, str, str], list[float]] = defaultdict(list)
-    for cell, _, caste, setting, share in scope.rows(
-        "SELECT run, caste, favourite_setting, setting_share FROM robots"
-        " WHERE setting_share IS NOT NULL ORDER BY ALL"
-    ):
-        found[cell, caste, setting].append(share)
-    return [
-        _Member(*key, len(of), float(np.mean(of)), sum(share > MAJORITY for share in of))
-        for key, of in found.items()
-    ]
+    found = scope.per_cell(
+        "SELECT cell, caste, favourite_setting, count(*), avg(setting_share),"
+        f" count(*) FILTER (setting_share > {MAJORITY}) FROM own JOIN robots USING (run)"
+        " WHERE setting_share IS NOT NULL GROUP BY ALL"
+        " ORDER BY cell, count(*) DESC, caste, favourite_setting"
+    )
+    return [_Member(*row) for row in found]
 
 
 def _by_setting(scope: Scope, members: Sequence[_Member]) -> Table:
@@ -171,7 +167,8 @@ def _by_setting(scope: Scope, members: Sequence[_Member]) -> Table:
     numbers = [
         scope.key(*cell) | {"n": len(scope.cells[cell])} | _shown([one])
         for cell in scope.ordered(scope.cells)
-        for one in _largest(one for one in members if one.cell == cell)
+        for one in members
+        if one.cell == cell
     ]
     rows = []
     for treatment in scope.treatments:
@@ -207,10 +204,6 @@ def _by_setting(scope: Scope, members: Sequence[_Member]) -> Table:
         rows,
         numbers=numbers,
     )
-
-
-def _largest(members: Iterable[_Member]) -> list[_Member]:
-    return sorted(members, key=lambda one: (-one.robots, one.caste, one.setting))
 
 
 def _shown(group: Sequence[_Member]) -> dict[str, Any]:

@@ -7,7 +7,6 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
-from statistics import fmean
 from typing import Any
 
 from conevo.campaigns.tables import RunValue, Tables
@@ -123,6 +122,18 @@ class Scope:
         found = self.tables.query(sql)[1]
         return [(self._cell_of[row[0]], *row) for row in found if row[0] in self._cell_of]
 
+    def per_cell(self, sql: str) -> list[tuple[Any, ...]]:
+        """Return the rows of a query about the group's cells, each after its cell.
+
+        Args:
+            sql: its first column is a cell of the table ``own`` (run, cell).
+        """
+        cells = list(self.cells)
+        runs = [(one.run, k) for k, cell in enumerate(cells) for one in self.cells[cell]]
+        listed = ", ".join("('{}', {})".format(run.replace("'", "''"), k) for run, k in runs)
+        found = self.tables.query(f"WITH own(run, cell) AS (VALUES {listed}) {sql}")[1]
+        return [(cells[k], *rest) for k, *rest in found]
+
     def ordered(self, cells: Collection[Cell]) -> list[Cell]:
         """Return cells by environment, then by treatment."""
         every = (Cell(*pair) for pair in product(self.environments, self.treatments))
@@ -134,17 +145,11 @@ class Scope:
         Pairs of sub-populations that recombined between populations in a generation, and their
         share of those that could have, in the mean of the runs.
         """
-        made: dict[Cell, list[tuple[float, float]]] = {}
-        for cell, _, pairs, share in self.rows(
-            "SELECT run, exchanges, exchange_share FROM runs WHERE exchanges IS NOT NULL"
-            " ORDER BY seed, run"
-        ):
-            made.setdefault(cell, []).append((pairs, share))
-        return {
-            cell: (fmean(pairs for pairs, _ in made[cell]), fmean(share for _, share in made[cell]))
-            for cell in self.cells
-            if cell in made
-        }
+        found = self.per_cell(
+            "SELECT cell, avg(exchanges), avg(exchange_share) FROM own JOIN runs USING (run)"
+            " WHERE exchanges IS NOT NULL GROUP BY cell ORDER BY cell"
+        )
+        return {cell: (pairs, share) for cell, pairs, share in found}
 
     def key(self, environment: str, treatment: Treatment) -> dict[str, Any]:
         """Return how rows of numbers name a cell."""

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from conevo.numbers import plus_minus
@@ -16,14 +14,15 @@ __all__ = ["blind_cells", "signal"]
 
 
 class MeasuredSignal(NamedTuple):
-    """The signal of a run's first or last populations; None where all fitness was the same."""
+    """The signal of a cell's first or last populations: means over runs, None if unknown."""
 
-    unit: str
-    scheme: int
-    icc: float | None
-    error: float | None
-    reliability: float | None
-    rounds: float | None
+    unit: str = ""
+    scheme: int = 0
+    n: int = 0
+    icc: float | None = None
+    error: float | None = None
+    reliability: float | None = None
+    rounds: float | None = None
 
 
 NOTE = (
@@ -68,45 +67,38 @@ def signal(scope: Scope) -> Section | None:
 def blind_cells(scope: Scope) -> set[Cell]:
     """Return the cells whose runs have studies of signal, and had none at first."""
     found = _found(scope)
-    return {cell for cell, own in found.items() if not has_signal(_reliability(own["first"]))}
+    return {cell for cell, own in found.items() if not has_signal(own["first"].reliability)}
 
 
-def _found(scope: Scope) -> dict[Cell, dict[str, list[MeasuredSignal]]]:
-    """Return the signals of the runs of each cell that has any, "first" and "last"."""
-    found: dict[Cell, dict[str, list[MeasuredSignal]]] = {}
-    for cell, _, generation, *rest in scope.rows(
-        "SELECT s.run, s.generation, unit, scheme, icc, standard_error, icc_of_scheme,"
-        " rounds_for_half FROM signal s JOIN runs USING (run) ORDER BY seed, s.run, s.generation"
+def _found(scope: Scope) -> dict[Cell, dict[str, MeasuredSignal]]:
+    """Return the signals "first" and "last" of each cell that has any.
+
+    Fitness that is always the same has an ICC and a reliability of 0.
+    """
+    found: dict[Cell, dict[str, MeasuredSignal]] = {}
+    for cell, generation, *rest in scope.per_cell(
+        "SELECT cell, generation, first(unit ORDER BY seed), first(scheme ORDER BY seed), count(*),"
+        " avg(coalesce(icc, 0)), sqrt(sum(standard_error ** 2)) / count(standard_error),"
+        " avg(coalesce(icc_of_scheme, 0)), avg(rounds_for_half)"
+        " FROM own JOIN signal USING (run) JOIN runs USING (run)"
+        " GROUP BY cell, generation ORDER BY cell"
     ):
-        found.setdefault(cell, {}).setdefault(generation, []).append(MeasuredSignal(*rest))
-    return {cell: found[cell] for cell in scope.cells if cell in found}
+        found.setdefault(cell, {})[generation] = MeasuredSignal(*rest)
+    return found
 
 
-def _row(scope: Scope, cell: Cell, own: dict[str, list[MeasuredSignal]]) -> dict[str, Any]:
+def _row(scope: Scope, cell: Cell, own: dict[str, MeasuredSignal]) -> dict[str, Any]:
     """Return the numbers of a cell."""
     first = own["first"]
-    row: dict[str, Any] = {**scope.key(cell.environment, cell.treatment)}
-    row |= {"unit": first[0].unit, "n": len(first), "scheme": first[0].scheme}
+    row = scope.key(*cell) | {"unit": first.unit, "n": first.n, "scheme": first.scheme}
     for generation in ("first", "last"):
-        runs = own.get(generation, [])
-        icc = _mean([one.icc or 0.0 for one in runs])
-        errors = [one.error for one in runs if one.error is not None]
-        error = math.sqrt(math.fsum(e * e for e in errors)) / len(errors) if errors else None
+        one = own.get(generation, MeasuredSignal())
         row |= {
-            f"shown_{generation}": None if icc is None else plus_minus(icc, error),
-            f"icc_{generation}": icc,
-            f"error_{generation}": error,
-            f"reliability_{generation}": _reliability(runs),
-            f"rounds_{generation}": _mean([one.rounds for one in runs if one.rounds is not None]),
+            f"shown_{generation}": None if one.icc is None else plus_minus(one.icc, one.error),
+            f"icc_{generation}": one.icc,
+            f"error_{generation}": one.error,
+            f"reliability_{generation}": one.reliability,
+            f"rounds_{generation}": one.rounds,
         }
-    is_there = has_signal(row["reliability_first"])
+    is_there = has_signal(first.reliability)
     return row | {"verdict": "signal" if is_there else "not tested: no signal"}
-
-
-def _reliability(runs: Sequence[MeasuredSignal]) -> float | None:
-    """Return the mean reliability of fitness; fitness that is always the same has none."""
-    return _mean([one.reliability or 0.0 for one in runs])
-
-
-def _mean(values: Sequence[float]) -> float | None:
-    return math.fsum(values) / len(values) if values else None
