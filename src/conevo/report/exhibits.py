@@ -112,7 +112,7 @@ class Exhibit:
         name: of its files, without an ending.
         title: its subject.
         note: how to read it, with sizes and tests.
-        columns: of its numbers.
+        columns: of a table's numbers.
         rows: its numbers; keys beyond those of the columns are written to CSV too.
         numbers: rows of the CSV file if they differ from those of the table.
     """
@@ -120,8 +120,8 @@ class Exhibit:
     name: str
     title: str
     note: str
-    columns: Sequence[Column[Any]]
-    rows: Sequence[Row]
+    columns: Sequence[Column[Any]] = ()
+    rows: Sequence[Row] = ()
     numbers: Sequence[Row] = field(default=(), kw_only=True)
 
     def cells(self) -> list[list[str]]:

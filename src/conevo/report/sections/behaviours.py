@@ -81,8 +81,7 @@ def _events(
         f"{words.events.capitalize()} by collective behaviour",
         f"Share of all {words.events} of the champions in fresh scenarios. "
         f"{sizes(n.values())} per bar; teams that {words.undone} have no bar.",
-        (),
-        rows,
+        rows=rows,
         drawing=tiles.shares(
             shares,
             dict(zip(names, colours, strict=True)),

@@ -71,8 +71,7 @@ def _over_generations(
         "Share of the robots in each caste, mean over runs, at equal numbers of team evaluations; "
         f"a robot is in the caste of its most frequent action if S < 0.5 ({S_SCALE}). A panel is "
         f"empty until the first generation has ended. {size} per panel.",
-        (),
-        rows,
+        rows=rows,
         drawing=curves.stacks(
             ordered,
             x,

@@ -131,8 +131,7 @@ def _map(scope: Scope, pairs: Sequence[Pair]) -> list[Figure]:
         f"+: the first is better, −: worse ({scope.main.direction}); the number is "
         f"Mann-Whitney's p after Holm's correction over {pairs[0].n_tests} pairs. {size} per "
         "sample.",
-        (),
-        rows_of([*COLUMNS, Column("verdict", of=lambda pair: pair.verdict)], pairs),
+        rows=rows_of([*COLUMNS, Column("verdict", of=lambda pair: pair.verdict)], pairs),
         drawing=tiles.heat_map(rows, list(places.values()), cells, legend, x_label=scope.axis),
     )
     return [figure]

@@ -123,8 +123,7 @@ def _figure(scope: Scope, about: str, by_run: dict[str, list[_Played]]) -> Figur
         f"{scope.stem}-composed",
         about,
         f"{NOTE} Mean over runs; error bars: standard deviation of the runs.",
-        (),
-        rows,
+        rows=rows,
         drawing=figures.bars(
             {"": means},
             place_names(places),

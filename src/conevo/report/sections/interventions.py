@@ -171,8 +171,7 @@ def _figure(scope: Scope, study: str, cells: dict[Cell, list[_Team]]) -> Exhibit
         f"({scope.main.direction}). A point per run{'' if study == ROTATED else OVER_CASTES}"
         + (f"; next to them the mean with Student's 95 % interval, {ENDS}" if several else "")
         + f". {size} per cell.",
-        (),
-        rows,
+        rows=rows,
         drawing=figures.points(
             at.grid(means, lambda of: figures.Points(of, mean_interval(of).ends(-MOST, MOST))),
             at.places,

@@ -86,8 +86,7 @@ def _exhibit(
         note
         + (", with Student's 95 % interval as a band" if several else "")
         + f". {sizes(counts.values())} per line.",
-        (),
-        rows,
+        rows=rows,
         drawing=curves.lines(
             panels,
             legend,

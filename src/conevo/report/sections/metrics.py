@@ -11,7 +11,7 @@ from conevo.report.comparison import Cell
 from conevo.report.exhibits import Column, Section, Table, number, plain
 from conevo.report.sections.scope import Scope, span
 from conevo.specialization.diversity import task_specialization
-from conevo.specialization.team import METRICS
+from conevo.specialization.team import METRICS, Metric
 from conevo.terms import S_SCALE, SHARE_SCALE
 from conevo.typing import Record
 
@@ -20,6 +20,13 @@ __all__ = ["definitions", "metrics"]
 MOST_COLUMNS = 5  # of treatments next to each other; more are below each other
 DIVERSITY = "hierarchic_social_entropy"
 PAYS = "diversity that pays"
+PAYING = Metric(
+    lambda _: None,  # of several runs, see ``_numbers``
+    "plus or minus the hierarchic social entropy",
+    "the runs' mean hierarchic social entropy times its correlation with their task performance; "
+    "below 0: diversity costs",
+    "Li et al. 2004",
+)
 DIRECTIONS = {
     "specialization": S_SCALE,
     "independent_specialization": "S of independent draws; 0 = always the same action",
@@ -119,31 +126,14 @@ def _title(metric: str) -> str:
 
 def definitions() -> Section:
     """Return what each measure is, its range, and where it is from."""
-    rows = [
-        {
-            "name": _title(name),
-            "span": metric.span,
-            "what": metric.what,
-            "source": metric.source,
-        }
-        for name, metric in METRICS.items()
-    ]
-    rows.append(
-        {
-            "name": PAYS,
-            "span": "plus or minus the hierarchic social entropy",
-            "what": "the runs' mean hierarchic social entropy times its correlation with their "
-            "task performance; below 0: diversity costs",
-            "source": "Li et al. 2004",
-        }
-    )
-    columns = [
-        Column("name", "measure", plain),
-        Column("span", "range", plain),
-        Column("what", "meaning", plain),
-        Column("source", "source", plain),
+    every = METRICS | {PAYS: PAYING}
+    columns: list[Column[str]] = [
+        Column("name", "measure", plain, of=_title),
+        Column("span", "range", plain, of=lambda name: every[name].span),
+        Column("what", "meaning", plain, of=lambda name: every[name].what),
+        Column("source", "source", plain, of=lambda name: every[name].source),
     ]
     note = "R: robots of the team, A: actions of the world, K: its settings."
-    name = "Measures of specialization: definitions"
-    table = Table("measures", name, note, columns, rows, is_folded=False)
+    title = "Measures of specialization: definitions"
+    table = Table.of("measures", title, note, columns, every, is_folded=False)
     return Section("Definitions of the measures of specialization", (), [table])

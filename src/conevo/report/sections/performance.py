@@ -68,8 +68,7 @@ def _drawn(
         f"{scope.about} Mean over runs of the fittest team in fresh scenarios"
         + ("; error bars: standard deviation of the runs" if several else "")
         + f". {size} per bar.",
-        (),
-        rows,
+        rows=rows,
         drawing=figures.bars(
             at.grid(found, lambda one: figures.Bar(one.mean.value, one.sd)),
             at.places,
@@ -86,8 +85,7 @@ def _drawn(
         title,
         f"{scope.about} A point per run; next to them the mean with Student's 95 % interval. "
         f"{size} per cell.",
-        (),
-        runs,
+        rows=runs,
         drawing=figures.points(
             at.grid(found, lambda one: figures.Points(one.values, one.mean.ends(*scope.within))),
             at.places,
