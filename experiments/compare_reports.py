@@ -7,12 +7,14 @@ CSV, JSON, LaTeX and HTML files must be the same byte for byte; drawings only ha
 from __future__ import annotations
 
 import csv
+import re
 import sys
 from pathlib import Path
 
 import click
 
 TEXT = {".csv", ".json", ".tex", ".html"}
+NUMBER = re.compile(r"-?[\d.]+(e[-+]?\d+)?")
 DIGESTS = "manifest.json"  # of the other files, drawings too
 
 
@@ -25,7 +27,7 @@ def content(path: Path, only_numbers: bool) -> object:
     if path.suffix != ".csv":
         return None
     names, *rows = csv.reader(path.read_text(encoding="utf-8").splitlines())
-    return names, [[cell for cell in row if cell[-1:].isdigit()] for row in rows]
+    return names, [[cell for cell in row if NUMBER.fullmatch(cell)] for row in rows]
 
 
 @click.command()

@@ -91,13 +91,13 @@ class Comparison:
     sd_a: float | None
     sd_b: float | None
     difference: float | None
-    low: float | None
-    high: float | None
-    p_t: float | None
-    p_welch: float | None
-    p_mann_whitney: float | None
-    a12: float | None
-    smallest_p: float | None
+    low: float | None = None
+    high: float | None = None
+    p_t: float | None = None
+    p_welch: float | None = None
+    p_mann_whitney: float | None = None
+    a12: float | None = None
+    smallest_p: float | None = None
 
 
 @dataclass(frozen=True)
@@ -158,29 +158,14 @@ def compare(a: npt.ArrayLike, b: npt.ArrayLike) -> Comparison:
     n, m = len(x), len(y)
     (mean_a, sd_a), (mean_b, sd_b) = _moments(x), _moments(y)
     difference = None if mean_a is None or mean_b is None else mean_a - mean_b
-    low = high = p_t = p_welch = p_mann_whitney = a12 = smallest_p = None
+    tests: dict[str, float] = {}
     if difference is not None and sd_a is not None and sd_b is not None and (sd_a or sd_b):
-        p_t, p_welch, low, high = _t_tests(x, y)
+        tests |= _t_tests(x, y)
     if n and m:
-        p_mann_whitney = mann_whitney(x, y)
-        a12 = float(above(x, y).mean())
-        smallest_p = smallest_mann_whitney(n, m)
-    return Comparison(
-        n_a=n,
-        n_b=m,
-        mean_a=mean_a,
-        mean_b=mean_b,
-        sd_a=sd_a,
-        sd_b=sd_b,
-        difference=difference,
-        low=low,
-        high=high,
-        p_t=p_t,
-        p_welch=p_welch,
-        p_mann_whitney=p_mann_whitney,
-        a12=a12,
-        smallest_p=smallest_p,
-    )
+        tests["p_mann_whitney"] = mann_whitney(x, y)
+        tests["a12"] = float(above(x, y).mean())
+        tests["smallest_p"] = smallest_mann_whitney(n, m)
+    return Comparison(n, m, mean_a, mean_b, sd_a, sd_b, difference, **tests)
 
 
 def holm(ps: Sequence[float | None]) -> list[float | None]:
@@ -275,8 +260,8 @@ def _moments(x: Floats) -> tuple[float | None, float | None]:
     return (mean, float(x.std(ddof=1))) if np.ptp(x) > 0 else (float(x[0]), 0.0)
 
 
-def _t_tests(x: Floats, y: Floats) -> tuple[float, float, float, float]:
-    """Return the p-values of Student's and of Welch's test, and Welch's interval.
+def _t_tests(x: Floats, y: Floats) -> dict[str, float]:
+    """Return the p-values of Student's and of Welch's test, and Welch's interval, by name.
 
     Of samples that are brought to one size, since the squares of tiny values vanish.
     """
@@ -287,7 +272,8 @@ def _t_tests(x: Floats, y: Floats) -> tuple[float, float, float, float]:
     with warnings.catch_warnings(action="ignore"):  # of a sample without a spread
         student, welch = (ttest_ind(x, y, equal_var=are_equal) for are_equal in (True, False))
         low, high = welch.confidence_interval(1 - ALPHA)
-    return float(student.pvalue), float(welch.pvalue), float(low * size), float(high * size)
+    ends = {"low": float(low * size), "high": float(high * size)}
+    return ends | {"p_t": float(student.pvalue), "p_welch": float(welch.pvalue)}
 
 
 @lru_cache(maxsize=256)

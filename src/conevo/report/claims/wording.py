@@ -26,6 +26,12 @@ __all__ = [
 ]
 
 SHOWN = 4  # of a list
+UNDECIDED = {
+    Decision.BLIND: "not tested: no signal, fitness carries no information about genotypes",
+    Decision.UNTESTED: "not tested: no exchange between populations",
+    Decision.OPEN: "open",
+    Decision.MISSING: "without all their runs",
+}
 
 
 def name_of(method: str) -> str:
@@ -90,17 +96,7 @@ def counts(cells: Sequence[Answer]) -> list[str]:
     if worst := sorted(of[Decision.CONTRADICTED], key=lambda cell: cell.weight):
         names = [f"{place_of(cell.statement)} {what_of(cell.statement)}" for cell in worst]
         told.append(f"{len(worst)} contradicted ({'; '.join(_few(names))})")
-    if blind := of[Decision.BLIND]:
-        told.append(
-            f"{len(blind)} not tested: no signal, fitness carries no information about genotypes"
-        )
-    if untested := of[Decision.UNTESTED]:
-        told.append(f"{len(untested)} not tested: no exchange between populations")
-    if of[Decision.OPEN]:
-        told.append(f"{len(of[Decision.OPEN])} open")
-    if of[Decision.MISSING]:
-        told.append(f"{len(of[Decision.MISSING])} without all their runs")
-    return told
+    return told + [f"{len(of[one])} {why}" for one, why in UNDECIDED.items() if of[one]]
 
 
 def power(found: float | None) -> list[str]:
