@@ -1,12 +1,12 @@
 """Aggregates over several environments, with stratified bootstrap intervals.
 
 Agarwal et al. 2021, "Deep reinforcement learning at the edge of the statistical precipice". A
-stratum is the sample of runs of one environment. Runs are drawn again within each stratum; the
-interval is that of the percentiles. Choice: where all draws agree there is no interval; its width
-of zero would be a certainty that few runs do not have.
+stratum is the sample of runs of one environment. Runs are resampled within each stratum, and the
+interval is that of the percentiles. Choice: if all resamples agree, the result has no interval,
+because a width of zero would be a certainty that few runs do not have.
 
-With few runs such intervals are too narrow. Values of several environments must be on one scale
-(a share of the optimum) before they are pooled: that is the caller's.
+With few runs such intervals are too narrow. The caller brings values of several environments to one
+scale (a share of the optimum) before they are pooled.
 """
 
 from __future__ import annotations
@@ -45,8 +45,8 @@ def iqm_interval(
     Args:
         strata: of each environment, the values of its runs, [runs]; empty ones do not count.
         level: of the interval.
-        resamples: how often the runs are drawn again.
-        seed: of these draws.
+        resamples: number of resamples.
+        seed: of the resampling.
     """
     from scipy.stats import trim_mean
 
@@ -76,8 +76,8 @@ def probability_of_improvement(
         y_strata: of the same environments, those of y. An environment without runs of both does
             not count.
         level: of the interval.
-        resamples: how often the runs are drawn again.
-        seed: of these draws.
+        resamples: number of resamples.
+        seed: of the resampling.
 
     Raises:
         ValueError: not as many strata of y as of x.
@@ -94,7 +94,7 @@ def probability_of_improvement(
     numbers = stream(seed, "probability of improvement")
     total = np.zeros(resamples)
     for won in wins:
-        # How often each run was drawn stands for the runs drawn.
+        # The counts of each run represent the runs drawn.
         x_drawn, y_drawn = (
             numbers.multinomial(size, np.full(size, 1 / size), size=resamples) for size in won.shape
         )

@@ -47,7 +47,7 @@ __all__ = [
 
 
 class Treatment(NamedTuple):
-    """A method, and the levels of further factors ("" if there are none)."""
+    """A method, and the levels of further factors ("" without any)."""
 
     method: str
     variant: str
@@ -153,7 +153,7 @@ class Pair:
 
     @property
     def too_few(self) -> bool:
-        """Whether Mann-Whitney could not get below 0.05 with so few runs, whatever they are."""
+        """Whether Mann-Whitney could not get below 0.05 with any values of these few runs."""
         least = self.result.smallest_p
         return least is None or least * self.n_tests >= ALPHA
 
@@ -178,8 +178,8 @@ class Aggregate:
         treatment: which.
         environments: how many.
         iqm: interquartile mean of the runs, 95 % stratified bootstrap interval.
-        improvement: over each treatment before it in the order, the probability that a run is
-            better than one of that.
+        improvement: over each previous treatment, the probability that a run is better than one of
+            that treatment.
     """
 
     treatment: Treatment
@@ -214,8 +214,8 @@ def summarize(runs: Sequence[RunValue]) -> Summary:
 def compare_all(cells: Mapping[Cell, Sequence[RunValue]]) -> list[Pair]:
     """Return every two treatments of each environment that differ in the method or in the levels.
 
-    Pairs that differ in both are left out: nothing would follow from them. The second of the
-    registry's order comes first, so that a difference is what the newer method gains. Choice: the
+    Pairs that differ in both are left out, because they would show nothing. The second of the
+    registry's order comes first, so that a difference is the gain of the newer method. Choice: the
     family of Holm's correction is all pairs of the cells given.
     """
     direction, found = _larger_is_better(cells), _by_environment(cells)

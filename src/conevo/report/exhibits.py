@@ -72,7 +72,7 @@ class Column(Generic[Item]):
         key: of the rows, and its name in CSV (a pair gets two: KEY_low, KEY_high).
         title: its heading; empty if only CSV has the column.
         show: makes the text of a cell.
-        is_wide: whether it holds sentences, which need a width of their own.
+        is_wide: whether it contains sentences, which need more width.
         of: returns its value for an item (``rows_of``).
     """
 
@@ -185,13 +185,13 @@ class Figure(Exhibit):
 
 @dataclass(frozen=True)
 class Section:
-    """A part of a report: text, exhibits and parts of its own.
+    """A part of a report: text, exhibits and subsections.
 
     Attributes:
         title: its heading.
         text: paragraphs.
         exhibits: tables and figures in order.
-        sections: parts of it.
+        sections: its subsections.
         preformatted: text shown unchanged, such as commands.
         name: where links go, if not after the title.
     """

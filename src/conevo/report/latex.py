@@ -141,7 +141,7 @@ def document(title: str, sections: Sequence[Section]) -> str:
 
 
 def _inside(section: Section, level: int) -> Iterator[str]:
-    """Yield a heading and what is below it; nothing if there is no table or figure."""
+    """Yield a heading and what is below it; nothing without a table or figure."""
     shown = [one for one in section.exhibits if one.rows]
     if not any(one.rows for one in section.all_exhibits()):
         return

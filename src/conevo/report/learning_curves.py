@@ -47,7 +47,7 @@ class Histories:
         cells: of each run, [N].
         starts: first generation of each run, and G, [N + 1].
         evaluations: [G] team evaluations spent, ascending within a run.
-        columns: name of one of ``COURSES`` -> [G], NaN where there is none.
+        columns: name of one of ``COURSES`` -> [G], NaN for no value.
         castes: C names.
         shares: [G, C] share of the fittest team's robots in each caste.
     """

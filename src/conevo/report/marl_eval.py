@@ -10,20 +10,19 @@
 environment       world, family and preset: "rover-v2 complex night" (budgets are never mixed)
 task              "complex-5"
 algorithm         the method, and its variant if it has one
-measure           the main task performance of the world, [1] in a step; "negated-NAME" with the
-                  values' signs turned round if smaller is better, as to the library larger always
-                  is
+measure           the main task performance of the world, [1] in a step; "negated-NAME" with
+                  negated values if smaller is better, because the library assumes that larger is
 step_count        team-steps, in equal parts of the fewest that a run of the environment spent
 step_k            the fittest team of the last generation that had ended by then
 absolute_metrics  the champion in its test, [scenarios]
 ================  ==============================================================================
 
-The library asks for a full rectangle: in an environment the same algorithms in every task, the same
-names of runs in each and the same number of steps. Runs are named by their seeds. Choice: either
-the tasks that have all algorithms are taken, or the algorithms that all tasks have, whichever keeps
-more runs; of each then the runs of the seeds that all have, one run per seed. ``left_out`` names
-the rest. Choice: before its first generation has ended a run shows that one's value. Choice: "_"
-becomes "-" in measures and "," becomes ";" in algorithms, because the library cuts names there.
+The library needs a full rectangle: every task of an environment has the same algorithms, runs of
+the same names and the same number of steps. Runs are named by their seeds. Choice: either the
+tasks that have all algorithms are taken, or the algorithms that all tasks have, whichever keeps
+more runs. Of these, the seeds that all have are taken, one run per seed. ``left_out`` names the
+rest. Choice: before its first generation has ended a run shows that generation's value. Choice:
+"_" becomes "-" in measures and "," becomes ";" in algorithms, because the library cuts names there.
 """
 
 from __future__ import annotations

@@ -36,7 +36,7 @@ class Redrawn(NamedTuple):
 
 
 def draw(values: npt.ArrayLike, *place: int | str) -> Redrawn | None:
-    """Return samples like one of runs but of mean 1, whatever its mean is.
+    """Return samples like a sample of runs, scaled to a mean of 1.
 
     None where the runs do not scatter, or are fewer than two, or their mean is 0.
 

@@ -24,9 +24,10 @@ def above(x: Floats, y: Floats) -> Floats:
 def mann_whitney(x: Floats, y: Floats) -> float:
     """Return the two-sided p-value of the Mann-Whitney test of two samples, neither empty.
 
-    Exact up to ``EXACT_RUNS`` runs. Choice: that is the permutation distribution of the very
-    ranks, ties and all, and every sum of ranks as far from its expectation counts (with ties the
-    tails may differ). Above, the normal approximation, corrected for ties and continuity.
+    Exact up to ``EXACT_RUNS`` runs. Choice: the exact test uses the permutation
+    distribution of the ranks, including ties, and counts every sum of ranks at least as far from
+    its expectation (with ties the tails may differ). Above, the normal approximation, corrected for
+    ties and continuity.
     """
     n, m = len(x), len(y)
     _, index, counts = np.unique(np.concatenate([x, y]), return_inverse=True, return_counts=True)

@@ -57,7 +57,7 @@ class Normality:
     Attributes:
         n: runs.
         p_ks: Kolmogorov-Smirnov against the normal with the sample's mean and deviation, as in
-            the thesis. Too large: the normal was fitted to the very sample.
+            the thesis. Too large, because the normal was fitted to the same sample.
         p_lilliefors: the same distance, judged by samples of normal numbers fitted in the same
             way (Lilliefors 1967).
     """
@@ -193,7 +193,7 @@ def is_alike(comparison: Comparison, margin: float = 0.15) -> bool:
 
     None of the three tests finds a difference, uncorrected, and the interval of the difference
     lies inside +-``margin`` of the larger mean. Choice: of the means' absolute values. Choice:
-    samples without an interval are not alike, whatever their means.
+    samples without an interval are not alike.
     """
     low, high = comparison.low, comparison.high
     if low is None or high is None or comparison.mean_a is None or comparison.mean_b is None:

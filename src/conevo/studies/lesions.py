@@ -121,7 +121,7 @@ def compose(
     fitness: npt.ArrayLike,
     compositions: Sequence[Composed],
 ) -> list[Compared]:
-    """Play each composition that a team has the robots for, in scenarios of its own.
+    """Play each composition for which a team has the robots, in its own scenarios.
 
     In section 4.6.5 individual behaviours were reproduced by fixed sensor inputs, then put
     together. Choice: here the robots are the fittest specialists of the run's own team, with their
@@ -157,7 +157,7 @@ def fittest_of(caste: str, labels: Sequence[str], fitness: npt.ArrayLike) -> int
 def replacement(world: World, caste: str) -> int:
     """Return which heuristic controller of a world stands in for a caste.
 
-    The one of the caste's name (tables 5.3 and 6.3). Choice: where there is none, as for rovers
+    The one with the caste's name (tables 5.3 and 6.3). Choice: without one, as for rovers
     specialized to moving, the non-specialized one; else the world's first, as for predators, whose
     only one is non-specialized (section 4.6.6).
     """

@@ -7,7 +7,7 @@ correlation ICC(C,1) of McGraw and Wong (1996, Psychological Methods 1: 30), is 
 one trial. By Spearman-Brown the mean of K trials has reliability K r / (1 + (K - 1) r).
 
 - Choice: populations and slots share one ICC, of their pooled mean squares.
-- Choice: its standard error is by jackknife over populations if there are ten or more, since the
+- Choice: its standard error is by jackknife over populations if they are ten or more, since the
   neurons of a robot share its fitness; of fewer over genotypes, the m-th of every population.
 - Choice: a genotype with a fitness that is not finite in any trial is left out.
 """
@@ -44,7 +44,7 @@ class Repeatability:
 
     Attributes:
         icc: at most 1; below 0 by chance. None if all fitness is the same.
-        standard_error: by jackknife; None if there are too few genotypes.
+        standard_error: by jackknife; None with too few genotypes.
         low, high: its 95 % interval, by Student's t.
         n_units: genotypes that were used, in all populations and slots.
     """

@@ -45,7 +45,7 @@ Announce = Callable[[str], None]
 
 
 class Unmeasured(UsageError):
-    """A method has no signal that could be measured, whatever the numbers asked for."""
+    """A method has no signal that could be measured with any number of trials."""
 
 
 @dataclass(frozen=True)

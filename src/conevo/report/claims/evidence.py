@@ -73,15 +73,15 @@ class Gathered:
 class Evidence:
     """Runs of one world, preset and variant.
 
-    Runs of different budgets are never compared in an environment. Choice: of several budgets that
-    all compared methods have there, the one with the most runs is taken. Choice: between
-    environments budgets may differ if no other runs are there, as between those evolved directly
-    and those learned in stages (6.4.2). Choice: the latter are also compared in one environment
-    where that is what is claimed, each with its own budget.
+    Runs of different budgets are never compared in an environment. Choice: if all compared methods
+    share several budgets, the one with the most runs is taken. Choice: between environments budgets
+    may differ if no other runs exist, as between those evolved directly and those learned in stages
+    (6.4.2). Choice: the latter are also compared in one environment if the claim is about it, each
+    with its own budget.
 
     Attributes:
         world, preset, variant: of all its runs; the world with its version.
-        read: returns a quantity by run, of whatever runs.
+        read: returns a quantity by run, for all runs of the campaign.
         runs: by environment and method.
     """
 
@@ -92,7 +92,7 @@ class Evidence:
     runs: dict[tuple[str, str], list[RunOf]] = field(default_factory=dict)
 
     def has_runs(self, method: str, environment: str) -> bool:
-        """Whether there is any run, whatever is known of it."""
+        """Whether any run exists, with or without the quantity in question."""
         return (environment, method) in self.runs
 
     def gather(self, statement: Compare | Within) -> Gathered:
@@ -127,9 +127,9 @@ class Evidence:
     def _gather_one(self, sample: Sample) -> Gathered:
         """Return the runs of a sample.
 
-        Choice: a mean over environments is taken seed by seed, and the seeds are the sample: of a
-        team that learned the environments in turn the stages are not independent runs. A seed that
-        lacks an environment is left out.
+        Choice: a mean over environments is taken seed by seed, and the seeds are the sample: the
+        stages of a team that learned the environments in turn are not independent runs. A seed
+        without one of the environments is left out.
         """
         found = {place: self.by_budget(sample, place) for place in sample.environments}
         chosen = {place: _usual(of) for place, of in found.items() if of}
@@ -148,7 +148,7 @@ class Evidence:
         return _gathered((sample,), (taken,), (flat,), chosen, chosen.values())
 
     def by_budget(self, sample: Sample, environment: str) -> dict[str, list[Valued]]:
-        """Return the runs of a sample in one environment with their values, apart by budget."""
+        """Return the runs of a sample in one environment with their values, by budget."""
         values = self.read(sample.quantity)
         found: dict[str, list[Valued]] = defaultdict(list)
         for method in sample.methods:
@@ -179,7 +179,7 @@ def _gathered(
 
 
 def read_evidence(tables: Tables) -> list[Evidence]:
-    """Return the runs of a campaign, apart by world, preset and variant, in this order.
+    """Return the runs of a campaign, separated by world, preset and variant, in this order.
 
     Their quantities are read from the tables when they are asked for.
     """
@@ -247,5 +247,5 @@ def _mean_of_all(values: Sequence[float | None]) -> float | None:
 
 
 def _usual(of: Mapping[str, list[Valued]]) -> str:
-    """Return the budget with the most runs, the first by name of equals."""
+    """Return the budget with the most runs; ties go to the first by name."""
     return max(sorted(of), key=lambda budget: len(of[budget]))

@@ -118,7 +118,7 @@ class Answer:
             return -math.inf
         if not isinstance(self.statement, Compare):
             least, most = self.statement.low, self.statement.high
-            # Nothing is below 0 or above 1: these bounds are as far as can be.
+            # Nothing is below 0 or above 1, so these bounds are never the nearest.
             return min(low - least if least > 0 else 1.0, most - high if most < 1 else 1.0)
         inside = low if self.statement.expect == "above" else -max(abs(low), abs(high))
         return inside / (self.scale or 1.0)

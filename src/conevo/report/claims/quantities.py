@@ -82,7 +82,7 @@ class Quantity:
             not so the performance of one of its robots, nor the exchange itself.
         needs_signal: whether it describes methods only if these select by more than luck; not so
             the exchange itself.
-        is_apart: whether its runs have budgets of their own, such as that of a stage.
+        is_apart: whether its runs have other budgets, such as that of a stage.
     """
 
     read: Reading

@@ -90,7 +90,7 @@ def sizes(cells: Sequence[Answer]) -> str:
 
 
 def counts(cells: Sequence[Answer]) -> list[str]:
-    """Return how many statements hold (by Mann-Whitney and Holm), and which do not."""
+    """Return the number of statements that hold (by Mann-Whitney and Holm), and the others."""
     of = {outcome: [c for c in cells if c.by_rank is outcome] for outcome in Decision}
     told = [f"{len(of[Decision.HOLDS])} of {len(cells)} hold"]
     if worst := sorted(of[Decision.CONTRADICTED], key=lambda cell: cell.weight):
@@ -100,7 +100,7 @@ def counts(cells: Sequence[Answer]) -> list[str]:
 
 
 def power(found: float | None) -> list[str]:
-    """Return how likely the rule is to find alike what is."""
+    """Return the probability of finding methods alike that are alike."""
     if found is None:
         return []
     share = "less than 1 %" if found < 0.01 else f"{found:.0%}".replace("%", " %")
@@ -108,7 +108,7 @@ def power(found: float | None) -> list[str]:
 
 
 def too_few(cells: Sequence[Answer]) -> list[str]:
-    """Return a warning where Mann-Whitney could not become significant whatever the runs reach."""
+    """Return a warning if Mann-Whitney could not become significant with any values."""
     smallest = [cell.comparison.smallest_p for cell in cells if cell.comparison]
     least = min((p for p in smallest if p is not None), default=0.0) * len(smallest)
     if least < ALPHA:

@@ -1,7 +1,7 @@
 """Drawings of results: bars with deviations, and every run as a point.
 
 Drawings are readable in grey, and the same bytes for the same numbers. Every method has one colour,
-hatch, line and marker, whatever else is drawn; colours differ in lightness. Each function returns
+hatch, line and marker in all drawings; colours differ in lightness. Each function returns
 the drawing as SVG and as PDF.
 """
 
@@ -54,7 +54,7 @@ class Bar(NamedTuple):
 
 
 class Points(NamedTuple):
-    """The runs of a cell, and their mean with low and high end of its interval, if there is one."""
+    """The runs of a cell, and their mean with the ends of its interval, if it has one."""
 
     values: Sequence[float]
     interval: tuple[float, float, float] | None
@@ -238,7 +238,7 @@ def _whiskers(
     within: tuple[float, float],
     width: float,
 ) -> list[float]:
-    """Draw lines from low to high, with caps if there is a width, and return their ends."""
+    """Draw lines from low to high, with caps unless the width is 0, and return their ends."""
     has = np.isfinite(low) & np.isfinite(high)
     if not has.any():
         return []

@@ -37,7 +37,7 @@ EVERYTHING = (-math.inf, math.inf)
 
 
 class Band(NamedTuple):
-    """A line with a band around it: x, middle, low and high [X]; NaN where there is none."""
+    """A line with a band around it: x, middle, low and high [X]; NaN for no value."""
 
     x: npt.NDArray[np.float64]
     middle: npt.NDArray[np.float64]

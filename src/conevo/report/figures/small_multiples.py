@@ -25,7 +25,7 @@ BLACK: dict[str, Any] = {"color": "black", "linewidth": 0.6, "clip_on": False}
 
 
 class Panels:
-    """Panels in rows and columns on one pair of axes without a frame of its own.
+    """Panels in rows and columns on one pair of axes without a frame.
 
     Attributes:
         axes: what to draw on, in places that ``at`` gives.

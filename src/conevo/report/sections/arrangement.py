@@ -2,7 +2,7 @@
 
 A panel holds a bar or a point cloud per place and method. Places are environments or, of one
 environment, the levels of the factor with the most of them; every combination of levels of the
-other factors has a panel of its own. A method that does not have a factor is in all its panels.
+other factors has its own panel. A method without a factor is in all panels of that factor.
 """
 
 from __future__ import annotations
@@ -83,9 +83,9 @@ class Arrangement:
 
 
 def factors_of(treatments: Iterable[Treatment]) -> dict[str, list[str]]:
-    """Return the factors that treatments of a method differ in, with their levels: numbers first.
+    """Return the factors in which treatments of a method differ, with their levels: numbers first.
 
-    A factor of one level is among them if a method has treatments with and without it.
+    A factor of one level is included if a method has treatments with and without it.
     """
     listed = [(treatment.method, levels_of(treatment.variant)) for treatment in treatments]
     found: dict[str, list[str]] = {}
@@ -118,7 +118,7 @@ def arrange(
         names: of the environments, along an axis.
         treatments: of them, in order.
         axis: what environments are called along an axis.
-        by_environment: whether places are environments even if there is one only.
+        by_environment: whether places are environments even with a single one.
     """
     factors = factors_of(treatments)
     along = ""
@@ -159,7 +159,7 @@ def arrange(
 
 
 def _agree(panel: Sequence[str], levels: Sequence[str | None]) -> bool:
-    """Whether levels are those of a panel, as far as there are any."""
+    """Whether levels are those of a panel; a missing level fits any."""
     return all(level in (None, own) for own, level in zip(panel, levels, strict=True))
 
 

@@ -39,7 +39,7 @@ def champions(scope: Scope) -> Section | None:
     ]
     note = (
         "Means over runs. Selection: in the scenarios that the fittest team of each generation "
-        "meets, by which finalists are kept; validation: in scenarios of their own, by which the "
+        "meets, by which finalists are kept; validation: in separate scenarios, by which the "
         "champion is chosen among them; test: in fresh ones. Fitness: mean of the robots, on which "
         "methods select. Where the test is worse than the selection (a ratio below 1 if larger is "
         "better, above 1 if smaller is) the champion was lucky when it was selected. "

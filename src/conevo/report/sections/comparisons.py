@@ -106,7 +106,7 @@ def comparisons(scope: Scope) -> Section | None:
 
 
 def _map(scope: Scope, pairs: Sequence[Pair]) -> list[Figure]:
-    """Draw every pair as a shaded cell, if there is more than one and they fit on a page."""
+    """Draw every pair as a shaded cell, unless it is the only one or they do not fit on a page."""
     names = {pair: f"{pair.a.title} − {pair.b.title}" for pair in pairs}
     rows = list(dict.fromkeys(names.values()))
     places = dict(zip(scope.environments, place_names(scope.environments), strict=True))

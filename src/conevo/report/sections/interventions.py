@@ -46,7 +46,7 @@ class _Team(NamedTuple):
 
     @property
     def scale(self) -> float:
-        """The larger of the two, whatever their signs; their distance if these differ."""
+        """The larger absolute value of the two; their distance if the signs differ."""
         return max(abs(self.whole), abs(self.value), abs(self.whole - self.value))
 
     @property

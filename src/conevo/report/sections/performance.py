@@ -193,7 +193,7 @@ def _warnings(scope: Scope) -> list[str]:
 
 
 def _pooled(scope: Scope) -> list[Exhibit]:
-    """Return the table over all environments, if there is something to pool."""
+    """Return the table over all environments, unless nothing can be pooled."""
     if max(map(len, scope.cells.values())) < 2:
         return []
     found = aggregate(scope.cells)

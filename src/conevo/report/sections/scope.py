@@ -204,7 +204,7 @@ def named(cells: Mapping[Cell, int]) -> dict[str, str]:
 
 
 def place_names(environments: Sequence[str]) -> list[str]:
-    """Return the names of environments under an axis: numbers alone if there are many."""
+    """Return the names of environments under an axis: numbers alone if they are many."""
     stems = {name.rpartition("-")[0] for name in environments}
     if len(environments) <= 6 or len(stems) > 1:
         return list(environments)
