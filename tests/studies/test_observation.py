@@ -20,7 +20,7 @@ from conevo.rng import fold, stream
 from conevo.runs.champions import Team
 from conevo.runs.shrinkage import shrinkage
 from conevo.studies.lifetimes import lifetimes
-from conevo.studies.observation import Observed, behaviour_report, observe
+from conevo.studies.observation import Observed, observe
 from conevo.studies.team_study import study
 from conevo.worlds.pursuit.study.behaviours import BEHAVIOURS
 from conevo.worlds.pursuit.study.captures import COLLECTIVES
@@ -154,9 +154,8 @@ def test_sensor_table_of_a_team(seen: Observation) -> None:
 
 def test_a_run_of_another_world_is_refused(tmp_path: Path) -> None:
     run = evolve_tiny(tmp_path / "rovers")
-    for call in (observe, behaviour_report):
-        with pytest.raises(UsageError, match=r"run of rover-v2/complex-1.*predators of pursuit-v2"):
-            call(run)
+    with pytest.raises(UsageError, match=r"run of rover-v2/complex-1.*predators of pursuit-v2"):
+        observe(run)
     with pytest.raises(UsageError, match="pursuit-v2"):
         composition_table([run])
 
@@ -185,7 +184,7 @@ def test_a_subclass_is_studied_like_the_world_it_inherits(tmp_path: Path, capsys
     settings: dict[str, Any] = TINY | SIZES["homcne"] | {"run.generations": 1}
     task, path = f"{tmp_path / 'mine.py'}:team-2", tmp_path / "run"
     run = conevo.evolve(task, "homcne", "smoke", 2, path, overrides=settings, threads=1)
-    found = behaviour_report(run, 2, threads=1)
+    found = observe(run, 2, threads=1).report
     assert found["task"] == "mine-v1/team-2"
     tested = run.test(2)["performance"]["capture_time"]["mean"]
     assert found["capture_time"] == pytest.approx(tested)
@@ -435,7 +434,8 @@ def test_the_command_prints_what_the_report_holds(runs, capsys) -> None:
     assert (code, err) == (0, "")
     code, text, err = say(capsys, *words, "--json")
     found = json.loads(text)
-    assert found == json.loads(json.dumps(behaviour_report(runs[3], 3, threads=2)))
+    report = {"run": str(runs[3].path)} | observe(runs[3], 3, threads=2).report
+    assert found == json.loads(json.dumps(report))
     assert sum(found["captures"].values()) > 0
     for name, n in found["captures"].items():
         assert (f"{name} {n}" in out) == (n > 0)

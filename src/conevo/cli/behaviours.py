@@ -51,11 +51,12 @@ def behaviours(
 ) -> None:
     """Classify what the fittest team of a run does."""
     from conevo.cli.lookup import find_run
-    from conevo.studies.observation import behaviour_report, studied
+    from conevo.studies.observation import observe
 
     of = find_run(run)
-    found = behaviour_report(of, scenarios, seed, threads=threads, device=device)
-    click.echo(json.dumps(found) if as_json else _text(found, studied(of)))
+    observed = observe(of, scenarios, seed, threads=threads, device=device)
+    found = {"run": str(of.path)} | observed.report
+    click.echo(json.dumps(found) if as_json else _text(found, observed.study))
 
 
 def _text(found: dict[str, Any], study: WorldStudy) -> str:

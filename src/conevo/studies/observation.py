@@ -24,7 +24,7 @@ from conevo.studies.lifetimes import Lifetime, lifetimes
 from conevo.worlds.registry import WORLDS, studies, study_of
 from conevo.worlds.study import Seen, WorldStudy
 
-__all__ = ["Observed", "behaviour_report", "equip", "observe", "studied", "watch"]
+__all__ = ["Observed", "equip", "observe", "watch"]
 
 
 @dataclass(frozen=True)
@@ -36,6 +36,7 @@ class Observed:
         seen: the results of the study.
         team: its controllers.
         lab: simulates it.
+        scenarios: number of scenarios.
         seed: the scenarios' root.
     """
 
@@ -43,6 +44,7 @@ class Observed:
     seen: Seen
     team: Team
     lab: Lab
+    scenarios: int
     seed: int
 
     @cached_property
@@ -88,6 +90,16 @@ class Observed:
         ]
         return [{"kind": kind, "behaviour": name, "count": n} for kind, name, n in counts]
 
+    @property
+    def report(self) -> dict[str, Any]:
+        """Plain data: task, generation (of the team), scenarios, seed, details of the study."""
+        return {
+            "task": self.lab.config.task,
+            "generation": self.team.generation,
+            "scenarios": self.scenarios,
+            "seed": self.seed,
+        } | self.seen.details([asdict(life) for life in self.lifetimes])
+
 
 def equip(run: Run, threads: int | None = None, device: str | None = None) -> tuple[Team, Lab]:
     """Return the fittest team of a run and what simulates it.
@@ -129,7 +141,7 @@ def observe(
     Raises:
         UsageError: another world, no generation has finished yet, or made with other kernels.
     """
-    study = studied(run)
+    study = _studied(run)
     team, lab = equip(run, threads, device)
     return _watched(
         study, team, lab, scenarios, run.config.run.seed if seed is None else seed, rules
@@ -142,7 +154,7 @@ def watch(team: Team, lab: Lab, scenarios: int, seed: int) -> Observed | None:
     return _watched(study, team, lab, scenarios, seed) if study is not None else None
 
 
-def studied(run: Run) -> WorldStudy:
+def _studied(run: Run) -> WorldStudy:
     """Return the study of a run's world.
 
     Raises:
@@ -166,31 +178,4 @@ def _watched(
     genes, (rows,) = team.as_trial()
     keys = tuple(fold(seed, "test", k) for k in range(scenarios))
     seen = study.observe(lab.simulator, genes, rows, keys, seed, rules)
-    return Observed(study, seen, team, lab, seed)
-
-
-def behaviour_report(
-    run: Run,
-    scenarios: int = 20,
-    seed: int | None = None,
-    *,
-    threads: int | None = None,
-    device: str | None = None,
-    rules: Any = None,
-) -> dict[str, Any]:
-    """Observe the fittest team of a run and return what ``conevo behaviours`` prints.
-
-    Plain data: run, task, generation (of the team), scenarios, seed; then the details that the
-    world's study gives.
-
-    Raises:
-        UsageError: another world, no generation has finished yet, or made with other kernels.
-    """
-    found = observe(run, scenarios, seed, threads=threads, device=device, rules=rules)
-    return {
-        "run": str(run.path),
-        "task": run.config.task,
-        "generation": found.team.generation,
-        "scenarios": scenarios,
-        "seed": found.seed,
-    } | found.seen.details([asdict(life) for life in found.lifetimes])
+    return Observed(study, seen, team, lab, scenarios, seed)
