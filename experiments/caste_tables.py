@@ -15,7 +15,7 @@ from conevo.errors import UsageError, without_team
 from conevo.rng import fold
 from conevo.runs.run import Run
 from conevo.runs.shrinkage import shrinkage
-from conevo.studies.lesions import WHOLE, lesion
+from conevo.studies.lesions import WHOLE, Original
 from conevo.studies.observation import observe
 from conevo.worlds.measures import measures_of
 
@@ -72,7 +72,8 @@ def lesion_table(
         lab, behaviours = seen.lab, seen.study.BEHAVIOURS
         lesioned = [behaviour for behaviour in behaviours if behaviour in seen.labels]
         others = lab.world.scenarios([fold(seen.seed, "lesion", k) for k in range(scenarios)])
-        found = lesion(lab.simulator, seen.team, seen.labels, lesioned, others)
+        team = Original(lab.simulator, seen.team, seen.labels, seen.team.fitness)
+        found = team.lesion(lesioned, others)
         main = measures_of(lab.world)[0].name
         means = found.performance[main].astype(np.float64).mean(axis=1).tolist()
         left = dict(zip(found.teams, means, strict=True))

@@ -12,7 +12,7 @@ from conevo.campaigns.tables import Tables
 from conevo.report.sections.composed import composed
 from conevo.report.sections.scope import scopes
 from conevo.runs.champions import Team
-from conevo.studies.lesions import compose
+from conevo.studies.lesions import Original
 from conevo.worlds.pursuit.study.behaviours import BEHAVIOURS
 from conevo.worlds.pursuit.study.captures import COMPOSITIONS
 from conevo.worlds.pursuit.study.composed import COMPOSED, roles_of
@@ -60,7 +60,7 @@ def test_the_fittest_of_each_behaviour_plays(rollout: Rollout, team: Team) -> No
         Composed("lacking", ["pursuer", "pursuer", "blocker", "knocker"], scenarios),
         Composed("nobody", [], scenarios),
     ]
-    (found,) = compose(rollout, team, LABELS, FITNESS, asked)
+    (found,) = Original(rollout, team, LABELS, FITNESS).compose(asked)
     assert found.teams == ("two and two",)
     who = [3, 3, 0, 0]
     same = Team(0, team.genes[who], team.active[who], np.zeros(4), np.zeros(4))

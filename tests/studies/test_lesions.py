@@ -10,11 +10,12 @@ import pytest
 
 import conevo
 from conevo.runs.champions import Team
-from conevo.studies.lesions import clone, lesion, replacement, rotate
+from conevo.studies.lesions import Original, replacement
 from conevo.worlds.rollout import Rollout
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "light.py"
 LABELS = ["low", "hi", "low", "non-specialized", "move", "hi"]
+NOTHING = [0.0] * 6  # fitness
 
 
 @pytest.fixture(scope="module")
@@ -47,7 +48,7 @@ def of(found, name: str):
 def test_a_lesion_replaces_all_robots_of_a_caste_and_nobody_else(rollout, team) -> None:
     scenarios = rollout.world.scenarios(range(3))
     castes = ["low", "hi", "move", "non-specialized"]
-    found = lesion(rollout, team, LABELS, castes, scenarios)
+    found = Original(rollout, team, LABELS, NOTHING).lesion(castes, scenarios)
     assert found.teams == ("whole", *castes)
     assert of(found, "whole") == play(rollout, team, scenarios)
     by_hand = {  # heuristics low 0, med 1, hi 2, non-specialized 3
@@ -64,7 +65,9 @@ def test_a_lesion_replaces_all_robots_of_a_caste_and_nobody_else(rollout, team) 
 def test_clones_are_all_the_fittest_robot_of_their_caste(rollout, team) -> None:
     scenarios = rollout.world.scenarios(range(3))
     fitness = [1.0, 5.0, 2.0, 0.0, 9.0, 5.0]
-    found = clone(rollout, team, LABELS, fitness, ["low", "hi", "non-specialized"], scenarios)
+    found = Original(rollout, team, LABELS, fitness).clone(
+        ["low", "hi", "non-specialized"], scenarios
+    )
     assert found.teams == ("whole", "low", "hi", "non-specialized")
     assert of(found, "whole") == play(rollout, team, scenarios)
     for caste, robot in (("low", 2), ("hi", 1), ("non-specialized", 3)):
@@ -77,20 +80,20 @@ def test_clones_are_all_the_fittest_robot_of_their_caste(rollout, team) -> None:
 def test_a_robot_without_a_finite_fitness_is_cloned_last(rollout, team) -> None:
     scenarios = rollout.world.scenarios([7])
     castes = ["low"]
-    expected = clone(rollout, team, LABELS, [0, 0, 1, 0, 0, 0], castes, scenarios)
+    expected = Original(rollout, team, LABELS, [0, 0, 1, 0, 0, 0]).clone(castes, scenarios)
     for worst in (np.nan, np.inf, -np.inf):
-        found = clone(rollout, team, LABELS, [worst, 0, -3, 0, 0, 0], castes, scenarios)
+        found = Original(rollout, team, LABELS, [worst, 0, -3, 0, 0, 0]).clone(castes, scenarios)
         assert of(found, "low") == of(expected, "low")
-    nobody = clone(rollout, team, LABELS, [np.nan] * 6, castes, scenarios)
-    first = clone(rollout, team, LABELS, [1, 0, 0, 0, 0, 0], castes, scenarios)
+    nobody = Original(rollout, team, LABELS, [np.nan] * 6).clone(castes, scenarios)
+    first = Original(rollout, team, LABELS, [1, 0, 0, 0, 0, 0]).clone(castes, scenarios)
     assert of(nobody, "low") == of(first, "low")
 
 
 def test_without_castes_only_the_whole_team_plays(rollout, team) -> None:
     scenarios = rollout.world.scenarios([1])
     for found in (
-        lesion(rollout, team, LABELS, [], scenarios),
-        clone(rollout, team, LABELS, np.zeros(6), [], scenarios),
+        Original(rollout, team, LABELS, NOTHING).lesion([], scenarios),
+        Original(rollout, team, LABELS, NOTHING).clone([], scenarios),
     ):
         assert found.teams == ("whole",)
         assert of(found, "whole") == play(rollout, team, scenarios)
@@ -123,7 +126,7 @@ def test_all_castes_of_the_thesis_have_a_heuristic_of_their_own(task: str) -> No
 
 def test_controllers_change_places_with_all_others_in_turn(rollout, team) -> None:
     scenarios = rollout.world.scenarios(range(3))
-    found = rotate(rollout, team, scenarios)
+    found = Original(rollout, team, LABELS, NOTHING).rotate(scenarios)
     assert found.teams == ("whole", "moved")
     assert of(found, "whole") == play(rollout, team, scenarios)
     moved = []
@@ -138,6 +141,6 @@ def test_controllers_change_places_with_all_others_in_turn(rollout, team) -> Non
 def test_clones_lose_nothing_by_it(rollout, team) -> None:
     first = [0] * 6
     clones = replace(team, genes=team.genes[first], active=team.active[first])
-    found = rotate(rollout, clones, rollout.world.scenarios(range(3)))
+    found = Original(rollout, clones, LABELS, NOTHING).rotate(rollout.world.scenarios(range(3)))
     for measure, values in of(found, "moved").items():
         assert values == pytest.approx(of(found, "whole")[measure], rel=1e-6)

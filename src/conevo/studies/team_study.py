@@ -30,7 +30,7 @@ from conevo.runs.run import Run
 from conevo.specialization.favourite import affinity, favourite, favourite_share
 from conevo.specialization.individual import NON_SPECIALIZED, relative_degree
 from conevo.specialization.team import Activity, measure
-from conevo.studies.lesions import Compared, clone, compose, lesion, rotate
+from conevo.studies.lesions import Compared, Original
 from conevo.studies.observation import Observed, equip, watch
 from conevo.typing import Record
 from conevo.worlds.protocol import Outcome, setting_columns
@@ -102,21 +102,16 @@ def study(
         altered = [caste for caste in altered if caste != NON_SPECIALIZED]
     clones = [fold(seed, "clones", k) for k in range(scenarios)]
     others = lab.world.scenarios([fold(seed, "lesion", k) for k in range(scenarios)])
-    lesioned = lesion(lab.simulator, team, portrait.labels, altered, others)
-    moved = [rotate(lab.simulator, team, others)] if len(team.genes) > 1 else []
-    cloned = clone(
-        lab.simulator,
-        team,
-        portrait.labels,
-        portrait.fitness,
+    original = Original(lab.simulator, team, portrait.labels, portrait.fitness)
+    composed = [] if watched is None else original.compose(watched.seen.compositions(clones))
+    cloned = original.clone(
         [caste for caste in altered if caste not in NOT_CLONED],
         watched.seen.together(clones) if watched is not None else lab.world.scenarios(clones),
     )
-    teams = [] if watched is None else watched.seen.compositions(clones)
-    composed = compose(lab.simulator, team, portrait.labels, portrait.fitness, teams)
+    moved = [original.rotate(others)] if len(team.genes) > 1 else []
     return {
         "scores": [
-            *_rows("lesion", lesioned),
+            *_rows("lesion", original.lesion(altered, others)),
             *_rows("clones", cloned),
             *(row for one in moved for row in _rows("rotated", one)),
             *(row for one in composed for row in _rows("composed", one)),
