@@ -16,7 +16,7 @@ from conevo.campaigns.tables import Tables
 from conevo.reading import read_json
 from conevo.report.files import sections_of
 from conevo.runs.run import Run
-from conevo.studies.signal import signal_of_run
+from conevo.studies.signal import measure_signal
 
 OWN = Path(__file__).resolve().parents[2] / "examples" / "own_method.py"
 
@@ -42,7 +42,7 @@ def test_a_study_that_a_plan_gets_later_is_all_that_is_missing(campaign) -> None
     for label in campaign.planned:
         study = read_json(campaign.paths.study(label, "signal"))
         run = Run(campaign.paths.run(label))
-        assert study == signal_of_run(run, threads=1) | {"not_measured": ""}
+        assert study == measure_signal(run, threads=1) | {"not_measured": ""}
         assert not campaign.paths.study(label).exists()
     with Tables(campaign.paths.tables) as tables:
         for label in campaign.planned:

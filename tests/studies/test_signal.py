@@ -19,7 +19,7 @@ from conevo.runs.evaluation import score
 from conevo.runs.lab import Lab
 from conevo.studies import signal
 from conevo.studies.repeatability import repeatability, spearman_brown
-from conevo.studies.signal import measure_signal, signal_of_run
+from conevo.studies.signal import measure_signal
 from runs.tiny import TASK, evolve_tiny, tiny_settings
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -158,7 +158,7 @@ def test_a_run_has_the_signal_of_its_first_and_last_populations(method, teams, t
         sizes["method__evaluation"] = "systematic"
     run = evolve_tiny(tmp_path / "run", method, **sizes)
     said: list[str] = []
-    found = signal_of_run(run, trials=3, threads=1, announce=said.append)
+    found = measure_signal(run, trials=3, threads=1, announce=said.append)
     first, last = found["signal"]
     assert [first["generation"], last["generation"]] == ["first", "last"]
     assert (first["number"], last["number"]) == (0, 5)
@@ -174,7 +174,7 @@ def test_a_run_that_begins_with_others_populations_is_measured_with_these(tmp_pa
     second = conevo.evolve(
         TASK, "ccga", "smoke", 9, tmp_path / "second", overrides=settings, origin=first, threads=1
     )
-    begun = signal_of_run(second, trials=3, threads=1)["signal"][0]
+    begun = measure_signal(second, trials=3, threads=1)["signal"][0]
     assert begun["icc"] != measure_signal(second.config, trials=3, threads=1)["signal"][0]["icc"]
 
 

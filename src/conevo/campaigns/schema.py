@@ -60,7 +60,7 @@ that recombined between populations, the mean over generations; exchange_share i
 pairs that could have; both are NULL for methods that never do. ``robots``: specialization is S,
 independent the S of independent draws from the robot's shares, relative S over that; a share is 1
 if it is always the same; columns from favourite_setting on are NULL in studies of earlier versions.
-``signal``: see ``studies.signal.signal_of_run``; icc is of one trial, scheme is the number of
+``signal``: see ``studies.signal.measure_signal``; icc is of one trial, scheme is the number of
 trials that the method gives each genotype; NULL where all fitness was the same. ``measures``: the
 world's, as it declares them; for one that is not listed, larger is better.
 """

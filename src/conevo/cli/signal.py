@@ -13,6 +13,7 @@ from conevo.cli.run_to_end import device_option, threads_option
 from conevo.errors import UsageError
 
 if TYPE_CHECKING:
+    from conevo.runs.config import RunConfig
     from conevo.runs.run import Run
 
 __all__ = ["signal"]
@@ -60,19 +61,20 @@ def signal(
 
     Try: conevo signal rover/complex-5 --method ccga
     """
-    from conevo.studies.signal import measure_signal, signal_of_run
+    from conevo.runs.run import Run
+    from conevo.studies.signal import measure_signal
 
     def announce(price: str) -> None:
         click.echo(price, err=as_json)
 
     if what is not None and _is_run(what):
-        run = _found(what, settings)
-        how: dict[str, Any] = {"threads": threads, "device": device, "announce": announce}
-        found = {"run": str(run.path)} | signal_of_run(run, units, trials, **how)
+        of: Run | RunConfig = _found(what, settings)
     else:
         order = Order(**settings, device=device or "cpu")
-        how = {"threads": threads, "device": order.device, "announce": announce}
-        found = measure_signal(order.resolve(what), units, trials, **how)
+        of, device = order.resolve(what), order.device
+    found = measure_signal(of, units, trials, threads=threads, device=device, announce=announce)
+    if isinstance(of, Run):
+        found = {"run": str(of.path)} | found
     click.echo(json.dumps(found) if as_json else _text(found))
 
 

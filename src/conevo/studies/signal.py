@@ -37,7 +37,7 @@ from conevo.studies.repeatability import Repeatability, repeatability, spearman_
 from conevo.terms import counted
 from conevo.typing import Record
 
-__all__ = ["TRIALS", "Unmeasured", "measure_signal", "signal_of_run", "signal_study"]
+__all__ = ["TRIALS", "Unmeasured", "measure_signal", "signal_study"]
 
 GENOTYPES, PER_ROBOT, ALONE, TRIALS = 20, 3, 5, 50
 BATCH = 1000  # teams that are played at once
@@ -78,36 +78,7 @@ class _Subject:
 
 
 def measure_signal(
-    config: RunConfig,
-    units: int | None = None,
-    trials: int = TRIALS,
-    *,
-    threads: int | None = None,
-    device: str = "cpu",
-    announce: Announce | None = None,
-) -> Record:
-    """Measure the signal of the populations that a run would start with; writes nothing.
-
-    Args:
-        config: of the run.
-        units: genotypes that are tried of each population or, of neurons, each sub-population.
-        trials: of each genotype.
-        threads, device: as for ``conevo.evolve``; they change no result.
-        announce: called with the cost before the start.
-
-    Returns:
-        As ``signal_of_run``, with the generation "first" only.
-
-    Raises:
-        Unmeasured: the method has no populations.
-        UsageError: these numbers are not allowed.
-    """
-    lab = Lab.equip(config, threads, device)
-    return _measure(lab, {"first": lab.first_state()}, units, trials, announce)
-
-
-def signal_of_run(
-    run: Run,
+    of: Run | RunConfig,
     units: int | None = None,
     trials: int = TRIALS,
     *,
@@ -115,12 +86,15 @@ def signal_of_run(
     device: str | None = None,
     announce: Announce | None = None,
 ) -> Record:
-    """Measure the signal of the first and the last populations of a run.
+    """Measure the signal of the first and the last populations of a run; writes nothing.
 
     Args:
-        run: finished or not; its last populations are those of its newest checkpoint.
-        units, trials, announce: as for ``measure_signal``.
-        threads, device: as for ``Run.resume``; they change no result.
+        of: a run, finished or not; its last populations are those of its newest checkpoint. Or the
+            configuration of a run, which has first populations only.
+        units: genotypes that are tried of each population or, of neurons, each sub-population.
+        trials: of each genotype.
+        threads, device: as for ``Run.resume`` and ``conevo.evolve``; they change no result.
+        announce: called with the cost before the start.
 
     Returns:
         Plain data: task, method, credit, and signal, a row for each of the two:
@@ -138,17 +112,29 @@ def signal_of_run(
         Unmeasured: the method has no populations.
         UsageError: these numbers are not allowed, or the run was made with other kernels.
     """
-    lab, store = run.equip(threads, device), Store(run.path)
-    name, blank = lab.config.method, lab.blank_state()
-    states = {"first": store.load_origin(name, blank) or blank}
-    last, _ = store.load_checkpoint(name, blank)
-    if last is not None and last.progress.generation:
-        states["last"] = last
-    return _measure(lab, states, units, trials, announce)
+    lab = (
+        of.equip(threads, device)
+        if isinstance(of, Run)
+        else Lab.equip(of, threads, device or "cpu")
+    )
+    if trials < 2:
+        raise UsageError(f"trials = {trials}: a signal takes two trials of each genotype, or more")
+    if units is not None and units < 2:
+        raise UsageError(f"units = {units}: a signal takes two genotypes to compare, or more")
+    states = _states(of, lab) if isinstance(of, Run) else {"first": lab.first_state()}
+    subjects = [_subject(lab, name, state, units) for name, state in states.items()]
+    if announce is not None:
+        announce(_price(lab, subjects, trials))
+    return {
+        "task": lab.config.task,
+        "method": lab.config.method,
+        "credit": lab.config.run.credit,
+        "signal": [_row(lab, one, trials) for one in subjects],
+    }
 
 
 def signal_study(run: Run, *, threads: int | None = None) -> Record:
-    """Return what ``signal_of_run`` does, as a campaign keeps it.
+    """Return the signal of a run in the form that a campaign keeps.
 
     Returns:
         Of a method without a signal that could be measured: no rows, and why as not_measured.
@@ -156,32 +142,19 @@ def signal_study(run: Run, *, threads: int | None = None) -> Record:
     config = run.config
     about = {"task": config.task, "method": config.method, "credit": config.run.credit}
     try:
-        return signal_of_run(run, threads=threads) | {"not_measured": ""}
+        return measure_signal(run, threads=threads) | {"not_measured": ""}
     except Unmeasured as error:
         return about | {"signal": [], "not_measured": str(error)}
 
 
-def _measure(
-    lab: Lab,
-    states: dict[str, State],
-    units: int | None,
-    trials: int,
-    announce: Announce | None,
-) -> Record:
-    if trials < 2:
-        raise UsageError(f"trials = {trials}: a signal takes two trials of each genotype, or more")
-    if units is not None and units < 2:
-        raise UsageError(f"units = {units}: a signal takes two genotypes to compare, or more")
-    subjects = [_subject(lab, name, state, units) for name, state in states.items()]
-    if announce is not None:
-        announce(_price(lab, subjects, trials))
-    config = lab.config
-    return {
-        "task": config.task,
-        "method": config.method,
-        "credit": config.run.credit,
-        "signal": [_row(lab, one, trials) for one in subjects],
-    }
+def _states(run: Run, lab: Lab) -> dict[str, State]:
+    """Return the states with the first populations of a run, and with its last if it has others."""
+    store, name, blank = Store(run.path), lab.config.method, lab.blank_state()
+    states = {"first": store.load_origin(name, blank) or blank}
+    last, _ = store.load_checkpoint(name, blank)
+    if last is not None and last.progress.generation:
+        states["last"] = last
+    return states
 
 
 def _subject(lab: Lab, generation: str, state: State, units: int | None) -> _Subject:
