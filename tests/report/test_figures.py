@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.collections import PolyCollection
 
 from conevo.palette import METHODS, caste_colours, method_looks
 from conevo.report.figures import charts as figures
@@ -263,7 +264,7 @@ def test_nothing_is_drawn_beyond_the_range_of_a_measure(drawn) -> None:
             ends = np.concatenate([path.vertices[:, 1] for path in collection.get_paths()])
             assert ends.min() >= 0
             assert ends.max() <= 1
-    (around,) = drawn[2].axes[0].collections
+    (around,) = (one for one in drawn[2].axes[0].collections if isinstance(one, PolyCollection))
     heights = around.get_paths()[0].vertices[:, 1]  # in panels, which end at 1.04 of the highest
     assert heights.min() >= 0
     assert heights.max() <= 1 / 1.04 + 1e-9
