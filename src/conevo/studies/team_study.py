@@ -103,15 +103,16 @@ def study(
     clones = [fold(seed, "clones", k) for k in range(scenarios)]
     others = lab.world.scenarios([fold(seed, "lesion", k) for k in range(scenarios)])
     original = Original(lab.simulator, team, portrait.labels, portrait.fitness)
-    composed = [] if watched is None else original.compose(watched.seen.compositions(clones))
+    lesioned = original.lesion(altered, others)
+    moved = [original.rotate(others)] if len(team.genes) > 1 else []
     cloned = original.clone(
         [caste for caste in altered if caste not in NOT_CLONED],
         watched.seen.together(clones) if watched is not None else lab.world.scenarios(clones),
     )
-    moved = [original.rotate(others)] if len(team.genes) > 1 else []
+    composed = [] if watched is None else original.compose(watched.seen.compositions(clones))
     return {
         "scores": [
-            *_rows("lesion", original.lesion(altered, others)),
+            *_rows("lesion", lesioned),
             *_rows("clones", cloned),
             *(row for one in moved for row in _rows("rotated", one)),
             *(row for one in composed for row in _rows("composed", one)),
