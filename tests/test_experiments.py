@@ -11,6 +11,7 @@ import conevo
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.append(str(ROOT / "experiments"))  # scripts import what they share
+CALIBRATION = ROOT / "docs" / "results" / "calibration.md"
 
 import calibration  # noqa: E402
 import calibration_tables as tables  # noqa: E402
@@ -132,8 +133,11 @@ def test_what_a_reading_must_be_like():
         assert [one for one, is_met in tables.CRITERIA.items() if not is_met(other)] == [name]
 
 
+@pytest.mark.skipif(
+    not CALIBRATION.with_suffix(".csv").is_file(), reason="the source package has no results"
+)
 def test_the_page_s_tables_are_those_of_its_numbers():
-    page = ROOT / "docs" / "results" / "calibration.md"
+    page = CALIBRATION
     text = page.read_text()
     for name, (part, make) in tables.PAGE_PARTS.items():
         rows = pages.read(page.with_name(f"calibration{tables.PARTS[part]}.csv"))

@@ -233,6 +233,9 @@ def test_bad_arguments_are_one_line(arguments, line, capsys, tmp_path, monkeypat
     assert "Traceback" not in said
 
 
+@pytest.mark.skipif(
+    not PAGE.with_suffix(".csv").is_file(), reason="the source package has no results"
+)
 def test_the_page_s_tables_are_those_of_its_numbers():
     text = PAGE.read_text()
     cells = cells_of(pages.read(PAGE.with_suffix(".csv")))

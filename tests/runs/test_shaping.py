@@ -207,6 +207,7 @@ def command(path: Path, settings: dict[str, Any]) -> list[str]:
     return ["--preset", "smoke", "--out", str(path), *sets]
 
 
+@pytest.mark.slow
 def test_kills_between_and_within_the_stages_are_not_noticed(tmp_path: Path) -> None:
     path, settings = tmp_path / "killed", tiny_settings("cone") | BRIEF
     first = ["run", "rover/complex-3", "--shape", *command(path, settings)]
