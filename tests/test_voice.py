@@ -31,12 +31,15 @@ CHECKED = (
     "src/conevo/controllers/*.py",
     "src/conevo/evolution/**/*.py",
     "src/conevo/kernels/*.py",
+    "src/conevo/playback/*.py",
+    "src/conevo/replay/**/*.py",
     "src/conevo/runs/*.py",
     "src/conevo/report/**/*.py",
     "src/conevo/specialization/*.py",
     "src/conevo/studies/*.py",
     "src/conevo/watch/*.py",
     "src/conevo/worlds/**/*.py",
+    "viewer/*.py",
 )
 # Each phrase, a regular expression in which a space is any white space, and what to write.
 REFUSED = (

@@ -1,9 +1,9 @@
-"""Write ``replay/playback.ts``: the types of a playback and the constants of how it looks.
+"""Write ``replay/playback.ts``: the types of a playback and the constants of its look.
 
     python viewer/make_playback.py
 
 They are declared in ``conevo.playback.schema``, ``conevo.playback.look`` and ``conevo.palette``,
-and here only translated, so that films and the viewer cannot differ.
+and only translated here, so that films and the viewer cannot differ.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from conevo.playback.quantized import Channel
 
 FILE = Path(__file__).parent / "replay" / "playback.ts"
 HEAD = """\
-// What is drawn of one team in one epoch, and how it looks, the same in films and here.
+// The drawing of one team in one epoch and its look, the same in films and here.
 //
 // Written by viewer/make_playback.py from conevo/playback/schema.py, conevo/playback/look.py and
-// conevo/palette.py, which say what everything means: not to be changed here.
+// conevo/palette.py, where everything is explained. Change those, not this file.
 
 import type { Channel } from "./data";
 """
@@ -54,7 +54,7 @@ def interfaces() -> Iterator[str]:
 
 
 def typescript(kind: Any) -> str:
-    """Return a type of a field as TypeScript has it."""
+    """Return the type of a field in TypeScript."""
     origin, parts = get_origin(kind), get_args(kind)
     if origin is Literal:
         return " | ".join(f'"{part}"' for part in parts)

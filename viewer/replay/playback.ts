@@ -1,7 +1,7 @@
-// What is drawn of one team in one epoch, and how it looks, the same in films and here.
+// The drawing of one team in one epoch and its look, the same in films and here.
 //
 // Written by viewer/make_playback.py from conevo/playback/schema.py, conevo/playback/look.py and
-// conevo/palette.py, which say what everything means: not to be changed here.
+// conevo/palette.py, where everything is explained. Change those, not this file.
 
 import type { Channel } from "./data";
 
@@ -30,7 +30,7 @@ export interface Kind {
   readonly colour: string;
 }
 
-/** What stands still. */
+/** An area that does not change. */
 export interface Backdrop {
   readonly shape: "rect" | "disc" | "raster";
   readonly numbers: readonly number[];
@@ -40,7 +40,7 @@ export interface Backdrop {
   readonly cells: Channel | null;
 }
 
-/** How some bodies look: "robot" bodies have the colour of their action or caste. */
+/** The look of some bodies: "robot" bodies have the colour of their action or caste. */
 export interface BodyKind {
   readonly name: string;
   readonly radius: number;
@@ -63,7 +63,7 @@ export interface Things {
   readonly states: readonly Kind[];
 }
 
-/** A range around the team's robots: [A] radius by the action of the moment, 0 for none. */
+/** A range around the team's robots: [A] radius by the current action, 0 for none. */
 export interface Ring {
   readonly name: string;
   readonly radius: readonly number[];
@@ -83,7 +83,7 @@ export interface SensorGroup {
   readonly turns: boolean;
 }
 
-/** What is said about a robot over the whole epoch. */
+/** A robot over the whole epoch. */
 export interface Robot {
   readonly caste: number;
   readonly specialization: number;
@@ -94,7 +94,7 @@ export interface Robot {
   readonly share: number;
 }
 
-/** Something to jump to. kind: index into the playback's event kinds; robots: numbers. */
+/** An event to jump to. kind: index into the playback's event kinds; robots: numbers. */
 export interface Event {
   readonly t: number;
   readonly kind: number;
@@ -118,13 +118,13 @@ export interface Gauge {
   readonly colour: string;
 }
 
-/** A curve over the timeline: [T], the last value is what the epoch ended with. */
+/** A curve over the timeline: [T], the last value is that at the end of the epoch. */
 export interface Curve {
   readonly name: string;
   readonly values: Channel;
 }
 
-/** One team in one epoch, ready to be drawn. R robots come first among the B bodies. */
+/** One team in one epoch, ready to be drawn. The R robots are the first of the B bodies. */
 export interface Playback {
   readonly title: string;
   readonly subtitle: string;

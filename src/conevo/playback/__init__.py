@@ -1,1 +1,1 @@
-"""What is to be drawn of a recorded epoch: data that worlds make, and viewer and films draw."""
+"""Playbacks, the drawings of recorded epochs: worlds make them, viewer and films draw them."""

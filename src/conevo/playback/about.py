@@ -1,4 +1,4 @@
-"""What a recorded epoch is of: the words and numbers kept with its channels."""
+"""The description of a recorded epoch: the words and numbers kept with its channels."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ __all__ = ["About"]
 
 
 class About(TypedDict):
-    """What a trajectory is of.
+    """The description of a trajectory.
 
-    label, run_id, method, seed: of the run. generation: in which the team was the fittest one.
+    label, run_id, method, seed: of the run. generation: in which the team was the fittest.
     epoch: number of the scenario among those that the seed draws; scenario: its key. labels [R]:
     caste of each robot in this epoch. specialization, fitness [R]: S and fitness in it. favourites,
-    favourite_shares [R]: the setting that a robot used most in it and its share of all that it
-    used, "" and 0 if it used none; earlier versions wrote none. heuristic [R]: name of a robot's
+    favourite_shares [R]: the setting that a robot used most in it, and its share of all settings
+    used, "" and 0 if it used none; missing in earlier versions. heuristic [R]: name of a robot's
     heuristic controller, "" for its network. neurons [R]: slots in which a robot has hidden
-    neurons. units: what follows a value of each measure of performance, its unit and that smaller
-    is better if it is; conevo 0.1.0 wrote none. controller: its name and settings. inputs, outputs:
-    names of what robots sense and of what their controllers give; conevo 0.1.0 wrote none. like:
-    world of the package whose class the world's own inherits. drawn: what it says is drawn.
+    neurons. units: text after the values of each measure of performance, its unit and whether
+    smaller is better; missing in conevo 0.1.0. controller: its name and settings. inputs, outputs:
+    names of sensors and of controllers' outputs; missing in conevo 0.1.0. like: world of the
+    package whose class the world's own inherits. drawn: the world's ``Drawn``.
     """
 
     format: int

@@ -1,4 +1,4 @@
-"""The playback of a world that the package does not know: robots where they are, what they do."""
+"""The playback of a world from outside the package: robots' positions and actions."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ __all__ = ["playback"]
 def playback(parts: Parts, drawn: Drawn) -> Playback:
     """Return the playback of an epoch of any world that records x, y and action of its robots.
 
-    A heading and an energy of every robot are shown, too, if they are recorded.
+    Robots' heading and energy are shown, too, if they are recorded.
 
     Args:
         parts: of the trajectory.
-        drawn: what the world says is drawn: its unit, bounds and colours, and robots' size.
+        drawn: the world's own: unit, bounds, colours, and size of robots.
 
     Raises:
-        UsageError: it does not record what is needed.
+        UsageError: the world does not record x, y and action.
     """
     about, t, r = parts.about, parts.t, parts.r
     missing = [name for name in ("x", "y", "action") if not parts.has(name, t, r)]
@@ -64,7 +64,7 @@ def playback(parts: Parts, drawn: Drawn) -> Playback:
 def _corners(
     x: npt.NDArray[Any], y: npt.NDArray[Any]
 ) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Return two corners of the world: the unit square if all robots are in it, else around all."""
+    """Return two corners of the world: the unit square if all robots are in it, else a larger."""
     low, high = np.array([x.min(), y.min()]), np.array([x.max(), y.max()])
     if low.min() >= 0 and high.max() <= 1:
         return (0.0, 0.0), (1.0, 1.0)
@@ -98,7 +98,7 @@ def _colours(
 
 
 def _sensors(parts: Parts) -> tuple[SensorGroup, ...]:
-    """Return the sensors by the names they have before their numbers: "light 0", "light 1"."""
+    """Return groups of sensors whose names differ in the number only: "light 0", "light 1"."""
     n = parts.channel("sensors", parts.t, parts.r, -1).codes.shape[2]
     names = parts.about.get("inputs", [])
     if len(names) != n:  # of conevo 0.1.0

@@ -1,6 +1,6 @@
-"""What a playback's parts must be to each other, and what is said of a damaged recording.
+"""Checks that a playback's parts fit together, and the error for a damaged recording.
 
-Numbers, names and texts of a file are looked at once, where it is loaded
+Numbers, names and texts of a file are checked once, where it is loaded
 (``conevo.replay.validation``); every channel where it is read (``conevo.playback.reading``).
 """
 
@@ -16,19 +16,19 @@ from conevo.playback.schema import Event, Playback
 __all__ = ["DAMAGE", "DAMAGED", "MOST_EVENTS", "checked", "one_line", "refusal"]
 
 MOST_EVENTS = 5_000
-# What damaged numbers and names make their readers raise.
+# Errors that damaged numbers and names cause.
 DAMAGE = (ArithmeticError, AttributeError, LookupError, TypeError, ValueError)
 DAMAGED = "the trajectory is damaged: "
 
 
 def checked(playback: Playback) -> Playback:
-    """Return a playback whose parts fit together, its events in order of time.
+    """Return a playback after checking its parts, with its events in order of time.
 
-    Choice: of more than 5,000 events the rarest kinds are kept, and of the kind that does not fit
-    any more the first ones; a fact says so.
+    Choice: of more than 5,000 events the rarest kinds are kept, and the first ones of the kind that
+    no longer fits; a fact reports it.
 
     Raises:
-        ValueError: something does not fit.
+        ValueError: some parts do not fit together.
     """
     x0, y0, x1, y1 = playback.bounds
     if not (all(map(math.isfinite, playback.bounds)) and x0 < x1 and y0 < y1):
@@ -56,10 +56,10 @@ def checked(playback: Playback) -> Playback:
 
 
 def refusal(error: Exception) -> UsageError:
-    """Return the error for a damaged trajectory: one line that says what was wrong."""
+    """Return the error for a damaged trajectory: one line with the reason."""
     return UsageError(DAMAGED + one_line(str(error) or type(error).__name__))
 
 
 def one_line(text: str) -> str:
-    """Return the beginning of a text that a damaged file may have a part in, as one clear line."""
+    """Return the beginning of a text, which may be from a damaged file, as one printable line."""
     return "".join(c if c.isprintable() else " " for c in text[:200])

@@ -1,4 +1,4 @@
-"""What a world's ``Drawn`` adds to a playback: objects, areas and events."""
+"""The additions of a world's ``Drawn`` to a playback: objects, areas and events."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ _GROUNDS = ("#efe6c8", "#d8e6df", "#e4dcec", "#e0e0da")  # of areas without a co
 
 
 def described(playback: Playback, parts: Parts, drawn: Drawn) -> Playback:
-    """Return a playback with what its world says is drawn.
+    """Return a playback with the objects, areas and signals that its world describes.
 
     Raises:
-        UsageError: the world names what is not recorded, or what cannot be drawn.
+        UsageError: the world names an array that is not recorded, or cannot be drawn.
     """
     places = _Places(parts)
     n = len(playback.event_kinds)
@@ -52,7 +52,7 @@ def described(playback: Playback, parts: Parts, drawn: Drawn) -> Playback:
 
 
 class _Places:
-    """Numbers of an epoch by the texts that say where they are kept."""
+    """Numbers of an epoch by texts that name their arrays, as in "ball[0]"."""
 
     def __init__(self, parts: Parts) -> None:
         self._parts = parts
@@ -62,10 +62,14 @@ class _Places:
         return UsageError(f"world {self._world}: {one_line(name)} is not drawn: {one_line(what)}")
 
     def values(self, name: str, text: float | str) -> npt.NDArray[Any]:
-        """Return the numbers at a place, of whatever shape; ``name`` is what they are for.
+        """Return the numbers that a text names, in any shape.
+
+        Args:
+            name: of the object, area or signal, for messages.
+            text: as in "ball[0]"; a number is returned as it is.
 
         Raises:
-            UsageError: nothing is kept there.
+            UsageError: it names no array or value.
         """
         if not isinstance(text, str):
             return np.asarray(text)
@@ -124,7 +128,7 @@ class _Places:
         )
 
     def _row(self, of: Objects, text: str) -> npt.NDArray[Any]:
-        """Return places [K], or [T, K] of what moves."""
+        """Return positions [K], or [T, K] of objects that move."""
         found = self.values(of.name, text)
         key = text.partition("[")[0].strip()
         if key in self._parts.names[0] and self.is_timed(found):
@@ -140,11 +144,11 @@ class _Places:
     def _index(
         self, of: Objects, text: str, shape: tuple[int, ...], n: int
     ) -> npt.NDArray[np.int64]:
-        """Return whole numbers that pick from n names."""
+        """Return whole numbers from 0 to n - 1, indices of n names."""
         found = self._whole(of, text, shape)
         if found.size and not (found.min() >= 0 and found.max() < n):
             raise self._refuse(
-                of.name, f"{text!r} is {found.min()} to {found.max()}, and there are {n} names"
+                of.name, f"{text!r} is {found.min()} to {found.max()}, for {n} names"
             )
         return found
 
@@ -171,7 +175,7 @@ class _Places:
         return Backdrop("rect", corners, fill, FAINT, of.name)
 
     def events(self, of: Signal, kind: int) -> list[Event]:
-        """Return an event wherever a number rises; those of [T, R] are the robots'."""
+        """Return an event for each rise of a number; those of [T, R] are robots' events."""
         found = self.values(of.name, of.rises)
         if not self.is_timed(found):
             raise self._refuse(of.name, f"{of.rises!r} is not recorded in every iteration")
@@ -184,7 +188,7 @@ class _Places:
 
 
 def _index(text: str) -> int | slice:
-    """Return a number or a slice as numpy picks by, "-1" or "4:" or "0::2"."""
+    """Return an index or a slice for numpy: "-1", "4:" or "0::2"."""
     parts = [int(part) if part.strip() else None for part in text.split(":")]
     if len(parts) == 1:
         if parts[0] is None:

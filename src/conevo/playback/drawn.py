@@ -1,6 +1,6 @@
-"""What a world of one's own says is drawn, next to its robots, in replay and film.
+"""A user's world's description of its drawing: objects and areas next to its robots.
 
-A world's class has it as ``drawn``; it is kept with every recorded epoch, so that drawing one needs
+A world's class has it as ``drawn``. It is kept with every recorded epoch, so that drawing one needs
 no code of the world::
 
     drawn: ClassVar[Drawn] = Drawn(
@@ -8,9 +8,9 @@ no code of the world::
         areas=(Area("goal", "places[-1, 0]", "places[-1, 1]", 0.03),),
     )
 
-A text for a number says where the number is kept: an array that ``simulation()`` records, else one
-of the scenario, else a parameter. Indices in brackets pick from it, "places[-1, 0]" or
-"places[4:, 0]"; time, of what is recorded in every iteration, comes first and is not among them.
+A text in place of a number names an array that ``simulation()`` records, else one of the scenario,
+else a parameter. Indices in brackets pick from it, "places[-1, 0]" or "places[4:, 0]". Time, the
+first dimension of arrays recorded in every iteration, is not among them.
 """
 
 from __future__ import annotations
@@ -35,10 +35,10 @@ _COLOUR = re.compile(r"#[0-9a-f]{6}")
 class Objects:
     """Things that lie or move in the world.
 
-    name: of them. x, y: where they are. size: radius, or half a side. shape: "disc" or "square".
-    kind: number of each thing's kind, which picks from ``kinds``. state: number of each thing's
-    state in every iteration, which picks from ``states``. gone: the iteration in which each was
-    taken away. Not given: all of one kind, without states, there to the end. colours: of the kinds.
+    name: of them. x, y: their positions. size: radius, or half a side. shape: "disc" or "square".
+    kind: index of each thing's kind in ``kinds``. state: index of each thing's state in ``states``,
+    in every iteration. gone: the iteration in which each was taken away. By default all are of one
+    kind, without states, and stay to the end. colours: of the kinds.
     """
 
     name: str
@@ -56,7 +56,7 @@ class Objects:
 
 @dataclass(frozen=True)
 class Area:
-    """What stands still: a goal, a home. x, y: its centre.
+    """An area that does not move: a goal, a home. x, y: its centre.
 
     radius: of a disc. width, height: of a rectangle, which has no radius. colour: of its floor.
     """
@@ -72,10 +72,10 @@ class Area:
 
 @dataclass(frozen=True)
 class Signal:
-    """Something to jump to: an event for every robot, object or world for which a number rises.
+    """A kind of event to jump to, which happens whenever a number rises.
 
-    name: of the event. rises: an array recorded in every iteration, [T] or [T, n]. colour: of its
-    mark.
+    name: of the event. rises: an array recorded in every iteration, [T] of the world, or [T, n] of
+    robots or objects. colour: of its mark.
     """
 
     name: str
@@ -85,12 +85,12 @@ class Signal:
 
 @dataclass(frozen=True)
 class Drawn:
-    """What is drawn of a world.
+    """The drawing of a world.
 
-    objects, areas, signals: next to its robots. unit: of lengths, as in "cm". seconds: of an
-    iteration, 0 if that means nothing. bounds: corners x0, y0, x1, y1; none: the unit square if all
-    robots stay in it, else what lies around them. radius: of a robot; 0: a hundredth of the world.
-    colours: "#rrggbb" of actions and castes by name; those left out get one.
+    objects, areas, signals: in addition to its robots. unit: of lengths, as in "cm". seconds: of an
+    iteration, 0 if it has no duration. bounds: corners x0, y0, x1, y1; None: the unit square if all
+    robots stay in it, else an area around them. radius: of a robot; 0: a hundredth of the world.
+    colours: "#rrggbb" of actions and castes by name; others are chosen.
     """
 
     objects: tuple[Objects, ...] = ()
@@ -104,10 +104,10 @@ class Drawn:
 
     @property
     def plain(self) -> dict[str, Any]:
-        """It as JSON has it.
+        """Its JSON form.
 
         Raises:
-            UsageError: something in it is none of JSON's kinds.
+            UsageError: JSON cannot represent a part of it.
         """
         try:
             found: dict[str, Any] = json.loads(json.dumps(asdict(self), allow_nan=False))
@@ -117,10 +117,10 @@ class Drawn:
 
     @staticmethod
     def of(plain: Mapping[str, Any], world: str) -> Drawn:
-        """Return what JSON says is drawn of a world.
+        """Return the drawing of a world from its JSON form.
 
         Raises:
-            UsageError: it is something else.
+            UsageError: it is not one.
         """
         from pydantic import ValidationError
 
@@ -135,7 +135,7 @@ class Drawn:
         return found
 
     def _wrong(self) -> str:
-        """Return what cannot be drawn though it is of the right kind, "" if nothing."""
+        """Return what is wrong with values of the right types, "" if nothing."""
         x0, y0, x1, y1 = self.bounds or (0.0, 0.0, 1.0, 1.0)
         if not (x0 < x1 and y0 < y1):
             return f"bounds {self.bounds} are not x0, y0, x1, y1 with x0 < x1 and y0 < y1"

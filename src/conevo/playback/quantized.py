@@ -1,4 +1,4 @@
-"""Numbers of a trajectory as they are kept: small codes, each standing for a value."""
+"""The stored numbers of a trajectory: small codes, each for a value."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ class Channel:
 
     @staticmethod
     def of(values: npt.ArrayLike, bits: int = 16) -> Channel:
-        """Return a channel for values: whole numbers exactly, others to ``bits`` (8 or 16) bits.
+        """Return a channel for values: whole numbers exactly, others with 8 or 16 ``bits``.
 
         The step of others is a ``2**bits - 1``-th of the distance from the least value to the
-        largest, so no value is off by more than half of that.
+        largest, so errors are at most half a step.
 
         Raises:
             ValueError: not finite, or whole numbers further apart than 2**32.
@@ -61,7 +61,7 @@ class Channel:
 
 
 def _smallest(largest: int) -> type[np.unsignedinteger[Any]]:
-    """Return the smallest type of code that can hold a number."""
+    """Return the smallest type of code for numbers up to the largest."""
     for kind in (np.uint8, np.uint16, np.uint32):
         if largest <= np.iinfo(kind).max:
             return kind

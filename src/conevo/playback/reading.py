@@ -1,4 +1,4 @@
-"""What all playbacks are made of: a trajectory's channels, each looked at before it is used."""
+"""Reading of a trajectory's channels, each checked before it is used."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ from conevo.terms import NON_SPECIALIZED
 
 __all__ = ["Parts", "begun", "columns", "octants"]
 
-_FARTHEST = 2.0**32  # beyond it whole numbers cannot be kept
+_FARTHEST = 2.0**32  # larger whole numbers have no code
 _COMPASS = ("ENE", "NNE", "NNW", "WNW", "WSW", "SSW", "SSE", "ESE")
 
 
 class Parts:
-    """A trajectory, of which every part is checked when it is asked for.
+    """A trajectory whose parts are checked when they are read.
 
     Args:
-        about: what the trajectory is of.
-        channels: what was recorded, by name.
+        about: description of the trajectory.
+        channels: the recorded arrays, by name.
 
     Attributes:
-        about: what the trajectory is of.
+        about: description of the trajectory.
         t: iterations.
         r: robots.
     """
@@ -41,7 +41,7 @@ class Parts:
         self.r = self.about["n_robots"]
 
     def has(self, name: str, *shape: int) -> bool:
-        """Return whether there is a channel of this name and shape; -1 is any length."""
+        """Return whether it has a channel of this name and shape; -1 is any length."""
         found = self._channels.get(name)
         return found is not None and _fits(found.codes.shape, shape)
 
@@ -49,11 +49,11 @@ class Parts:
         """Return a channel.
 
         Args:
-            name: of it.
+            name: of the channel.
             shape: that it must have; -1 for any length.
 
         Raises:
-            ValueError: there is none of that name, or it has another shape.
+            ValueError: it is missing, or has another shape.
         """
         if self.has(name, *shape):
             return self._channels[name]
@@ -64,12 +64,12 @@ class Parts:
         raise ValueError(f"{name} is {actual}, not [{wanted}]")
 
     def any_channel(self, name: str) -> Channel:
-        """Return a channel of whatever shape."""
+        """Return a channel of any shape."""
         return self._channels[name]
 
     @property
     def names(self) -> tuple[frozenset[str], frozenset[str], frozenset[str]]:
-        """Names of what is recorded, of the scenario's arrays, and of the world's parameters."""
+        """Names of recorded arrays, of the scenario's arrays, and of the world's parameters."""
         scene = {name.removeprefix("scene/") for name in self._channels if "scene/" in name}
         recorded = {name for name in self._channels if "/" not in name}
         return frozenset(recorded), frozenset(scene), frozenset(self.about["params"])
@@ -81,14 +81,14 @@ class Parts:
     def whole(self, name: str, *shape: int) -> npt.NDArray[np.int64]:
         """Return the values of a channel of this shape as whole numbers.
 
-        What the world has as float32 is whole but for the step it is kept in, less than a half.
+        A world's float32 are rounded: their error is that of the channel's step, less than a half.
 
         Raises:
             ValueError: as ``channel``, or the numbers are too large.
         """
         values = np.rint(self.floats(name, *shape))
         if not (np.abs(values) < _FARTHEST).all():
-            raise ValueError(f"{name} holds numbers that are too large")
+            raise ValueError(f"{name} has numbers that are too large")
         return values.astype(np.int64)
 
     def index(self, name: str, n: int, *shape: int, least: int = 0) -> Channel:
@@ -103,7 +103,7 @@ class Parts:
         return Channel.of(values)
 
     def number(self, name: str) -> int:
-        """Return the one whole number, at least 0, of a channel."""
+        """Return the single whole number, at least 0, of a channel."""
         value = int(self.whole(name))
         if value < 0:
             raise ValueError(f"{name} is {value}")
@@ -113,7 +113,7 @@ class Parts:
         """Return a number among the world's parameters.
 
         Raises:
-            ValueError: there is none, or it is not finite and at least 0.
+            ValueError: it is missing, or not finite and at least 0.
         """
         value = self.about["params"].get(name)
         if isinstance(value, bool) or not isinstance(value, int | float):
@@ -152,9 +152,9 @@ def columns(channel: Channel) -> list[Channel]:
 def begun(
     parts: Parts, actions: Mapping[str, str], castes: Mapping[str, str], outputs: Sequence[str]
 ) -> dict[str, Any]:
-    """Return what every playback says, as arguments of ``Playback``.
+    """Return the arguments of ``Playback`` that all worlds have in common.
 
-    Whose team it is, title, subtitle and facts, is left to who shows it.
+    Title, subtitle and facts are empty: ``conevo.replay.playback`` sets them.
 
     Args:
         parts: of the trajectory.
@@ -198,6 +198,6 @@ def _robots(parts: Parts, castes: list[str]) -> tuple[Robot, ...]:
 
 
 def octants(name: str, first: int, reach: float) -> SensorGroup:
-    """Return eight sensors of an octant each, counter-clockwise from +x; they do not turn."""
+    """Return eight sensors, one per octant, counter-clockwise from +x; they do not turn."""
     angles = tuple((k + 0.5) * math.pi / 4 for k in range(8))
     return SensorGroup(name, first, 8, _COMPASS, angles, half=math.pi / 8, reach=reach)

@@ -1,10 +1,10 @@
-"""What is to be drawn of an epoch: the one description that the viewer and films share.
+"""The playback of an epoch: the description of its drawing that viewer and films share.
 
-A playback knows no world. ``conevo.replay.playback`` makes one of a trajectory; the viewer gets it
-as JSON with the channels next to it, and its types are generated from these classes
-(``viewer/make_playback.py``). Lengths are in the world's unit, angles in rad counter-
-clockwise from +x, y points up, colours are "#rrggbb". Frame t, from 0 to T - 1, is the state after
-iteration t; actions and sensor values of frame t are those of iteration t.
+A playback does not depend on the world. ``conevo.replay.playback`` makes one of a trajectory. The
+viewer gets it as JSON with the channels next to it, and its types are generated from these classes
+(``viewer/make_playback.py``). Lengths are in the world's unit, angles in rad counter-clockwise from
++x, y points up, colours are "#rrggbb". Frame t, from 0 to T - 1, is the state after iteration t;
+actions and sensor values of frame t are those of iteration t.
 """
 
 from __future__ import annotations
@@ -45,11 +45,11 @@ class Kind:
 
 @dataclass(frozen=True)
 class Backdrop:
-    """What stands still.
+    """An area that does not change.
 
     shape "rect": numbers x0, y0, x1, y1. "disc": x, y, radius. "raster": x0, y0, x1, y1, and
-    ``cells`` [rows, columns], drawn where it is not 0; row 0 lies at y0. An empty fill or line is
-    not drawn.
+    ``cells`` [rows, columns], drawn where it is not 0; row 0 is at y0. An empty fill or line is not
+    drawn.
     """
 
     shape: Literal["rect", "disc", "raster"]
@@ -62,9 +62,10 @@ class Backdrop:
 
 @dataclass(frozen=True)
 class BodyKind:
-    """How some bodies look: "robot" bodies have the colour of their action or caste.
+    """The look of some bodies: "robot" bodies have the colour of their action or caste.
 
-    shape: "disc", or "square" for what is not of the team. colour: "" for the team's robots.
+    shape: "disc", or "square" for bodies that are not of the team. colour: "" for the team's
+    robots.
     """
 
     name: str
@@ -77,9 +78,9 @@ class BodyKind:
 class Things:
     """Rocks or objects.
 
-    kinds: of them; kind [K] index of each. x, y: [K], or [T, K] if they can be moved. size: half a
+    kinds: of them; kind [K]: index of each. x, y: [K], or [T, K] if they can be moved. size: half a
     side or the radius. shape: "square" or "disc". gone [K]: iteration in which each was detected or
-    taken away, T if it never was: it fades during ``fade`` frames, to a faint mark. state [T, K]:
+    taken away, T if it never was; it fades during ``fade`` frames, to a faint mark. state [T, K]:
     index into ``states``, names with a colour for the rim ("" for none).
     """
 
@@ -98,10 +99,10 @@ class Things:
 
 @dataclass(frozen=True)
 class Ring:
-    """A range around the team's robots: [A] radius by the action of the moment, 0 for none.
+    """A range around the team's robots: [A] radius by the current action, 0 for none.
 
     when: "action": drawn for all robots, filled faintly in the colour of the action. "selected":
-    an outline around the selected robot; around all if the reader asks for ranges. of "others": the
+    an outline around the selected robot; around all if the reader turns ranges on. of "others": the
     same around the other bodies.
     """
 
@@ -115,10 +116,9 @@ class Ring:
 class SensorGroup:
     """Sensors that belong together: ``count`` of them from number ``first`` on.
 
-    angles [count]: direction that each looks in; relative to the heading if ``turns``. half: half
-    the angle that it sees, reach: how far, from the robot's centre; no angles for what has no
-    direction. A wedge as opaque as the sensor's reading shows them around a selected robot.
-    names [count].
+    angles [count]: direction of each, relative to the heading if ``turns``; empty for sensors
+    without direction. half: half of its angle of view, reach: its range from the robot's centre.
+    Around a selected robot each is a wedge, as opaque as its value. names [count].
     """
 
     name: str
@@ -133,11 +133,11 @@ class SensorGroup:
 
 @dataclass(frozen=True)
 class Robot:
-    """What is said about a robot over the whole epoch.
+    """A robot over the whole epoch.
 
     caste: index into the playback's castes. specialization: S. fitness. heuristic: its heuristic
     controller, "" for its network. neurons: slots in which it has hidden neurons. favourite: the
-    setting that it used most, "" if none is known; share: of it, in all settings that it used.
+    setting that it used most, "" if none is known; share: of it in all settings that it used.
     """
 
     caste: int
@@ -151,7 +151,7 @@ class Robot:
 
 @dataclass(frozen=True)
 class Event:
-    """Something to jump to. kind: index into the playback's event kinds; robots: numbers."""
+    """An event to jump to. kind: index into the playback's event kinds; robots: numbers."""
 
     t: int
     kind: int
@@ -184,7 +184,7 @@ class Gauge:
 
 @dataclass(frozen=True)
 class Curve:
-    """A curve over the timeline: [T], the last value is what the epoch ended with."""
+    """A curve over the timeline: [T], the last value is that at the end of the epoch."""
 
     name: str
     values: Channel
@@ -192,12 +192,12 @@ class Curve:
 
 @dataclass(frozen=True)
 class Playback:
-    """One team in one epoch, ready to be drawn. R robots come first among the B bodies.
+    """One team in one epoch, ready to be drawn. The R robots are the first of the B bodies.
 
     action [T, R]: index into actions, -1 for none. energy [T, R] or None. held [T, R]: number of
     the thing (of the first group) that a robot holds, -1 for none; or None. sensors [T, R, S],
-    hidden [T, R, H], outputs [T, R, O]: activations; None where robots have no networks.
-    output_names [O]. seconds: of an iteration, 0 if the world does not say.
+    hidden [T, R, H], outputs [T, R, O]: activations; None if robots have no networks.
+    output_names [O]. seconds: of an iteration, 0 if it has no duration.
     """
 
     title: str
@@ -234,10 +234,10 @@ class Playback:
 
 
 class Pool:
-    """Channels one after another in one piece of memory, for a page.
+    """Consecutive channels in one piece of memory, for a page.
 
-    Values lie with time running fastest: that of [t, i, j] of a channel [T, I, J] is number
-    t + T * (i + I * j). Every channel begins at a multiple of four bytes; little-endian.
+    Time runs fastest: value [t, i, j] of a channel [T, I, J] is number t + T * (i + I * j). Every
+    channel starts at a multiple of four bytes; little-endian.
     """
 
     def __init__(self) -> None:
@@ -245,7 +245,7 @@ class Pool:
         self._size = 0
 
     def add(self, channel: Channel) -> dict[str, Any]:
-        """Add a channel and return where it lies: at, bytes (each), shape, low, step."""
+        """Add a channel; return its place: at, bytes (each), shape, low, step."""
         codes = channel.codes
         data = codes.astype(codes.dtype.newbyteorder("<")).tobytes(order="F")
         place = {

@@ -1,4 +1,4 @@
-"""Names in a row as people write them."""
+"""Names as text."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""Frames of a film: one or two teams in their worlds, what they do and what they have reached.
+"""Frames of a film: one or two teams in their worlds, with their actions and performance.
 
-Nothing of the machine is needed: the letters are those that Pillow brings along.
+The font is Pillow's own, so frames are the same on every machine.
 """
 
 from __future__ import annotations
@@ -21,16 +21,16 @@ _SIZES = (120, 2160)  # px, of a world's longer side
 class Painter:
     """Paints frames of one team, or of two teams side by side.
 
-    A frame is a function of its number alone: painting others before changes no bit of it.
+    A frame depends on its number alone, bit for bit, whatever was painted before.
 
     Args:
-        playbacks: one or two; an epoch that is shorter than the other stays at its end.
-        size: of the longer side of each world, px; all else follows from it.
+        playbacks: one or two; the shorter epoch stays at its end.
+        size: of the longer side of each world, px; other sizes follow from it.
         colour_by: "action" or "caste".
 
     Attributes:
         size: (width, height) of a frame in px, both even, as video needs.
-        iterations: how many frames there are: the iterations of the longer epoch.
+        iterations: number of frames: the iterations of the longer epoch.
 
     Raises:
         UsageError: no playback or more than two, a size that is out of range, an unknown colouring.

@@ -21,24 +21,24 @@ EVERY_WORLD = ("x", "y", "action", "fitness")  # [T, R], or the robots' come fir
 
 
 def frame_of(trajectory: Trajectory, *arrays: str) -> DataFrame:
-    """Return what every robot did in every iteration, ordered by iteration and robot.
+    """Return a row for every iteration and robot, in this order.
 
     ====================  ==========================================================================
     iteration, robot      from 0
     caste                 of the robot in this epoch
-    x, y, fitness         its place and its fitness so far
-    action                name of the action it executed, missing where there was none
-    sensors.X, outputs.X  what it sensed, and the outputs of its controller, by their names
+    x, y, fitness         its position and its fitness so far
+    action                name of the action it executed, missing if there was none
+    sensors.X, outputs.X  its sensor values, and the outputs of its controller, by their names
     hidden.0 ...          activation of the part in each slot, 0 in an empty one
     performance.X         the team's, as if the epoch ended there: the same for all robots
     ====================  ==========================================================================
 
     Args:
         trajectory: the epoch.
-        arrays: further arrays of the world, whose robots are their second dimension.
+        arrays: further arrays of the world, with robots as their second dimension.
 
     Raises:
-        UsageError: no such array, or one of other things than robots.
+        UsageError: no such array, or one that is not of robots.
         EnvironmentFailure: pandas is not installed.
     """
     about, frames = trajectory.about, pandas()
@@ -75,7 +75,7 @@ def _of_robots(trajectory: Trajectory, name: str) -> npt.NDArray[np.generic]:
     """Return the robots' part [T * R] of an array [T, R] or [T, bodies], the robots first.
 
     Raises:
-        UsageError: no such array, or one of other things than robots.
+        UsageError: no such array, or one that is not of robots.
     """
     channels, robots = trajectory.channels, trajectory.about["n_robots"]
     if name not in channels:

@@ -1,13 +1,12 @@
-"""What notebooks show of a recorded epoch: the replay page in a sandboxed frame."""
+"""A recorded epoch in notebooks: the replay page in a sandboxed frame."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
-from conevo.replay.captions import subtitle, title
 from conevo.replay.page import replay_page
-from conevo.replay.playback import playback_of
+from conevo.replay.playback import playback_of, subtitle, title
 from conevo.runs.html import card, escape
 from conevo.terms import counted
 
@@ -16,12 +15,12 @@ if TYPE_CHECKING:
 
 __all__ = ["MOST_BYTES", "replay_card"]
 
-MOST_BYTES = 8 * 2**20  # of a page, which becomes a part of the notebook's file
+MOST_BYTES = 8 * 2**20  # of a page, which the notebook's file will contain
 HEIGHT = 720  # pixels
 
 
 def replay_card(trajectory: Trajectory) -> str:
-    """Return the replay in a sandboxed frame, or how to see it if the page is too large."""
+    """Return the replay in a sandboxed frame, or a hint if the page is too large."""
     about = trajectory.about
 
     def parts() -> Iterable[str]:

@@ -1,4 +1,4 @@
-"""The replay of one or two teams as one page that needs no network and no server."""
+"""The replay of one or two teams as a single page that needs neither network nor server."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from conevo.playback.schema import Playback, Pool
 
 __all__ = ["replay_page"]
 
-PLACE = "<!-- conevo:data -->"  # in the viewer's page, where the data go
-# Inside a script element nothing may end it: these are written as JSON escapes.
+PLACE = "<!-- conevo:data -->"  # in the viewer's page, replaced by the data
+# Written as JSON escapes, since nothing inside a script element may end it.
 _ESCAPED = {ord(sign): f"\\u{ord(sign):04x}" for sign in "<>&\u2028\u2029"}
 
 
 def replay_page(playbacks: Sequence[Playback]) -> str:
-    """Return the viewer with the data of its teams; the same playbacks always give the same page.
+    """Return the viewer with the data of its teams; equal playbacks give equal pages.
 
     Args:
         playbacks: one team, or two in the same scenario, side by side.

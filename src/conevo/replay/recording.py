@@ -1,4 +1,4 @@
-"""Recording: the team of a run plays one epoch again, with the kernels that it evolved with."""
+"""Recording: one more epoch of a run's team, with the kernels that it evolved with."""
 
 from __future__ import annotations
 
@@ -37,11 +37,11 @@ def record(
 
     Args:
         run: finished or not.
-        generation: whose fittest team; by default the champion.
+        generation: of the fittest team; by default the champion.
         epoch: number of the scenario among those that the run's testing phase draws, from 0.
         threads, device: as for ``Run.resume``; they change no result.
-        like: another run's trajectory of the same task: its scenario is played instead.
-        progress: told the generations done and wanted while the run is evolved again.
+        like: another run's trajectory of the same task, whose scenario is used instead.
+        progress: called with the finished and all generations while the run is evolved again.
 
     Raises:
         UsageError: no generation has finished yet, no such generation, made with other kernels, or
@@ -103,10 +103,10 @@ def record_epoch(
         genes: pool of genotypes [K, G].
         team: pool rows [R, U], -1 for an empty slot.
         scenario: its key.
-        heuristic: [R] index of a heuristic controller, -1 for the network; None for networks.
+        heuristic: [R] index of a heuristic controller, -1 for the network; None for networks only.
 
     Returns:
-        What is known of it, of no run; and the channels.
+        Its description, without a run; and the channels.
     """
     world = simulator.world
     modes = np.full(world.n_robots, -1, np.int32) if heuristic is None else heuristic

@@ -8,19 +8,19 @@
     kept = about["channels"]["x"]
     x = kept["low"] + kept["step"] * file["x"]          # [T, bodies]
 
-The values of a whole number's channel are exact; others have 16 bits between their least and their
-largest value, activations of neurons 8. Row t is the state after iteration t; actions, sensors and
-activations of row t are those of iteration t.
+Whole numbers are exact; other values have 16 bits between the least and the largest, activations of
+neurons 8. Row t is the state after iteration t; actions, sensors and activations of row t are those
+of iteration t.
 
 =====================  =============================================================================
-channel                what
+channel                contents
 =====================  =============================================================================
 the world's own        every array of its ``Simulation.recorded`` [T, ...] and ``recorded_at_end``
 ``performance/NAME``   [T] each task performance measure as if the epoch ended there
-``sensors``            [T, R, S] what every robot sensed
+``sensors``            [T, R, S] sensor values of every robot
 ``hidden``             [T, R, U] activation of the part in each slot, 0 in an empty one
-``outputs``            [T, R, O] activations of the output units, of which the highest wins
-``scene/NAME``         the scenario: where everything stood
+``outputs``            [T, R, O] activations of the output units; the highest wins
+``scene/NAME``         the scenario: initial positions and the like
 =====================  =============================================================================
 """
 
@@ -48,26 +48,26 @@ if TYPE_CHECKING:
 __all__ = ["FORMAT", "Trajectory"]
 
 FORMAT = 1
-MOST_BYTES = 2**30  # of a file when it is unpacked: what a small file can ask for is limited
+MOST_BYTES = 2**30  # of an unpacked file: limits the memory that a small file can take
 
 
 @dataclass(frozen=True, repr=False)
 class Trajectory:
-    """What one team did in one epoch.
+    """A recorded epoch of one team.
 
     Attributes:
-        about: what it is of.
-        channels: what was recorded, by name.
+        about: its description.
+        channels: the recorded arrays, by name.
     """
 
     about: About
     channels: dict[str, Channel]
 
     def to_bytes(self) -> bytes:
-        """Return the file: the same trajectory always gives the same bytes."""
+        """Return the file; equal trajectories give equal bytes."""
         kept = {name: {"low": c.low, "step": c.step} for name, c in self.channels.items()}
         about = json.dumps(self.about | {"channels": kept}, allow_nan=False)
-        # Time lies closest together: neighbours in time are alike, so the file becomes smaller.
+        # Time runs fastest: values of neighbouring iterations are similar and compress better.
         arrays = {name: np.asarray(c.codes, order="F") for name, c in self.channels.items()}
         text = np.frombuffer(about.encode(), dtype=np.uint8)
         buffer = io.BytesIO()
@@ -81,7 +81,7 @@ class Trajectory:
             arrays: further arrays of the world over robots, such as "energy".
 
         Raises:
-            UsageError: no such array, or one of other things than robots.
+            UsageError: no such array, or one that is not of robots.
             EnvironmentFailure: pandas is not installed.
         """
         from conevo.replay.frame import frame_of
@@ -90,8 +90,8 @@ class Trajectory:
 
     def __repr__(self) -> str:
         about = self.about
-        what = f"{about['task']}, generation {about['generation']}, epoch {about['epoch']}"
-        return f"Trajectory({what!r})"
+        text = f"{about['task']}, generation {about['generation']}, epoch {about['epoch']}"
+        return f"Trajectory({text!r})"
 
     def _repr_html_(self) -> str:
         from conevo.replay.html import replay_card
@@ -102,14 +102,14 @@ class Trajectory:
         """Write the file, all at once.
 
         Raises:
-            UsageError: there is another file already.
+            UsageError: ``path`` exists.
             EnvironmentFailure: it cannot be written.
         """
         write_new({path: self.to_bytes()})
 
     @staticmethod
     def load(path: Path) -> Trajectory:
-        """Return the trajectory in a file. What comes from a file is looked at here, and only here.
+        """Return the trajectory in a file, which is checked here, and only here.
 
         Raises:
             UsageError: it is damaged, or not a trajectory.
@@ -119,7 +119,7 @@ class Trajectory:
 
     @staticmethod
     def of_arrays(arrays: dict[str, npt.NDArray[Any]], path: Path) -> Trajectory:
-        """Return the trajectory that the arrays of a file are, its words among them.
+        """Return the trajectory of a file's arrays; ``about`` is one of them.
 
         Raises:
             UsageError: it is damaged, or not a trajectory.
@@ -131,10 +131,10 @@ class Trajectory:
                 raise ValueError(f"its format is {version!r}, not {FORMAT}")
             kept = about.pop("channels")
             if set(kept) != set(arrays):
-                raise ValueError("it has other channels than it says")
+                raise ValueError("it has other channels than it lists")
             channels = {name: channel_of(name, arrays[name], kept[name]) for name in arrays}
             return Trajectory(validated(about), channels)
-        except Exception as error:  # whatever a damaged or hostile file makes its readers say
+        except Exception as error:  # a damaged or hostile file can cause any
             raise UsageError(f"{path} is damaged or not a trajectory ({_reason(error)})") from error
 
 

@@ -1,4 +1,4 @@
-"""What a recording in a file must be: looked at once, by ``Trajectory.load``."""
+"""Checks of a recording in a file, made once, by ``Trajectory.load``."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ _CODES = {np.dtype(kind) for kind in (np.uint8, np.uint16, np.uint32)}
 
 
 def channel_of(name: str, codes: Any, kept: Any) -> Channel:
-    """Return a channel of what a file has of it.
+    """Return a channel from its codes, and the numbers that a file has for it.
 
     Raises:
-        ValueError, TypeError, KeyError: its numbers cannot be.
+        ValueError, TypeError, KeyError: the numbers are not possible.
     """
     if codes.dtype not in _CODES:
         raise ValueError(f"{name} has codes of type {codes.dtype}")
@@ -42,11 +42,11 @@ def channel_of(name: str, codes: Any, kept: Any) -> Channel:
 
 
 def validated(about: Any) -> About:
-    """Return what a file says that it is of.
+    """Return the description in a file.
 
     Raises:
         ValueError: it has other fields or kinds of values, texts that cannot be shown, or numbers
-            that do not go together.
+            that contradict each other.
     """
     checked: About = _checker().validate_python(about, strict=True)
     _check_texts(checked)
@@ -67,7 +67,7 @@ def validated(about: Any) -> About:
 
 
 def _check_texts(thing: Any) -> None:
-    """Raise ValueError if a text anywhere in a thing cannot be shown."""
+    """Raise ValueError if a text anywhere in a description cannot be shown."""
     if isinstance(thing, str):
         if not (len(thing) <= MOST_CHARACTERS and thing.isprintable()):
             raise ValueError(f"the text {thing[:40]!r} cannot be shown")

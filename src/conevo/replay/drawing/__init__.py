@@ -1,1 +1,1 @@
-"""What a film's frame is painted with: planes and masks, the world, the timeline, the letters."""
+"""Parts of a film's frame: masks, the world, the timeline, the panel of a team."""

@@ -14,13 +14,13 @@ __all__ = ["Mask"]
 
 
 class Mask:
-    """How opaque a colour lies where, on a part of a picture; places are the picture's, in px.
+    """Opacity of a colour on a part of a picture. Coordinates are the picture's, in px.
 
-    What is drawn later replaces what was there, so a disc of opacity 0 is a hole.
+    A later shape replaces earlier ones below it, so a disc of opacity 0 is a hole.
 
     Args:
         image: the picture, in mode "RGB".
-        box: what is drawn lies between these places x0, y0 and x1, y1.
+        box: corners x0, y0, x1, y1 around all shapes.
     """
 
     def __init__(self, image: Image.Image, box: Iterable[float]) -> None:
@@ -41,7 +41,7 @@ class Mask:
         return self
 
     def square(self, x: float, y: float, half: float, opacity: float = 1.0) -> Mask:
-        """Draw an upright square, half a side given."""
+        """Draw an upright square; ``half`` is half its side."""
         self._draw.rectangle(self._corners(x, y, half), fill=round(255 * opacity))
         return self
 
@@ -67,7 +67,7 @@ class Mask:
         return places
 
     def _corners(self, x: float, y: float, size: float) -> tuple[Any, ...]:
-        # Whole numbers: what is cut off at the left does not move the rest.
+        # Whole numbers: a part cut off at the left does not move the rest.
         times, (left, top) = self._times, self._box[:2]
         x, y = round(x * times) - left * times, round(y * times) - top * times
         reach = size * times
@@ -75,6 +75,6 @@ class Mask:
 
 
 def _cut(low: float, high: float, n: int) -> tuple[int, int]:
-    """Return the pixels from low to high and one around them, of n, at least one of these."""
+    """Return the range of pixels from low to high, with a margin of one: at least one of n."""
     first = min(max(math.floor(low) - 1, 0), n - 1)
     return first, max(min(math.ceil(high) + 1, n), first + 1)

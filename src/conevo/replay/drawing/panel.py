@@ -1,4 +1,4 @@
-"""One team in a film: a head, its world, what is said beside or below it, and the timeline."""
+"""One team in a film: titles, its world, texts next to or below it, and the timeline."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ Text = str | Callable[[int], str]  # of frame t, if it changes
 Key = tuple[str, str, str, str]  # of a legend: name, fill, "disc", "square" or "kite", line
 
 PAGE = "#ffffff"
-_SOFT, _EMPTY = "#62626c", "#ececea"  # text of less weight, a gauge
-_SIDE = 224  # px beside a world of 720, for what is said about it
+_SOFT, _EMPTY = "#62626c", "#ececea"  # minor text, a gauge
+_SIDE = 224  # px, width of the texts next to a world of 720
 
 
 class Panel:
@@ -34,10 +34,10 @@ class Panel:
         playback: to be painted.
         size: of the longer side of the world, px.
         colour_by: "action" or "caste".
-        alone: what is said stands beside the world, else below it.
+        alone: whether texts are next to the world, else below it.
 
     Attributes:
-        background: what is the same in all frames.
+        background: the part that is the same in all frames.
         world: corners x0, y0, x1, y1 of the world in px.
         timeline: below the world.
         timeline_at: its upper left corner.
@@ -72,14 +72,14 @@ class Panel:
         self.background = sheet.crop((0, 0, sheet.width, below))
 
     def paint(self, page: Image.Image, x: int, t: int) -> None:
-        """Paint the panel as it is in frame t, its left side at x of the page."""
+        """Paint the panel in frame t, with its left side at x of the page."""
         page.paste(self.background, (x, 0))
         page.paste(self._scene.at(t), (x + self.world[0], self.world[1]))
         for change in self._changes:
             change(page, x, t)
         self.timeline.paint(page, x + self.timeline_at[0], self.timeline_at[1], t)
 
-    # --- what is said: each returns where it ends -------------------------------------------------
+    # --- texts: each method returns its lower end -------------------------------------------------
 
     def _say(self, x: int, y: int, width: int) -> int:
         playback = self.playback
@@ -121,7 +121,7 @@ class Panel:
     def _say_robots(
         self, title: str, kinds: Sequence[Kind], counts: Sequence[Text], x: int, y: int, width: int
     ) -> int:
-        """Name kinds of robots, each with a number."""
+        """Write the names of kinds of robots, each with a number."""
         self._write(x, y, title, "small", _SOFT, width)
         y += self._line("small")
         places, bottom = self._cells(x, y, width, len(kinds), 160, self._line("text"))
@@ -133,7 +133,7 @@ class Panel:
         return bottom + self._gap // 2
 
     def _say_keys(self, x: int, y: int, width: int) -> int:
-        """Name what else is to be seen."""
+        """Write the names of other marks in the world."""
         keys = list(_keys(self.playback))
         places, bottom = self._cells(x, y, width, len(keys), 160, self._line("text"))
         for key, (left, top, room) in zip(keys, places, strict=True):
@@ -141,7 +141,7 @@ class Panel:
         return bottom + self._gap // 2
 
     def _say_plan(self, row: PlanRow, x: int, y: int, width: int) -> int:
-        """Show a complex object: pale parts are still to be built."""
+        """Draw a complex object; parts that are not built yet are pale."""
         order = "in this order" if row.is_ordered else "in any order"
         self._write(x, y, f"{row.name}, {order}", "small", _SOFT, width)
         y += self._line("small")
@@ -169,7 +169,7 @@ class Panel:
     def _cells(
         self, x: int, y: int, width: int, count: int, least: int, height: int
     ) -> tuple[list[tuple[int, int, int]], int]:
-        """Return places (x, y, room) for things of one size, row by row, and where they end."""
+        """Return positions (x, y, width) for items of one size, row by row, and their lower end."""
         n = max(min(width // round(least * self._points["text"] / 14), count), 1)
         room = width // n
         places = [(x + k % n * room, y + k // n * height, room - 6) for k in range(count)]
@@ -199,7 +199,7 @@ class Panel:
         colour: str,
         share: Callable[[int], float],
     ) -> None:
-        """Draw a box x, y, width, height whose left share is filled, as large as in frame t."""
+        """Draw a box x, y, width, height; its left part is filled by the share of frame t."""
         x, y, width, height = box
         self._draw.rectangle((x, y, x + width - 1, y + height - 1), fill=empty, outline=line)
 
@@ -210,7 +210,7 @@ class Panel:
         self._changes.append(change)
 
     def _write(self, x: int, y: int, text: Text, letters: str, colour: str, room: int) -> None:
-        """Write a text, cut to the room that there is; one that depends on t as it changes."""
+        """Write a text, cut to a width in px; one that depends on t is written in each frame."""
         font = _font(self._points[letters])
         if isinstance(text, str):
             self._draw.text((x, y), _fitted(text, self._points[letters], room), colour, font)
@@ -227,7 +227,7 @@ class Panel:
 
 
 def _keys(playback: Playback) -> Iterator[Key]:
-    """Yield what a legend names besides actions and castes."""
+    """Yield the entries of the legend in addition to actions and castes."""
     for n, body in enumerate(playback.body_kinds):
         if body.shape == "square" and n in playback.body:
             yield body.name, body.colour or INK, "kite", ""
@@ -244,7 +244,7 @@ def _keys(playback: Playback) -> Iterator[Key]:
 
 
 def _number(values: npt.NDArray[Any], digits: int = 0) -> Callable[[int], str]:
-    """Return the number of frame t as text, of numbers [T]."""
+    """Return the function that gives the number of frame t, of numbers [T], as text."""
     return lambda t: f"{values[t]:,.{digits}f}"
 
 
@@ -254,7 +254,7 @@ def _font(points: int) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
 
 
 def _fitted(text: str, points: int, room: int) -> str:
-    """Return a text without what cannot be printed, cut to the room in px."""
+    """Return a text without unprintable characters, cut to a width in px."""
     font = _font(points)
     text = "".join(letter if letter.isprintable() else " " for letter in text[:300])
     shown, end = text, ""

@@ -1,4 +1,4 @@
-"""The world of a playback as films show it, frame by frame."""
+"""The world of a playback in films, frame by frame."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ Floats = npt.NDArray[np.float64]
 class Scene:
     """Paints the world of a playback.
 
-    Order: backdrop, what stands still, trails, what moves, ranges, bodies, what robots hold.
+    Order: backdrop, still things, trails, moving things, ranges, bodies, things that robots hold.
 
     Args:
         playback: to be painted.
-        size: width and height of the picture in px; they follow from the playback's bounds.
+        size: width and height of the picture in px, in the proportion of the playback's bounds.
         colour_by: "action" or "caste".
     """
 
@@ -49,7 +49,7 @@ class Scene:
         self._still = next((group for group in self._groups if group.is_still), None)
         self._floor = self._painted_floor()
         self._ground = self._floor.copy()
-        self._phase: npt.NDArray[np.int64] | None = None  # of what stands still on the ground
+        self._phase: npt.NDArray[np.int64] | None = None  # of the still things on the ground
 
     def at(self, t: int) -> Image.Image:
         """Return the world after iteration t."""
@@ -74,17 +74,17 @@ class Scene:
         return [*own, *(kind.colour or INK for kind in kinds)]
 
     def _pixels(self, x: Floats, y: Floats) -> Floats:
-        """Return places in px [..., 2] from the upper left corner, at most a world outside."""
+        """Return positions in px [..., 2] from the upper left corner, at most a world outside."""
         left, top = self.playback.bounds[0], self.playback.bounds[3]
         places = np.stack([(x - left) * self._scale, (top - y) * self._scale], axis=-1)
         return places.clip(-max(self._size), 2 * max(self._size))
 
     def _length(self, length: float) -> float:
-        """Return a length in px; more than the world is as good as the world."""
+        """Return a length in px, at most the longer side of the world."""
         return min(length * self._scale, float(max(self._size)))
 
     def _painted_floor(self) -> Image.Image:
-        """Return what never changes."""
+        """Return the backdrop, which never changes."""
         sharper = 4 if max(self._size) <= 1080 else 2  # drawn larger, then reduced
         image = Image.new("RGB", (self._size[0] * sharper, self._size[1] * sharper), GROUND)
         draw = ImageDraw.Draw(image)
@@ -110,9 +110,9 @@ class Scene:
         return image.reduce(sharper)
 
     def _ground_at(self, t: int) -> Image.Image:
-        """Return the floor with what stands still on it; only what has changed is painted again.
+        """Return the floor with the still things on it; only changed parts are painted again.
 
-        A pixel is the floor and the things over it in order of number, whatever was painted before.
+        A pixel is the floor and the things over it by number, whatever was painted before.
         """
         if self._still is None:
             return self._floor.copy()
@@ -129,7 +129,7 @@ class Scene:
         return self._ground.copy()
 
     def _paint_trails(self, image: Image.Image, colours: list[str], t: int) -> None:
-        """Paint where bodies have been lately, fainter the longer ago."""
+        """Paint the recent paths of bodies, older parts fainter."""
         first, long = max(t - look.TRAIL, 0), look.TRAIL // look.TRAIL_PIECES
         for b, colour in enumerate(colours):
             jumps = self._jumps[b]
@@ -138,7 +138,7 @@ class Scene:
                 path = self._places[begin:end, b]
                 low, high = path.min(axis=0), path.max(axis=0)
                 if (high - low).max() < 0.5:
-                    continue  # it stands still
+                    continue  # it does not move
                 mask = Mask(image, (*low, *high))
                 for k in reversed(range(look.TRAIL_PIECES)):
                     some = slice(
@@ -181,7 +181,7 @@ class Scene:
             rim.paint(INK)
 
     def _paint_held(self, image: Image.Image, t: int) -> None:
-        """Paint what robots hold above them, with a line to it if it is elsewhere."""
+        """Paint things that robots hold over them, with a line to a thing that is elsewhere."""
         if self._held is None or not self._groups:
             return
         group, held = self._groups[0], self._held[t].tolist()
@@ -199,7 +199,7 @@ def _around(x: float, y: float, reach: float) -> tuple[float, float, float, floa
 
 
 def _kite(x: float, y: float, radius: float, angle: float) -> list[tuple[float, float]]:
-    """Return the corners of what is not of the team: it points ahead and looks like no robot."""
+    """Return the corners of a body that is not of the team: it points ahead, unlike a robot."""
     reaches = (look.KITE_TIP, *(look.KITE_SIDE,) * 3)
     turns = (angle + k * math.pi / 2 for k in range(4))
     return [

@@ -1,4 +1,4 @@
-"""Rocks and objects in a film: as they are, fading when they have gone, faint ever after."""
+"""Rocks and objects in a film: they fade when they have gone, and leave a faint mark."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ class Heap:
 
     Args:
         things: to be painted.
-        places: [K, 2], or [T, K, 2] of what can be moved, px.
+        places: [K, 2], or [T, K, 2] if they can be moved, px.
         size: radius or half a side, px.
 
     Attributes:
-        is_still: whether they change only by going.
-        boxes: [K, 4] corners of what each covers, px.
+        is_still: whether they change only when they go.
+        boxes: [K, 4] corners of the area that each covers, px.
     """
 
     def __init__(self, things: Things, places: npt.NDArray[np.float64], size: float) -> None:
@@ -40,18 +40,18 @@ class Heap:
         self.boxes = np.concatenate(corners, axis=-1).round().astype(int).clip(min=0)
 
     def place(self, t: int, k: int) -> npt.NDArray[np.float64]:
-        """Return where thing k is, x and y."""
+        """Return the position x, y of thing k."""
         found: npt.NDArray[np.float64] = self._places[k if self._places.ndim == 2 else (t, k)]
         return found
 
     def phase(self, t: int) -> npt.NDArray[np.int64]:
-        """Return whether things [K] are there, fade away or have left a faint mark."""
+        """Return the phase [K] of things: present, fading, or a faint mark."""
         return np.searchsorted([0, self._things.fade], t - self._gone, side="right")
 
     def paint_within(
         self, piece: Image.Image, x: int, y: int, phase: npt.NDArray[np.int64]
     ) -> None:
-        """Paint what does not fade on a piece of a picture whose upper left corner is x, y."""
+        """Paint things that do not fade on a piece of a picture with upper left corner x, y."""
         low, high = self.boxes[:, :2], self.boxes[:, 2:]
         corner = np.array([x, y])
         is_near = ((low < corner + piece.size) & (high > corner)).all(axis=1)
@@ -60,13 +60,13 @@ class Heap:
             self._mask(piece, self._places[k] - corner, self._size, opacity).paint(self._colours[k])
 
     def paint_all(self, image: Image.Image, t: int, only_fading: bool) -> None:
-        """Paint all things, or those that fade if the others are there already."""
+        """Paint all things, or only fading ones if the others are painted already."""
         phase = self.phase(t)
         for k in np.flatnonzero(phase == FADING) if only_fading else range(len(phase)):
             self.paint(image, t, int(k))
 
     def paint(self, image: Image.Image, t: int, k: int) -> None:
-        """Paint thing k, as faint as it is."""
+        """Paint thing k with its opacity in frame t."""
         age, place, colour = t - int(self._gone[k]), self.place(t, k), self._colours[k]
         if self._state is not None and age < 0:
             rim = self._things.states[int(self._state[t, k])].colour

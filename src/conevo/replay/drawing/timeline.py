@@ -13,22 +13,22 @@ __all__ = ["Timeline"]
 
 _CURVE, _EVENTS, _MARK = 40, 8, 12  # px: height, height, width of the caste's mark and the gap
 _LINE, _UNDER = "#55555f", "#e6e3da"
-_TO_COME = 0.72  # how much paler the future is
+_TO_COME = 0.72  # share of white in the future
 _SHARPER = 4
 
 
 class Timeline:
-    """A strip with a playhead; what is to come is pale.
+    """A strip with a playhead; the future is pale.
 
-    A robot has a row; rows lie by caste, whose colour stands at their left end. Time runs from top
-    to bottom within a column of a row, then on to the next column: where a row is as high as there
-    are iterations to a column, each of them has a pixel, so what looks solid is a robot that keeps
-    to its action and what looks like noise is one that switches.
+    Each robot has a row. Rows are sorted by caste, with its colour at their left end. Time runs
+    from top to bottom within a column of a row, then on to the next column. If a row is high enough
+    for the iterations of a column, each has a pixel. Then a solid area is a robot that keeps to its
+    action, and noise is one that switches.
 
     Args:
-        playback: whose.
+        playback: to be painted.
         width: px.
-        size: of the world, px: the strip's height goes with it.
+        size: of the world, px; the strip's height depends on it.
 
     Attributes:
         height: px.
@@ -49,11 +49,11 @@ class Timeline:
         self._pale.paste(self._past.crop((0, top, _MARK, self.height)), (0, top))
 
     def head(self, t: int) -> int:
-        """Return the place of the playhead in frame t, px from the strip's left end."""
+        """Return the position of the playhead in frame t, px from the strip's left end."""
         return _MARK + int((t + 1) / self._playback.iterations * (self._width - _MARK - 2))
 
     def paint(self, page: Image.Image, x: int, y: int, t: int) -> None:
-        """Paint the strip as it is in frame t, its upper left corner given."""
+        """Paint the strip in frame t, with its upper left corner at x, y."""
         head = self.head(t)
         page.paste(self._pale, (x, y))
         page.paste(self._past.crop((0, 0, head, self.height)), (x, y))
