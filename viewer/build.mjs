@@ -1,11 +1,11 @@
-// Make one self-contained HTML file of each page, where the package has it: PAGE/PAGE.html.
+// Build each page into one self-contained HTML file in the package: PAGE/PAGE.html.
 //
 // A page is a folder with page.html and main.ts. Style (what main.ts imports ending in .css) and
 // script are put where page.html says <!-- conevo:style --> and <!-- conevo:script -->. Its content
-// security policy names the script by its hash, so nothing else that could get into a page runs.
+// security policy names the script by its hash, so no other script in a page can run.
 //
-// With --check nothing is written: it fails if they differ from what a build gives. The package's
-// folder may be named.
+// With --check nothing is written: it fails if the files differ from those of a build. The package's
+// folder may be given.
 
 import { createHash } from "node:crypto";
 import { existsSync, readFileSync, writeFileSync } from "node:fs";
@@ -51,7 +51,7 @@ async function assemble(page) {
   });
   const output = (ending) =>
     bundle.outputFiles.find((file) => file.path.endsWith(ending))?.text.trim() ?? "";
-  // What ends a script or a style for the HTML parser must not stand in one.
+  // A script or a style must not contain the text that ends it for the HTML parser.
   const script = (licences(bundle.metafile) + output(".js")).replace(
     /<(?=\/script|!--)/gi,
     "\\x3c",

@@ -1,4 +1,4 @@
-// Robots and what else moves by itself: trails, bodies, what they hold, which one is selected.
+// Robots and other moving bodies: trails, bodies, things they hold, the selected one.
 
 import { colourOf } from "./paint";
 import {
@@ -23,7 +23,7 @@ export function radiusOf(playback: Playback, view: View, body: number): number {
   return Math.max(playback.body_kinds[playback.body[body]!]!.radius * view.scale, LEAST_BODY);
 }
 
-/** Draw where the robots were in the iterations before. */
+/** Draw where the robots were in previous iterations. */
 export function drawTrails(pen: Pen, playback: Playback, view: View, state: State): void {
   const { t, colourBy } = state;
   const [x0, y0, x1, y1] = playback.bounds;
@@ -46,7 +46,7 @@ export function drawTrails(pen: Pen, playback: Playback, view: View, state: Stat
         let last = [Infinity, Infinity] as const;
         for (let s = from; s <= to; s++) {
           const [x, y] = [playback.x.at(s, robot), playback.y.at(s, robot)];
-          // Who leaves a world on one side and enters on the other draws no line across it.
+          // A body that leaves a world on one side and enters on the other draws no line across it.
           const isFar = Math.abs(x - last[0]) > JUMP * (x1 - x0);
           if (isFar || Math.abs(y - last[1]) > JUMP * (y1 - y0)) pen.moveTo(view.x(x), view.y(y));
           else pen.lineTo(view.x(x), view.y(y));
@@ -59,7 +59,7 @@ export function drawTrails(pen: Pen, playback: Playback, view: View, state: Stat
   pen.globalAlpha = 1;
 }
 
-/** Draw all bodies, robots last: they are what is looked at. */
+/** Draw all bodies, robots last, above the others. */
 export function drawBodies(pen: Pen, playback: Playback, view: View, state: State): void {
   for (let body = playback.body.length - 1; body >= 0; body--) {
     const { t } = state;
@@ -92,7 +92,7 @@ export function drawBodies(pen: Pen, playback: Playback, view: View, state: Stat
   }
 }
 
-/** Draw a line from each robot to what it holds. */
+/** Draw a line from each robot to the thing that it holds. */
 export function drawHeld(
   pen: Pen,
   playback: Playback,

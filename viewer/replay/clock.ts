@@ -1,4 +1,4 @@
-// Playing: time goes on by elapsed time x speed, one drawing per animation frame.
+// Playing: time advances by elapsed time x speed, one drawing per animation frame.
 
 import type { Store } from "./state";
 
@@ -23,7 +23,7 @@ export class Clock {
     this.store.set(playing ? { playing: false } : { playing: true, t: isOver ? 0 : t });
   }
 
-  /** Return how many frames were drawn while playing since the last call, and in how long. */
+  /** Return the number of frames drawn while playing since the last call, and the time taken. */
   frames(): { count: number; seconds: number } {
     const drawn = { ...this.drawn };
     this.drawn.count = this.drawn.seconds = 0;

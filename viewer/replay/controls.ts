@@ -1,4 +1,4 @@
-// Buttons, sliders and the legend: everything of the reader's choice.
+// Buttons, sliders and the legend.
 
 import { find, make, named, say, swatch } from "../shared/dom";
 import type { Clock } from "./clock";

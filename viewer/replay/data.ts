@@ -1,4 +1,4 @@
-// Numbers of a trajectory as they are kept: small codes, each standing for a value.
+// The stored numbers of a trajectory: small codes, each for a value.
 
 import type { Playback } from "./playback";
 
@@ -13,7 +13,7 @@ export class Channel {
     readonly step: number,
   ) {}
 
-  /** Return the value at [first, i, j], as many as the channel has axes. */
+  /** Return the value at [first, i, j], an index for each axis of the channel. */
   at(first: number, i = 0, j = 0): number {
     const [n = 1, m = 1] = this.shape;
     return this.low + this.step * this.codes[first + n * (i + m * j)]!;
@@ -36,7 +36,7 @@ export class Channel {
   }
 }
 
-/** A channel as JSON has it: where its codes lie in the page's memory. */
+/** A channel in JSON: the place of its codes in the page's memory. */
 interface Place {
   readonly at: number;
   readonly bytes: 1 | 2 | 4;
@@ -45,7 +45,7 @@ interface Place {
   readonly step: number;
 }
 
-/** Return what a page's JSON says is drawn of its teams, with the channels in its memory. */
+/** Return the playbacks of a page's teams from its JSON, with the channels in its memory. */
 export function readPlaybacks(json: string, memory: ArrayBuffer): Playback[] {
   const kinds = { 1: Uint8Array, 2: Uint16Array, 4: Uint32Array };
   const revive = (_: string, value: unknown) => {
@@ -57,7 +57,7 @@ export function readPlaybacks(json: string, memory: ArrayBuffer): Playback[] {
   return JSON.parse(json, revive).teams;
 }
 
-/** Return the memory of a page's text: base64 of zlib-compressed bytes. */
+/** Return the memory from a page's text: base64 of zlib-compressed bytes. */
 export async function inflate(base64: string): Promise<ArrayBuffer> {
   const bytes = Uint8Array.from(atob(base64), (sign) => sign.charCodeAt(0));
   const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));

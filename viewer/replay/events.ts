@@ -1,4 +1,4 @@
-// What happened, as a list: the kinds that are looked for, and a click jumps there.
+// A list of events: filtered by kind, and a click jumps to one.
 
 import { make, named, say, swatch } from "../shared/dom";
 import { INK, type Event, type Playback } from "./playback";
@@ -11,7 +11,7 @@ export class Events {
   readonly element: HTMLElement;
   private readonly list: HTMLElement;
   private readonly note = make("p", { class: "note", role: "status" });
-  /** Numbers of all events, the first to happen first. */
+  /** Numbers of all events in order of time. */
   private readonly sorted: number[];
   private readonly hidden = new Set<number>();
   private shown: { t: number; button: HTMLElement }[] = [];
@@ -25,7 +25,7 @@ export class Events {
     this.sorted = playback.events.map((_, k) => k);
     this.sorted.sort((a, b) => playback.events[a]!.t - playback.events[b]!.t || a - b);
     this.list = make("div", { id: `events-${team}`, class: "events", role: "group" });
-    this.list.setAttribute("aria-label", "events, the first to happen first");
+    this.list.setAttribute("aria-label", "events in order of time");
     this.element = make("section", { class: "card of-events" }, make("h3", {}, "Events"));
     const filters = make("div", { class: "filters" });
     playback.event_kinds.forEach((_, kind) => filters.append(this.filter(kind)));
@@ -34,7 +34,7 @@ export class Events {
     store.listen(({ t, playing }) => this.follow(t, playing));
   }
 
-  /** Return the iterations at which something happened that is not filtered out, in order. */
+  /** Return the iterations of the listed events, in order. */
   get times(): number[] {
     return this.sorted
       .map((k) => this.playback.events[k]!)
@@ -66,7 +66,7 @@ export class Events {
     });
     this.list.replaceChildren(...this.shown.map(({ button }) => button));
     const all = this.playback.events.length;
-    if (!all) say(this.note, "Nothing happened in this epoch that would be listed.");
+    if (!all) say(this.note, "This epoch has no events.");
     else if (wanted.length > MOST) say(this.note, `The first ${MOST} of ${wanted.length}.`);
     else say(this.note, wanted.length < all ? `${wanted.length} of ${all}.` : "");
     this.current = null;
@@ -90,7 +90,7 @@ export class Events {
     return button;
   }
 
-  /** Mark what happened last; while playing it is kept in sight. */
+  /** Mark the last event; while playing it is kept in sight. */
   private follow(t: number, playing: boolean): void {
     let [low, high] = [0, this.shown.length];
     while (low < high) {
@@ -103,7 +103,7 @@ export class Events {
     this.current?.removeAttribute("aria-current");
     current?.setAttribute("aria-current", "true");
     this.current = current;
-    // Who is at work in the list does not want it to move.
+    // The list must not move while the reader uses it.
     if (!current || !playing || this.list.matches(":hover, :focus-within")) return;
     this.list.scrollTop = current.offsetTop - this.list.clientHeight / 2;
   }

@@ -1,11 +1,11 @@
-// What stands still: the floor, areas, canals and walls.
+// The ground, which does not change: the floor, areas, canals and walls.
 
 import { FAINT, GROUND, INK, type Backdrop, type Playback } from "./playback";
 import type { View } from "./view";
 
 type Pen = CanvasRenderingContext2D;
 
-/** Draw the floor and all that stands on it for good. */
+/** Draw the floor and the areas on it. */
 export function drawGround(pen: Pen, playback: Playback, view: View): void {
   const [x0, y0, x1, y1] = playback.bounds;
   pen.fillStyle = GROUND;

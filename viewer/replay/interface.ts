@@ -1,4 +1,4 @@
-// What tests, and readers at the console, can ask of the page: window.conevo.
+// Functions for tests, and for readers at the console: window.conevo.
 
 import type { Clock } from "./clock";
 import { colourOf } from "./paint";
@@ -7,14 +7,14 @@ import type { Team } from "./team";
 
 /** Return the functions of window.conevo; ``ready`` is kept when the page is drawn. */
 export function makeInterface(store: Store, clock: Clock, teams: readonly Team[]) {
-  // Drawing only notes what is to be painted; who reads a pixel waits until it is.
+  // Drawing is deferred: read a pixel only after it is done.
   const probe = new OffscreenCanvas(1, 1).getContext("2d", { willReadFrequently: true })!;
   const settle = () => {
     for (const { world } of teams) probe.drawImage(world.canvas, 0, 0);
     probe.getImageData(0, 0, 1, 1);
   };
   return {
-    /** Return what is shown. */
+    /** Return the state of the page. */
     state(): State & { teams: number } {
       return { ...store.now, teams: teams.length };
     },
@@ -46,7 +46,7 @@ export function makeInterface(store: Store, clock: Clock, teams: readonly Team[]
     colour(team: number, body: number): string {
       return colourOf(store.playbacks[team]!, body, store.now.t, store.now.colourBy);
     },
-    /** Return how many frames were drawn while playing since the last call, and in how long. */
+    /** Return the number of frames drawn while playing since the last call, and the time taken. */
     frames(): { count: number; seconds: number } {
       return clock.frames();
     },

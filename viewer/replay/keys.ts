@@ -7,20 +7,20 @@ import { zoom } from "./zoom";
 
 const HELP: [string, string][] = [
   ["Space", "play, pause"],
-  ["← →", "one iteration back, on; ten with Shift"],
-  ["Home End", "the first, the last iteration"],
-  [", .", "the event before, the next event"],
+  ["← →", "one iteration back, forward; ten with Shift"],
+  ["Home End", "first, last iteration"],
+  [", .", "previous, next event"],
   ["− +", "slower, faster"],
-  ["↑ ↓", "the robot before, the next robot"],
+  ["↑ ↓", "previous, next robot"],
   ["Esc", "no robot"],
   ["c", "colours by action or by caste"],
   ["t", "trails"],
   ["r", "ranges of all robots"],
-  ["z Z 0", "nearer, farther, the whole world; as the mouse wheel"],
+  ["z Z 0", "zoom in, zoom out, whole world; the mouse wheel zooms, too"],
   ["?", "this list"],
 ];
 
-/** Listen to keys. ``times`` are the iterations of the events that are looked at, in order. */
+/** Listen to keys. ``times`` are the iterations of the listed events, in order. */
 export function listenToKeys(store: Store, clock: Clock, times: () => number[]): void {
   const help = find("help", HTMLDialogElement);
   find("keys", HTMLElement).append(
@@ -44,7 +44,7 @@ export function listenToKeys(store: Store, clock: Clock, times: () => number[]):
   const nearer = (factor: number) => {
     const { selected, t, look } = store.now;
     const playback = selected && store.playbacks[selected.team];
-    // Around the selected robot, or around what is in the middle.
+    // Around the selected robot, or around the middle of the view.
     const x = playback ? playback.x.at(t, selected.robot) : look.x;
     const y = playback ? playback.y.at(t, selected.robot) : look.y;
     if (playback && factor > 1) store.set({ look: { ...look, x, y } });
@@ -82,7 +82,7 @@ export function listenToKeys(store: Store, clock: Clock, times: () => number[]):
   releaseFocus();
 }
 
-/** Whether a key means something else to the control that has the focus. */
+/** Whether a key has another meaning for the control that has the focus. */
 function isOwn({ target, key }: KeyboardEvent): boolean {
   if (target instanceof HTMLSelectElement) return key !== "Escape";
   const isPressed = target instanceof HTMLButtonElement || isCheckbox(target);
@@ -95,7 +95,7 @@ function isCheckbox(target: EventTarget | null): boolean {
 
 /** Give the keys back to the page after a click: the space bar plays, and does not click again.
  *
- * Who uses the keyboard keeps the focus.
+ * With the keyboard the focus stays.
  */
 function releaseFocus(): void {
   let isPointer = false;

@@ -1,4 +1,4 @@
-// The replay of one epoch: reads what the page carries, and shows it.
+// The replay of one epoch: reads the data in the page, and shows them.
 
 import "./page.css";
 import "./team.css";
@@ -42,7 +42,7 @@ async function show(): Promise<void> {
   document.body.dataset["ready"] = "yes";
 }
 
-/** Say in one line that nothing can be shown: the file was cut or changed on its way. */
+/** Show in one line that the data are missing or damaged: the file was cut or changed. */
 function complain(): void {
   const text = "This replay cannot be shown: its data are missing or damaged.";
   find("app", HTMLElement).hidden = true;

@@ -1,4 +1,4 @@
-// Below the rows of a timeline: when events happened, a lane for each kind, and curves of measures.
+// Below the rows of a timeline: events, a lane for each kind, and curves of measures.
 
 import { make, say, swatch } from "../shared/dom";
 import { Sheet } from "./paint";
@@ -9,7 +9,7 @@ import type { Tooltip } from "./tooltip";
 /** Heights in CSS pixels. */
 const LANE = 13;
 const CURVE = 26;
-/** Pixels beside a mark that still belong to it. */
+/** Pixels around a mark that still belong to it. */
 const REACH = 4;
 
 export class Marks {
@@ -28,7 +28,7 @@ export class Marks {
     private readonly store: Store,
     private readonly tooltip: Tooltip,
   ) {
-    const label = "When events happened, and how measures went";
+    const label = "Events and measures over time";
     this.canvas = make("canvas", { id: `marks-${team}`, role: "img", "aria-label": label });
     this.sheet = new Sheet(this.canvas, false);
     // Two teams have the same lanes and the same scales: they are compared.
@@ -40,7 +40,7 @@ export class Marks {
         one.measures.filter((measure) => measure.name === name),
       );
       const ranges = same.map(({ values }) => values.range());
-      // A curve of what is never negative stands on zero.
+      // The curve of a measure that is never negative starts at zero.
       return [
         Math.min(0, ...ranges.map(([least]) => least)),
         Math.max(...ranges.map(([, most]) => most)),
@@ -71,7 +71,7 @@ export class Marks {
     this.playback.measures.forEach((measure, k) => this.drawCurve(measure, k, top + CURVE * k));
   }
 
-  /** Show what the measures are in a frame. */
+  /** Show the values of the measures in a frame. */
   update(t: number): void {
     this.playback.measures.forEach((measure, k) =>
       say(this.values[k]!, short(measure.values.at(t))),
@@ -170,7 +170,7 @@ export class Marks {
   }
 }
 
-/** Return a number with no more digits than a reader takes in. */
+/** Return a number with few digits. */
 export function short(value: number): string {
   if (Number.isInteger(value)) return String(value);
   return Math.abs(value) >= 100 ? value.toFixed(1) : value.toPrecision(3);

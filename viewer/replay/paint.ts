@@ -3,7 +3,7 @@
 import { FAINT, HUES, type Playback } from "./playback";
 import type { State } from "./state";
 
-/** Return a colour for the k-th of some things that have none of their own. */
+/** Return a colour for the k-th of some things without one. */
 export const hue = (k: number): string => HUES[k % HUES.length]!;
 
 /** Return the colour of a body: that of its kind, or of the robot's action or caste. */
@@ -32,7 +32,7 @@ export class Sheet {
     this.pen = canvas.getContext("2d", { alpha: hasTransparency })!;
   }
 
-  /** Make room for a size in CSS pixels; all that was drawn is gone. */
+  /** Set the size in CSS pixels; this erases the canvas. */
   resize(width: number, height: number): void {
     const sharpness = Math.min(window.devicePixelRatio || 1, 2);
     [this.width, this.height] = [width, height];

@@ -1,4 +1,4 @@
-// How far robots see and reach: rings around them, and what each sensor of one of them reads.
+// The ranges of robots: rings around them, and the sensor values of a selected one.
 
 import { colourOf, hue } from "./paint";
 import { FAINT, INK, type Ring, type Playback, RANGE_FILL, RANGE_LINE } from "./playback";
@@ -7,10 +7,10 @@ import type { View } from "./view";
 
 type Pen = CanvasRenderingContext2D;
 
-/** How opaque a wedge is whose sensor reads 1: what lies below it can still be seen. */
+/** Opacity of a wedge whose sensor reads 1; objects below it stay visible. */
 const FULL = 0.55;
 
-/** Draw the ranges that are to be seen now around the robots of one team. */
+/** Draw the visible ranges around the robots of one team. */
 export function drawRings(
   pen: Pen,
   playback: Playback,
@@ -30,7 +30,7 @@ export function drawRings(
   }
 }
 
-/** Return a ring's radius in pixels around a body; what is not of the team has no actions. */
+/** Return a ring's radius in pixels around a body; bodies that are not of the team have no actions. */
 function radius(playback: Playback, view: View, ring: Ring, t: number, b: number): number {
   const action = b < playback.robots.length ? playback.action.at(t, b) : 0;
   return action < 0 ? 0 : (ring.radius[action] ?? 0) * view.scale;
@@ -81,7 +81,7 @@ function drawOutline(
   pen.globalAlpha = 1;
 }
 
-/** Draw where a robot's sensors look, each wedge as opaque as its sensor's reading. */
+/** Draw the directions of a robot's sensors, each wedge as opaque as its sensor's value. */
 export function drawWedges(
   pen: Pen,
   playback: Playback,

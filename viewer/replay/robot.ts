@@ -1,4 +1,4 @@
-// What one robot is, reads and does: numbers, activations, and the history of its actions.
+// One robot: numbers, sensors, activations, and the history of its actions.
 
 import { make, say, swatch } from "../shared/dom";
 import type { Channel } from "./data";
@@ -234,11 +234,11 @@ export class RobotPanel {
   /** Mark the highest output: it decides. */
   private markHighest(t: number): void {
     const { outputs } = this.playback;
-    // Where outputs are fewer than actions, they are no votes: wheels have speeds.
+    // Fewer outputs than actions are not votes, but wheel speeds.
     if (!outputs || !this.outputs.length || this.outputs.length < this.playback.actions.length)
       return;
     const values = this.outputs.map((_, k) => outputs.at(t, this.robot, k));
-    // Several may be as high, as far as kept values tell.
+    // Several may be equally high, to the precision of stored values.
     const most = Math.max(...values);
     this.outputs.forEach((item, k) => item.classList.toggle("highest", values[k] === most));
   }

@@ -1,11 +1,11 @@
-// What stands beside a world: its key, gauges, what is to be built, and facts about the epoch.
+// The cards next to a world: its key, gauges, plans of objects, and facts about the epoch.
 
 import { make, say, swatch } from "../shared/dom";
 import { short } from "./marks";
 import { FAINT, INK, type Playback } from "./playback";
 import type { Store } from "./state";
 
-/** Return the cards of a playback; what it has nothing for stays out of sight. */
+/** Return the cards of a playback, without empty ones. */
 export function cards(
   playback: Playback,
   store: Store,
@@ -28,7 +28,7 @@ function card(name: string, title: string, content: HTMLElement): HTMLElement {
   );
 }
 
-/** What can be seen in the world besides the robots. */
+/** Other marks in the world than the robots. */
 function key(playback: Playback): HTMLElement {
   const list = make("ul", { class: "key" });
   const add = (name: string, fill: string, line: string, shape: string) => {

@@ -1,4 +1,4 @@
-// What the reader of the page has chosen, and who is told when it changes.
+// The reader's choices, and the listeners to their changes.
 
 import { type Playback, SPEED } from "./playback";
 import { type Look, wholeOf } from "./view";
@@ -16,14 +16,14 @@ export interface State {
   readonly order: "number" | "caste";
   readonly trails: boolean;
   readonly ranges: boolean;
-  /** What part of the world is looked at, the same for all teams. */
+  /** The visible part of the world, the same for all teams. */
   readonly look: Look;
   readonly selected: { readonly team: number; readonly robot: number } | null;
 }
 
 type Listener = (now: State, before: State) => void;
 
-/** The state of the page. Listeners are told once per animation frame, however much has changed. */
+/** The state of the page. Listeners are called once per animation frame, for any number of changes. */
 export class Store {
   now: State;
   private told: State;
@@ -44,7 +44,7 @@ export class Store {
     };
   }
 
-  /** The look at the whole world. */
+  /** The view of the whole world. */
   get whole(): Look {
     return wholeOf(this.playbacks[0]!.bounds);
   }
@@ -69,7 +69,7 @@ export class Store {
     });
   }
 
-  /** Change something; what is out of range is brought into it. */
+  /** Change something; values are clipped to their range. */
   set(change: Partial<State>): void {
     const next = { ...this.now, ...change };
     const t = Math.min(Math.max(Math.floor(next.t) || 0, 0), this.length - 1);
@@ -81,7 +81,7 @@ export class Store {
     this.asked ||= requestAnimationFrame(() => this.tell());
   }
 
-  /** Return a look that does not leave the world. */
+  /** Return a view that does not leave the world. */
   private within(look: Look): Look {
     const [x0, y0, x1, y1] = this.playbacks[0]!.bounds;
     const keep = (value: number, low: number, high: number) => {
@@ -91,7 +91,7 @@ export class Store {
     return { zoom: look.zoom, x: keep(look.x, x0, x1), y: keep(look.y, y0, y1) };
   }
 
-  /** Tell all listeners now. */
+  /** Call all listeners now. */
   tell(): void {
     cancelAnimationFrame(this.asked);
     this.asked = 0;

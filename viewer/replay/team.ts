@@ -1,4 +1,4 @@
-// One team: its world, what is said beside it, and its timeline.
+// One team: its world, the cards next to it, and its timeline.
 
 import { make } from "../shared/dom";
 import { Events } from "./events";
@@ -11,15 +11,15 @@ import { Timeline } from "./timeline";
 import type { Tooltip } from "./tooltip";
 import { World } from "./world";
 
-/** When what stands beside the world goes below it, as in the style sheet. */
+/** When the cards next to the world move below it, as in the style sheet. */
 const STACKED = "(max-width: 900px)";
-/** Pixels beside the world that it leaves to what is said about it. */
+/** Pixels next to the world that are left for the cards. */
 const BESIDE = 250;
-/** What the column of S and castes says. */
+/** Tooltip of the column of S and castes. */
 const DEGREE =
   "S: degree of specialization (0 = always the same action, 1 = switches all the time); caste by " +
-  "S; share of the favourite setting in those that the robot used, in its colour (1 = always the " +
-  "same one), which S cannot see";
+  "S; share of the favourite setting in all that the robot used, in its colour (1 = always the " +
+  "same one), which S does not measure";
 
 export class Team {
   readonly element: HTMLElement;
@@ -69,7 +69,7 @@ export class Team {
     const caption = make(
       "p",
       {},
-      "What every robot did, from the first iteration to the last; dark ticks: switches",
+      "Actions of every robot over the whole epoch; dark ticks: switches",
     );
     const ends = make("div", {}, right, this.marks.right);
     const lines = make(

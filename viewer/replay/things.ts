@@ -1,4 +1,4 @@
-// Rocks and objects: as they are, fading when detected or taken away, faint ever after.
+// Rocks and objects: they fade when detected or taken away, and leave a faint mark.
 
 import type { Channel } from "./data";
 import { GONE_OPACITY, LEAST_THING, RING_FRAMES, RING_GROWTH, type Things } from "./playback";

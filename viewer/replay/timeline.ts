@@ -6,7 +6,7 @@ import { FAINT, type Playback } from "./playback";
 import type { State, Store } from "./state";
 import type { Tooltip } from "./tooltip";
 
-/** Pixels at the foot of a row that say how often the robot switches there, if there is room. */
+/** Pixels at the foot of a row that show how often the robot switches there, if there is room. */
 const SWITCHES = 2;
 
 export class Timeline {
@@ -51,13 +51,13 @@ export class Timeline {
     for (const side of [this.left, this.right]) {
       side.style.height = `${height}px`;
       side.style.setProperty("--row", `${rowHeight}px`);
-      // Smaller letters could not be read.
+      // Smaller letters would be illegible.
       side.classList.toggle("tight", rowHeight < 8.5);
     }
     this.draw();
   }
 
-  /** Draw all rows, pixel by pixel: a column shows shares of the iterations it stands for. */
+  /** Draw all rows, pixel by pixel: a column shows shares of its iterations. */
   private draw(): void {
     const { canvas, pen } = this.sheet;
     const { width, height } = canvas;
@@ -122,7 +122,7 @@ export class Timeline {
     }
   }
 
-  /** Return what stands at the end of a row: S, the caste, and the share of the favourite setting. */
+  /** Return the text at the end of a row: S, the caste, and the share of the favourite setting. */
   private ending(robot: number): HTMLElement {
     const { caste, specialization: s, favourite, share } = this.playback.robots[robot]!;
     const kind = this.playback.castes[caste]!;
@@ -173,7 +173,7 @@ export class Timeline {
     this.tooltip.show(event.clientX, event.clientY, text);
   }
 
-  /** Return what can be seen, in words. */
+  /** Return a description in words. */
   private summary(): string {
     const { robots, actions, castes } = this.playback;
     const names = castes.map((kind, index) => {
@@ -186,7 +186,7 @@ export class Timeline {
   }
 }
 
-/** Return "#rrggbb" as a number that lies in memory as red, green, blue, opaque. */
+/** Return "#rrggbb" as a number whose bytes in memory are red, green, blue, opaque. */
 function abgr(colour: string): number {
   const rgb = parseInt(colour.slice(1), 16);
   return (0xff000000 | ((rgb & 255) << 16) | (rgb & 0xff00) | (rgb >> 16)) >>> 0;

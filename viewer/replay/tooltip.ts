@@ -1,4 +1,4 @@
-// A line of text beside the pointer.
+// A line of text next to the pointer.
 
 import { make, say } from "../shared/dom";
 
@@ -9,7 +9,7 @@ export class Tooltip {
     document.body.append(this.element);
   }
 
-  /** Show a text beside a point of the window. */
+  /** Show a text next to a point of the window. */
   show(x: number, y: number, text: string): void {
     const { element } = this;
     say(element, text);

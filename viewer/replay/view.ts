@@ -6,20 +6,20 @@ import type { Playback } from "./playback";
 /** Pixels around the world, for its border and for names of robots at it. */
 const MARGIN = 6;
 
-/** What is looked at: how much nearer than the whole world, and which point is in the middle. */
+/** A view: its magnification, 1 for the whole world, and the point in the middle. */
 export interface Look {
   readonly zoom: number;
   readonly x: number;
   readonly y: number;
 }
 
-/** Return a look at the whole of a world. */
+/** Return the view of a whole world. */
 export function wholeOf(bounds: Playback["bounds"]): Look {
   const [x0, y0, x1, y1] = bounds;
   return { zoom: 1, x: (x0 + x1) / 2, y: (y0 + y1) / 2 };
 }
 
-/** Where a world lies on its canvas, in CSS pixels. */
+/** The position of a world on its canvas, in CSS pixels. */
 export class View {
   /** Pixels per length. */
   scale = 1;
@@ -34,7 +34,7 @@ export class View {
     return (x1 - x0) / (y1 - y0);
   }
 
-  /** Show what is looked at in the middle of a canvas of a size. */
+  /** Center a view on a canvas of a size. */
   fit(width: number, height: number, look: Look): void {
     const [x0, y0, x1, y1] = this.bounds;
     const [across, up] = [width - 2 * MARGIN, height - 2 * MARGIN];

@@ -1,4 +1,4 @@
-// The world of one team on its canvas, as it is in the frame that is shown.
+// The world of one team on its canvas, in the current frame.
 
 import { drawBodies, drawHeld, drawMark, drawTrails } from "./bodies";
 import { drawGround, drawLabels } from "./ground";
@@ -17,7 +17,7 @@ export class World {
   /** The ground is drawn once for a size, and copied. */
   private readonly ground = new Sheet(document.createElement("canvas"), false);
   private readonly heaps: Heap[];
-  /** What the ground was drawn for. */
+  /** The view that the ground was drawn for. */
   private look: Look | null = null;
   /** The body below the pointer, and the frame in which it was there. */
   private hovered = -1;
@@ -39,7 +39,7 @@ export class World {
     canvas.addEventListener("pointerleave", () => this.leave());
   }
 
-  /** Take the size that the page gives to the canvas, in CSS pixels. */
+  /** Take the canvas' size in the page, in CSS pixels. */
   resize(width: number, height: number): void {
     this.sheet.resize(width, height);
     this.ground.resize(width, height);

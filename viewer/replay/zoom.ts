@@ -1,10 +1,10 @@
-// Looking nearer: the wheel zooms where the pointer is, dragging moves; all worlds follow.
+// Zooming: the wheel zooms at the pointer, dragging moves; all worlds follow.
 
 import type { Store } from "./state";
 import type { View } from "./view";
 
 const MOST = 30;
-/** Pixels that a pointer moves at least to drag; less is a click. */
+/** Smallest movement of a drag, in pixels; less is a click. */
 const SLACK = 4;
 
 /** Let a canvas be zoomed and moved. Clicks that end a drag do not reach its other listeners. */
@@ -42,7 +42,7 @@ export function letZoom(canvas: HTMLCanvasElement, view: View, store: Store): vo
   canvas.addEventListener("click", (event) => isDrag && event.stopImmediatePropagation(), true);
 }
 
-/** Look nearer by a factor, and keep a point of the world where it is on the canvas. */
+/** Zoom by a factor, with a point of the world fixed on the canvas. */
 export function zoom(store: Store, factor: number, x: number, y: number): void {
   const { look } = store.now;
   const next = Math.min(Math.max(look.zoom * factor, 1), MOST);

@@ -1,9 +1,9 @@
-// Elements made and found in one line. Texts get in as text only, never as markup.
+// Elements made and found in one line. Texts are inserted as text, never as markup.
 
 type Child = Node | string;
 type Given = Record<string, string | number | boolean | ((event: Event) => void)>;
 
-/** Return a new element: "on..." attributes are listeners, true and false set or leave out. */
+/** Return a new element: "on..." attributes are listeners, true sets one, false omits it. */
 export function make<K extends keyof HTMLElementTagNameMap>(
   tag: K,
   given: Given = {},
@@ -34,7 +34,7 @@ export function say(element: HTMLElement, text: string): void {
   if (element.textContent !== text) element.textContent = text;
 }
 
-/** Return a name for a legend, cut if it is longer than anybody would want to read there. */
+/** Return a name for a legend, cut if it is very long. */
 export function named(text: string): HTMLElement {
   return make("span", { class: "name", title: text }, text);
 }

@@ -30,7 +30,7 @@ export function options(xLabel: string, yLabel: string, height: number): uPlot.O
   };
 }
 
-/** Return a label that fits beside a chart that high: without its direction, or its unit, if need be. */
+/** Return a label that fits next to a chart of that height: without its direction, or its unit, if need be. */
 function fitting(label: string, height: number): string {
   const pen = document.createElement("canvas").getContext("2d");
   if (!pen) return label;
@@ -40,7 +40,7 @@ function fitting(label: string, height: number): string {
   return shorter.find((text) => pen.measureText(text).width <= room) ?? shorter[2]!;
 }
 
-/** A chart in a place of the page, as wide as the place. It is made anew when its options change. */
+/** A chart in an element of the page, as wide as it. It is rebuilt when its options change. */
 export class Chart {
   readonly place: HTMLElement;
   private plot: uPlot | null = null;
@@ -51,7 +51,7 @@ export class Chart {
     new ResizeObserver(() => this.resize()).observe(this.place);
   }
 
-  /** Draw data; `make` gives the options, asked for only where `key` is another than before. */
+  /** Draw data; `make` gives the options, and is called only if `key` has changed. */
   draw(key: string, data: uPlot.AlignedData, make: () => uPlot.Options): void {
     if (this.plot && key === this.key) {
       this.plot.setData(data);
@@ -63,7 +63,7 @@ export class Chart {
     this.resize();
   }
 
-  /** Say something where the chart would be. */
+  /** Show a text in place of the chart. */
   say(text: string): void {
     if (this.key === `say ${text}`) return;
     this.clear();

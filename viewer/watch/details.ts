@@ -1,4 +1,4 @@
-// One run: how it stands, and four charts over its generations.
+// One run: its state, and four charts over its generations.
 
 import uPlot from "uplot";
 
@@ -23,7 +23,7 @@ const FIELDS = [
   ["path", "folder"],
 ] as const;
 
-/** Which way the share of a favourite goes. */
+/** The direction of the share of a favourite. */
 const SHARE = "1 = always the same one";
 
 /** The view of one run. */
@@ -71,7 +71,7 @@ export class DetailsView {
     this.data = null;
   }
 
-  /** Say how a run stands. */
+  /** Show the state of a run. */
   drawSummary(run: Summary, state: State): void {
     this.state = state;
     this.root.hidden = false;
@@ -176,7 +176,7 @@ export class DetailsView {
     }));
   }
 
-  /** Draw how many robots are of each caste, one area upon the other. */
+  /** Draw the number of robots of each caste, as stacked areas. */
   private drawCastes(data: Details, state: State): void {
     const world = data.task.split("/")[0] ?? "";
     const colours = own(state.castes, world) ?? {};
@@ -216,7 +216,7 @@ export class DetailsView {
 
   private castesShown: { names: string[]; colours: string[] } = { names: [], colours: [] };
 
-  /** Write the legend of castes with their sizes in one generation, the last if none is meant. */
+  /** Write the legend of castes with their sizes in one generation, by default the last. */
   private tellCastes(index: number | null): void {
     const data = this.data;
     if (!data) return;
@@ -259,7 +259,7 @@ function figure(title: string, chart: Chart, ...more: HTMLElement[]): HTMLElemen
   return make("figure", {}, make("figcaption", {}, title, " ", ...more), chart.place);
 }
 
-/** Draw a line where each stage of a shaping begins, with its number. */
+/** Draw a line at the start of each stage of a shaping, with its number. */
 function markStages(plot: uPlot, stages: Details["stages"]): void {
   const { ctx, bbox } = plot;
   ctx.save();

@@ -1,4 +1,4 @@
-// The page behind `conevo watch`: asks every two seconds how things stand, and shows it.
+// The page of `conevo watch`: asks for the state every two seconds, and shows it.
 
 import "./style.css";
 
@@ -64,7 +64,7 @@ function ask(address: string, headers: Record<string, string> = {}): Promise<Res
   return fetch(address, { headers, cache: "no-store", signal: AbortSignal.timeout(30_000) });
 }
 
-/** Ask how things stand; returns whether there is more to be read. */
+/** Ask for the state; return whether more is to be read. */
 async function look(): Promise<boolean> {
   const answer = await ask("/state.json", tag ? { "If-None-Match": tag } : {});
   if (answer.status !== 304) {
@@ -161,7 +161,7 @@ function makeChoices(): void {
     make(
       "span",
       { class: "faint" },
-      "Thick: median of the runs with the same method and settings, as far as at least half of those that have begun have got. Thin: each run; point at one for its name, click for its details.",
+      "Thick: median of the runs with the same method and settings, up to the point that at least half of those begun have reached. Thin: each run; point at one for its name, click for its details.",
     ),
   );
 }

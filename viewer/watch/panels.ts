@@ -120,7 +120,7 @@ export class PanelView {
     this.chart.place.style.cursor = at > 0 && at <= this.labels.length ? "pointer" : "";
   }
 
-  /** Say which line the pointer is at, and its value there. */
+  /** Show the line at the pointer, and its value there. */
   private tell(plot: uPlot, xLabel: string): void {
     const index = plot.cursor.idx;
     const name = this.focus > 0 ? this.names[this.focus - 1] : undefined;

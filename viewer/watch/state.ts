@@ -1,4 +1,4 @@
-// What the server sends: how everything stands, and all generations of one run.
+// Data from the server: the state, and all generations of one run.
 
 export type Values = (number | null)[];
 
@@ -107,7 +107,7 @@ export interface Details extends Summary {
   robots: Record<string, Values>;
 }
 
-/** Return the value of a key that the object has itself. */
+/** Return the value of an object's own key. */
 export function own<V>(object: Record<string, V>, key: string): V | undefined {
   return Object.hasOwn(object, key) ? object[key] : undefined;
 }
@@ -117,7 +117,7 @@ export function main(run: Summary): [string, number | null] {
   return Object.entries(run.performance)[0] ?? ["", null];
 }
 
-/** Return what a method is called where it was published. */
+/** Return the published name of a method. */
 export function methodTitle(state: State, method: string): string {
   return own(state.methods, method)?.title ?? method;
 }

@@ -18,7 +18,7 @@ function endsByBudget(run: Summary): boolean {
   return run.budget > 0 && run.evaluations / run.budget > run.generation / run.generations;
 }
 
-/** Return where a run is: of its generations, or of its budget if that will end it. */
+/** Return the progress of a run: its generations, or its budget if that will end it. */
 export function place(run: Summary): string {
   const stage = run.n_stages ? `stage ${run.stage} of ${run.n_stages}, ` : "";
   if (!run.generations) return "";
@@ -50,7 +50,7 @@ export function casteBar(run: Summary, state: State): HTMLElement {
   return bar;
 }
 
-/** Return a bar of how much of a run is over. */
+/** Return a bar for the share of a run that is over. */
 export function progressBar(run: Summary): HTMLElement {
   const bar = make("span", { class: "progress", title: place(run) });
   const part = make("i");
@@ -148,7 +148,7 @@ export class Table {
     this.arrange();
   }
 
-  /** Bring the rows into order and hide those that are not asked for. */
+  /** Sort the rows, and hide those that the filter excludes. */
   private arrange(): void {
     const { state } = this;
     if (!state) return;
@@ -174,7 +174,7 @@ export class Table {
   }
 }
 
-/** Compare two values of a column; none comes last. */
+/** Compare two values of a column; missing ones come last. */
 function compare(a: number | string | null, b: number | string | null): number {
   if (a === null || b === null) return a === b ? 0 : a === null ? 1 : -1;
   if (typeof a === "number" && typeof b === "number") return a - b;

@@ -1,4 +1,4 @@
-// Numbers, times and states as people read them.
+// Numbers, times and states as text.
 
 /** Return a number with four significant digits, "–" for none. */
 export function number(value: number | null | undefined): string {
@@ -30,7 +30,7 @@ export function left(endsAt: number | null): string {
   return seconds < 1 ? "any moment now" : `${duration(seconds)} left`;
 }
 
-/** Return a moment as the clock shows it, with the date if it is not today. */
+/** Return a time of day, with the date if it is not today. */
 export function clock(at: number): string {
   const moment = new Date(at * 1000);
   const time = moment.toLocaleTimeString("en-GB", { hour: "2-digit", minute: "2-digit" });
@@ -40,7 +40,7 @@ export function clock(at: number): string {
 
 export const STATES = ["finished", "running", "pending", "interrupted", "failed", "damaged"];
 
-/** Return how many runs are in each state: "12 finished, 2 running, 76 pending". */
+/** Return the number of runs in each state: "12 finished, 2 running, 76 pending". */
 export function counts(found: Record<string, number>): string {
   const parts = STATES.filter((state) => found[state]).map((state) => `${found[state]} ${state}`);
   return parts.join(", ") || "no runs yet";
