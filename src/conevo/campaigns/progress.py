@@ -22,7 +22,7 @@ from conevo.evolution.methods.registry import name_in
 from conevo.reading import parse_json, read_last_line, read_toml
 from conevo.runs import locks
 from conevo.runs.directory import CONFIG, LOCK, SHAPING
-from conevo.runs.outline import Outline, outline_of
+from conevo.runs.outline import Outline, budget_of, outline_of
 from conevo.runs.progress import Done, share_of
 from conevo.runs.records import Generation
 from conevo.runs.store import GENERATIONS
@@ -103,12 +103,11 @@ def progress_of(paths: Paths, planned: PlannedRun) -> RunProgress:
             break
         done.append(Done(*found))
         written.append(at)
-    budgets = [outline.budget_evaluations for outline in outlines]
     return RunProgress(
         generations=sum(one.generations for one in done),
         of=sum(outline.generations for outline in outlines),
         evaluations=sum(one.evaluations for one in done),
-        budget=sum(budgets) if all(budgets) else 0,
+        budget=budget_of(outlines),
         share=share_of(outlines, done),
         written=max(written, default=None),
     )

@@ -25,7 +25,7 @@ from conevo.runs.code import changes_text, sessions_of
 from conevo.runs.directory import as_json
 from conevo.runs.drafts import draft_of
 from conevo.runs.durable import replace_file, sync_directory, writing
-from conevo.runs.outline import Outline
+from conevo.runs.outline import Outline, budget_of
 from conevo.runs.provenance import describe_world
 from conevo.runs.run import Run
 from conevo.runs.shrinkage import shrinkage
@@ -177,13 +177,12 @@ def _rows(paths: Paths, planned: PlannedRun, cost: float) -> Iterator[tuple[str,
         world = provenance.get("world") or describe_world(run.config.build_world())  # 0.1.0: none
         measures = world["measures"]
         exchanges, share = exchanged(run.generations())
-        budgets = [one.outline.budget_evaluations for one in runs]
         yield (
             "runs",
             _run_row(planned, run.outline, world["name"], provenance, records, sessions)
             | {
                 "run": name,
-                "planned_evaluations": sum(budgets) if all(budgets) else None,
+                "planned_evaluations": budget_of(one.outline for one in runs) or None,
                 "measure": measures[0]["name"],
                 "optimum": world["optimum"],
                 "n_robots": world["n_robots"],

@@ -13,7 +13,7 @@ import subprocess
 import tempfile
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -24,8 +24,7 @@ from PIL import Image
 from conevo.errors import EnvironmentFailure, UsageError
 from conevo.playback.look import SPEED
 from conevo.replay.film_frame import Painter
-from conevo.runs.drafts import draft_of
-from conevo.runs.durable import refuse_file, sync_directory, sync_file, writing
+from conevo.runs.durable import appearing_file
 
 __all__ = [
     "FPS",
@@ -134,7 +133,7 @@ def write_film(
             if progress:
                 progress(done, len(frames))
 
-    with _appearing(path) as draft:
+    with appearing_file(path) as draft:
         if kind == "gif":
             samples = (painter.frame(t) for t in frames[:: -(-len(frames) // _SAMPLES)])
             _save_gif(pictures(), _palette(samples), fps, draft)
@@ -150,7 +149,7 @@ def write_poster(painter: Painter, path: Path, t: int) -> None:
         EnvironmentFailure: it cannot be written.
     """
     picture = painter.frame(t)
-    with _appearing(path) as draft, draft.open("xb") as file:
+    with appearing_file(path) as draft, draft.open("xb") as file:
         picture.save(file, "PNG", optimize=True)
 
 
@@ -168,23 +167,6 @@ def find_ffmpeg() -> str | None:
     except RuntimeError:  # the package is installed, without an ffmpeg
         return None
     return exe
-
-
-# --- files ----------------------------------------------------------------------------------------
-
-
-@contextmanager
-def _appearing(path: Path) -> Iterator[Path]:
-    """Yield a hidden path; the file that is written there then becomes ``path``."""
-    refuse_file(path)
-    with writing(path):
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with draft_of(path) as draft:
-            yield draft
-            sync_file(draft)
-            refuse_file(path)
-            draft.rename(path)
-            sync_directory(path.parent)
 
 
 # --- MP4 ------------------------------------------------------------------------------------------

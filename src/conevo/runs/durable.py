@@ -13,6 +13,7 @@ from conevo.runs.drafts import draft_of
 
 __all__ = [
     "append_line",
+    "appearing_file",
     "refuse_file",
     "replace_file",
     "sync_directory",
@@ -62,13 +63,27 @@ def write_new(files: Mapping[Path, bytes]) -> None:
     for path in missing:
         refuse_file(path)
     for path, data in missing.items():
-        with writing(path):
-            path.parent.mkdir(parents=True, exist_ok=True)
-            with draft_of(path) as draft:
-                draft.write_bytes(data)
-                sync_file(draft)
-                draft.rename(path)
-                sync_directory(path.parent)
+        with appearing_file(path) as draft:
+            draft.write_bytes(data)
+
+
+@contextmanager
+def appearing_file(path: Path) -> Iterator[Path]:
+    """Yield a hidden path; the file that is written there then becomes ``path``, all at once.
+
+    Raises:
+        UsageError: ``path`` exists; it is left as it is.
+        EnvironmentFailure: it cannot be written.
+    """
+    refuse_file(path)
+    with writing(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with draft_of(path) as draft:
+            yield draft
+            sync_file(draft)
+            refuse_file(path)
+            draft.rename(path)
+            sync_directory(path.parent)
 
 
 def is_there(path: Path) -> bool:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import PurePath
 from typing import Any
@@ -21,6 +21,7 @@ from conevo.terms import quoted
 __all__ = [
     "LENGTH",
     "Outline",
+    "budget_of",
     "digest_of",
     "flattened",
     "identify",
@@ -148,6 +149,12 @@ def read_outline(content: bytes, provenance: Mapping[str, Any], place: str) -> O
             f"'conevo run --config {quoted(place)} --out DIR'"
         )
     return outline
+
+
+def budget_of(stages: Iterable[Outline]) -> int:
+    """Return the team evaluations that all stages may spend together, 0 without a limit."""
+    budgets = [one.budget_evaluations for one in stages]
+    return sum(budgets) if all(budgets) else 0
 
 
 def span(tasks: Sequence[str]) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from array import array
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePath
 from typing import Any
@@ -17,7 +17,7 @@ from conevo.campaigns.plan import levels_of
 from conevo.errors import UsageError
 from conevo.runs import locks
 from conevo.runs.directory import CONFIG, LOCK, SEAL, SHAPING, kind_of
-from conevo.runs.outline import Outline, flattened, span
+from conevo.runs.outline import Outline, budget_of, flattened, span
 from conevo.runs.progress import Done, seconds_left, share_of
 from conevo.runs.provenance import declared
 from conevo.runs.run import Run
@@ -27,7 +27,7 @@ from conevo.watch.settings import CODE, FROM, Choices, choices_of
 from conevo.watch.tail import Log, Whole, problem_of, readable, stamp
 from conevo.worlds.measures import Measure
 
-__all__ = ["Subject", "plain"]
+__all__ = ["Subject"]
 
 SHOWN = 2000  # generations of a run in its details, at most
 LAST = ("fitness", "best", "specialization", "favourite_share", "sst", "gst")
@@ -260,13 +260,12 @@ class Subject:
         """Return its progress, and the time (seconds since 1970) when it will be finished."""
         logs = [stage.log for stage in self._stages]
         done = [stage.done for stage in self._stages]
-        budgets = [one.budget_evaluations for one in self._outlines]
         share = 1.0 if self._status == "finished" else share_of(self._outlines, done)
         return {
             "generation": self._n_generations,
             "generations": sum(one.generations for one in self._outlines),
             "evaluations": sum(one.evaluations for one in done),
-            "budget": sum(budgets) if all(budgets) else 0,
+            "budget": budget_of(self._outlines),
             "seconds": round(sum(sum(log.generations.numbers["seconds"]) for log in logs), 1),
             "share": round(share, 4),
             "ends_at": self._ends_at(done),
@@ -366,10 +365,7 @@ class Subject:
         Of more than ``SHOWN`` generations it returns evenly spaced ones, with the first and last.
         """
         n = self._n_generations
-        shown = (
-            sorted({round((n - 1) * k / (SHOWN - 1)) for k in range(SHOWN)}) if n > SHOWN else []
-        )
-        rows = np.array(shown, dtype=np.int64) if shown else np.arange(n)
+        rows = np.linspace(0, n - 1, min(n, SHOWN)).round().astype(np.int64)
         stages, first = [], 0
         for number, (one, stage) in enumerate(zip(self._outlines, self._stages, strict=False), 1):
             stages.append({"stage": number, "task": one.task, "first": first})
@@ -378,36 +374,28 @@ class Subject:
             **self.summary,
             "stages": stages if self._shaping else [],
             "number": rows.tolist(),
-            "columns": {
-                name: plain(column[rows]) for name, column in self._columns("numbers", math.nan)
-            },
-            "measures": {
-                name: plain(column[rows]) for name, column in self._columns("performance", math.nan)
-            },
-            "robots": {name: plain(column[rows]) for name, column in self._columns("castes", 0.0)},
+            "columns": self._columns("numbers", rows, math.nan),
+            "measures": self._columns("performance", rows, math.nan),
+            "robots": self._columns("castes", rows, 0.0),
         }
 
-    def _columns(self, kind: str, none: float) -> Iterator[tuple[str, npt.NDArray[np.float64]]]:
-        """Yield the columns of all stages, stage by stage."""
-        parts: list[tuple[int, Mapping[str, Sequence[float]]]] = [
-            (len(found), getattr(found, kind))
-            for found in (stage.log.generations for stage in self._stages)
-        ]
-        for name in dict.fromkeys(name for _, part in parts for name in part):
-            yield (
-                name,
-                np.concatenate(
-                    [
-                        np.array(part[name]) if name in part else np.full(n, none)
-                        for n, part in parts
-                    ]
-                ),
-            )
+    def _columns(
+        self, kind: str, rows: npt.NDArray[np.int64], none: float
+    ) -> dict[str, list[float | None]]:
+        """Return the columns of all stages at some rows, as JSON has them, to six digits.
 
-
-def plain(values: npt.NDArray[np.float64]) -> list[float | None]:
-    """Return numbers as JSON has them, to six digits; None if not finite."""
-    return [None if not math.isfinite(v) else float(f"{v:.6g}") for v in values.tolist()]
+        Args:
+            kind: attribute of ``Generations``.
+            rows: numbers of generations, counted through the stages.
+            none: value in the stages that lack a column.
+        """
+        logs = [stage.log.generations for stage in self._stages]
+        columns = {}
+        for name in dict.fromkeys(name for log in logs for name in getattr(log, kind)):
+            parts = [getattr(log, kind).get(name, [none] * len(log)) for log in logs]
+            values = np.concatenate([np.array(part, np.float64) for part in parts])[rows]
+            columns[name] = [_plain(float(f"{value:.6g}")) for value in values.tolist()]
+        return columns
 
 
 def _plain(value: float) -> float | None:
