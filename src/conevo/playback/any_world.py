@@ -40,8 +40,8 @@ def playback(parts: Parts, drawn: Drawn) -> Playback:
             f"{', '.join(missing)} of every robot (Simulation.recorded must name x, y and action)"
         )
     x, y = parts.channel("x", t, r), parts.channel("y", t, r)
-    low, high = _corners(x.values, y.values)
-    bounds = drawn.bounds or (*low, *high)
+    bounds = drawn.bounds or _bounds(x.values, y.values)
+    side = max(bounds[2] - bounds[0], bounds[3] - bounds[1])
     actions, castes = _colours(about["actions"], about["castes"], drawn.colours)
     n_outputs = parts.channel("outputs", t, r, -1).codes.shape[2]
     return Playback(
@@ -50,7 +50,7 @@ def playback(parts: Parts, drawn: Drawn) -> Playback:
         seconds=drawn.seconds,
         bounds=bounds,
         # Choice: robots are drawn as large as a hundredth of the world.
-        body_kinds=(BodyKind("robot", drawn.radius or 0.01 * _side(bounds)),),
+        body_kinds=(BodyKind("robot", drawn.radius or 0.01 * side),),
         body=(0,) * r,
         x=x,
         y=y,
@@ -61,20 +61,14 @@ def playback(parts: Parts, drawn: Drawn) -> Playback:
     )
 
 
-def _corners(
-    x: npt.NDArray[Any], y: npt.NDArray[Any]
-) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Return two corners of the world: the unit square if all robots are in it, else a larger."""
+def _bounds(x: npt.NDArray[Any], y: npt.NDArray[Any]) -> tuple[float, float, float, float]:
+    """Return x0, y0, x1, y1: of the unit square if all robots are in it, else around them."""
     low, high = np.array([x.min(), y.min()]), np.array([x.max(), y.max()])
     if low.min() >= 0 and high.max() <= 1:
-        return (0.0, 0.0), (1.0, 1.0)
+        return (0.0, 0.0, 1.0, 1.0)
     margin = 0.05 * float((high - low).max()) or 0.5
     (x0, y0), (x1, y1) = (low - margin).tolist(), (high + margin).tolist()
-    return (x0, y0), (x1, y1)
-
-
-def _side(bounds: tuple[float, float, float, float]) -> float:
-    return max(bounds[2] - bounds[0], bounds[3] - bounds[1])
+    return (x0, y0, x1, y1)
 
 
 def _outputs(names: list[str], n: int) -> list[str]:
