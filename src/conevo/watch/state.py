@@ -32,22 +32,18 @@ class Watched:
     Args:
         paths: their directories.
         folders: all directories in these are followed, also those that appear later.
-        title: of the page.
 
     Raises:
         UsageError: a path is none of the three.
     """
 
-    def __init__(
-        self, paths: Sequence[Path] = (), folders: Sequence[Path] = (), title: str = ""
-    ) -> None:
+    def __init__(self, paths: Sequence[Path] = (), folders: Sequence[Path] = ()) -> None:
         named = [Path(path).resolve() for path in paths]
         self._folders = [Path(folder).resolve() for folder in folders]
         for path in named:
             if not kind_of(path):
                 raise UsageError(f"{path} is not a run, a shaping or a campaign")
-        names = ", ".join(path.name for path in (*named, *self._folders))
-        self.title = readable(title or names)
+        self.title = readable(", ".join(path.name for path in (*named, *self._folders)))
         self._lock = threading.Lock()
         self._names = Names()
         self._groups: dict[Path, Followed] = {}
