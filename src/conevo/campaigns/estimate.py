@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Mapping
 from statistics import fmean
 
@@ -27,29 +28,25 @@ def remaining_seconds(
         at: the present time, seconds since 1970.
     """
     planned = campaign.planned
-    known: dict[tuple[str, ...], list[float]] = {}
+    spent = {k: one.core_seconds for k, one in entries.items() if one.state == "finished"}
+    if not any(spent.values()):
+        for label, entry in entries.items():
+            if entry.state == "running" and (passed := _passed(entry, at)) > 0:
+                share = progress_of(campaign.paths, planned[label]).share
+                spent[label] = passed / share if share > 0 else 0.0
+    known: dict[tuple[str, ...], list[float]] = defaultdict(list)
+    for label, seconds in spent.items():
+        for key in _keys(campaign, label) if seconds > 0 else ():
+            known[key].append(seconds)
     left = 0.0
-    for label, entry in entries.items():
-        seconds = entry.core_seconds if entry.state == "finished" else 0.0
-        if seconds > 0:
-            for key in _keys(campaign, label):
-                known.setdefault(key, []).append(seconds)
-    running = [label for label, entry in entries.items() if entry.state == "running"]
-    if not known:
-        for label in running:
-            share = progress_of(campaign.paths, planned[label]).share
-            passed = _passed(entries[label], at)
-            if share > 0 and passed > 0:
-                for key in _keys(campaign, label):
-                    known.setdefault(key, []).append(passed / share)
     for label, entry in entries.items():
         if label not in planned or entry.state not in ("pending", "running"):
             continue
         costs = next((known[key] for key in _keys(campaign, label) if key in known), None)
         if costs is None:
             return None
-        spent = _passed(entry, at) if entry.state == "running" else 0.0
-        left += max(fmean(costs) - spent, 0.0)
+        passed = _passed(entry, at) if entry.state == "running" else 0.0
+        left += max(fmean(costs) - passed, 0.0)
     longest = max((e.threads for e in entries.values() if e.state == "running"), default=1)
     return left / max(cores, longest, 1)
 
