@@ -134,7 +134,7 @@ def test_other_code_does_not_carry_a_campaign_on_unless_it_is_accepted(
 ) -> None:
     made = begun_by_another(tmp_path)
     here = current_code()
-    with pytest.raises(UsageError, match=r"was begun by conevo .*abc123.*--accept-other-code"):
+    with pytest.raises(UsageError, match=r"was started by conevo .*abc123.*--accept-other-code"):
         carried_out(made)
     for verb in ("start", "retry", "slurm"):
         with pytest.raises(SystemExit, match="2"):

@@ -1,1 +1,1 @@
-"""Campaigns: a plan of runs, carried out to the end by whatever machines there are."""
+"""Campaigns: plans of runs, executed to the end on one machine or many."""

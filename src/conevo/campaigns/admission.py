@@ -40,7 +40,7 @@ def admit_code(paths: Paths, labels: Iterable[str], accept: bool = False) -> Non
         codes = sorted({last_code(read_json(file)) for file in files} - {here})
     if codes and not accept:
         raise UsageError(
-            f"{paths.root} was begun by conevo {', '.join(codes)}, and this is {here}, which may "
+            f"{paths.root} was started by conevo {', '.join(codes)}, and this is {here}, which may "
             f"give other results: use that version, or continue with 'conevo campaign start "
             f"{quoted(paths.root)} --accept-other-code'"
         )

@@ -1,1 +1,1 @@
-"""Seeing the team: trajectories, the viewer in the browser, and films."""
+"""Replays of a team: recordings, the viewer in the browser, and films."""

@@ -1,1 +1,1 @@
-"""Where runs are executed: here one after another, in processes, on a Ray cluster."""
+"""Executors of runs: one after another here, in processes, or on a Ray cluster."""

@@ -62,7 +62,7 @@ class RayCluster:
         if not set(devices) <= {AUTO, CPU, "cuda"}:
             raise UsageError(
                 f"--device {','.join(devices)}: with the executor ray it is auto, cpu or cuda; Ray "
-                f"gives every task a GPU of its own"
+                f"gives every task its own GPU"
             )
         os.environ["RAY_USAGE_STATS_ENABLED"] = "0"
         try:
