@@ -122,7 +122,7 @@ def test_a_subclass_is_drawn_like_the_world_it_inherits(tmp_path):
         ),
         (
             Drawn(objects=(Objects("a", "x", "y", state="action", states=("a",)),)),
-            "0 to 1, and",
+            "0 to 1, for 1 names",
         ),
         ({"object": []}, "drawn.object: "),
         ({"unit": 3}, "drawn.unit: "),
