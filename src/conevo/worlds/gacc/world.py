@@ -68,7 +68,7 @@ Choices, all declared in ``GaccParams`` or here:
 - Choice: a robot without energy lets go, stays where it is as a body, and does nothing more.
 - Choice: an obstacle blocks the view of other robots too, but not of the home area or the demand.
 - Choice: if several complex objects need a type, the first of them gets it. Several objects that
-  are ready in one iteration are built in in the order of their numbers.
+  are ready in one iteration get their places in the order of their numbers.
 - Choice: walls and obstacles are sensed at their closest points, with a negative reading. The bound
   of eq. 6.1 limits a reading, but does not change which thing is the closest.
 - Choice: only the end of a step decides whether it is refused; obstacles are too wide to be jumped
