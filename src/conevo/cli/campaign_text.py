@@ -19,7 +19,7 @@ from conevo.campaigns.plan import Plan, PlannedRun
 from conevo.campaigns.plan_file import preset_names, read_preset
 from conevo.campaigns.progress import cell_text, cells, last_written, progress_of
 from conevo.cli.format import table
-from conevo.cli.lookup import campaigns_in
+from conevo.cli.lookup import directories
 from conevo.errors import ConevoError
 from conevo.kernels.threads import usable_cores
 from conevo.numbers import duration
@@ -54,7 +54,7 @@ def experiments() -> Rows:
 def campaigns_here() -> Rows:
     """Return the campaigns in campaigns/."""
     rows: Rows = []
-    for path in campaigns_in(CAMPAIGNS):
+    for path in directories(CAMPAIGNS, "campaign"):
         try:
             found = Campaign(path)
             stands = counts(found.standings())

@@ -131,7 +131,7 @@ def _runs(folder: str | None) -> Rows:
     if folder and not place.is_dir():
         raise UsageError(f"{place} is not a directory")
     rows = []
-    for path in directories(place):
+    for path in directories(place, "run", "shaping"):
         try:
             found = open_directory(path)
             runs = [found] if isinstance(found, Run) else found.stages

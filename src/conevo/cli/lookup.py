@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 
 __all__ = [
     "campaign_at",
-    "campaigns_in",
     "directories",
     "find",
     "find_campaign",
@@ -42,7 +41,7 @@ def find(text: str) -> Run | Shaping:
     """
     if Path(text).exists():
         return open_directory(Path(text))
-    names = {path.name: path for path in directories(RUNS)}
+    names = {path.name: path for path in directories(RUNS, "run", "shaping")}
     matches = [name for name in names if name.startswith(text.removeprefix(f"{RUNS}/"))]
     if len(matches) == 1:
         return open_directory(names[matches[0]])
@@ -95,17 +94,8 @@ def find_shaping(text: str) -> Shaping:
     return found
 
 
-def directories(folder: Path) -> list[Path]:
-    """Return the directories of runs and shapings in ``folder``, sorted by name."""
-    return _holding(folder, "run", "shaping")
-
-
-def campaigns_in(folder: Path) -> list[Path]:
-    """Return the directories of campaigns in ``folder``, sorted by name."""
-    return _holding(folder, "campaign")
-
-
-def _holding(folder: Path, *kinds: str) -> list[Path]:
+def directories(folder: Path, *kinds: str) -> list[Path]:
+    """Return the directories of these kinds (``kind_of``) in ``folder``, sorted by name."""
     if not folder.is_dir():
         return []
     return sorted(
@@ -135,7 +125,7 @@ def find_campaign(text: str) -> Campaign:
 
     found = campaign_at(text)
     if found is None:
-        known = [path.name for path in campaigns_in(CAMPAIGNS)]
+        known = [path.name for path in directories(CAMPAIGNS, "campaign")]
         raise unknown_name("campaign", text, known, f"in {CAMPAIGNS}/")
     return found
 
@@ -148,7 +138,7 @@ def only_campaign() -> Campaign:
     """
     from conevo.campaigns.campaign import CAMPAIGNS, Campaign
 
-    paths = campaigns_in(CAMPAIGNS)
+    paths = directories(CAMPAIGNS, "campaign")
     if len(paths) == 1:
         return Campaign(paths[0])
     names = ", ".join(path.name for path in paths)

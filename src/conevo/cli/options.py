@@ -16,6 +16,8 @@ from conevo.errors import UsageError
 
 if TYPE_CHECKING:
     from conevo.runs.config import RunConfig
+    from conevo.runs.run import Run
+    from conevo.runs.shaping import Shaping
     from conevo.runs.time_limit import TimeLimit
 
 __all__ = ["Order", "setting_options", "settings_only"]
@@ -92,7 +94,6 @@ class Order:
         for name, value in names:
             self._refuse_twice(f"run.{name}", f"--{name}", value)
         self.take("run.budget_evaluations", "--budget-evaluations", self.budget_evaluations)
-        self.command = shlex.join(["conevo", *sys.argv[1:]])
 
     def take(self, key: str, option: str, value: Any) -> None:
         """Add an option to the settings, if it is given.
@@ -148,7 +149,7 @@ class Order:
 
         Args:
             configs: of the run, or of every stage.
-            origin, of_champion: as for ``run``.
+            origin, of_champion: as for ``start``.
         """
         from conevo.cli.lookup import find_last
         from conevo.cli.settings_text import print_dry_run
@@ -166,29 +167,6 @@ class Order:
             ancestors = [*stand_ins(configs)]
             refuse_existing(path)
         print_dry_run(configs, path, self.as_json, ancestors, ancestry)
-
-    def run(self, config: RunConfig, origin: str | None = None, of_champion: bool = False) -> None:
-        """Start a run and continue it to its end.
-
-        Args:
-            config: of the run.
-            origin: name of another run that has the initial populations; of a shaping, its last
-                stage has them.
-            of_champion: breed the populations from the champion of ``origin`` instead.
-        """
-        from conevo.cli.lookup import find_last
-        from conevo.runs.start import start
-
-        begun = start(
-            config,
-            self.out,
-            threads=self.threads,
-            device=self.device,
-            command=self.command,
-            origin=None if origin is None else find_last(origin),
-            of_champion=of_champion,
-        )
-        carry_on(begun, self.threads, self.style, self.limit)
 
     def resolve_both(self, world: str | None, first: str) -> list[RunConfig]:
         """Return the configurations of two stages; method ``first`` evolves the first one.
@@ -211,10 +189,27 @@ class Order:
             PLACE,
         )
 
-    def shape(self, configs: Sequence[RunConfig]) -> None:
-        """Start a shaping and continue it to its end."""
+    def start(
+        self, configs: Sequence[RunConfig], origin: str | None = None, of_champion: bool = False
+    ) -> None:
+        """Start a run, or a shaping if there are several stages, and continue it to its end.
+
+        Args:
+            configs: of the run, or of every stage.
+            origin: name of another run that has the initial populations; of a shaping, its last
+                stage has them.
+            of_champion: breed the populations from the champion of ``origin`` instead.
+        """
+        from conevo.cli.lookup import find_last
         from conevo.runs.shaping import start_stages
+        from conevo.runs.start import start
 
         how: dict[str, Any] = {"threads": self.threads, "device": self.device}
-        begun = start_stages(configs, self.out, command=self.command, **how)
+        how["command"] = shlex.join(["conevo", *sys.argv[1:]])
+        begun: Run | Shaping
+        if len(configs) > 1:
+            begun = start_stages(configs, self.out, **how)
+        else:
+            found = None if origin is None else find_last(origin)
+            begun = start(configs[0], self.out, origin=found, of_champion=of_champion, **how)
         carry_on(begun, self.threads, self.style, self.limit)

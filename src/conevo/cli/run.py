@@ -91,12 +91,6 @@ def run(
         from conevo.runs.shaping import tasks_up_to
 
         stages = [order.resolve(task) for task in tasks_up_to(config.address)]
-    if len(stages) > 1 and dry_run:
-        order.print_only(stages)
-    elif len(stages) > 1:
-        order.shape(stages)
-    elif dry_run:
-        order.print_only([config], origin or champion, of_champion=champion is not None)
-    else:
-        order.run(config, origin or champion, of_champion=champion is not None)
+    act = order.print_only if dry_run else order.start
+    act(stages or [config], origin or champion, of_champion=champion is not None)
     return None

@@ -26,4 +26,4 @@ def shape_prey(**options: Any) -> None:
     from conevo.worlds.pursuit.evolved import TASKS
 
     order = Order(**options)
-    order.shape([order.resolve(task) for task in TASKS])
+    order.start([order.resolve(task) for task in TASKS])
