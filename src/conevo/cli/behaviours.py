@@ -24,7 +24,7 @@ Try: conevo behaviours runs/hunt
 """
 
 
-@click.command(help=HELP, short_help="Classify what robots do, each and together.")
+@click.command(help=HELP)
 @click.argument("run")
 @click.option(
     "--scenarios",

@@ -58,7 +58,7 @@ plan_options = all_of(
 """Options that select a campaign and its scale."""
 
 
-@click.group("campaign", short_help="Start, monitor, stop and retry campaigns of many runs.")
+@click.group()
 def campaign() -> None:
     """Campaigns of many runs: methods x environments x seeds, resumable.
 

@@ -12,7 +12,7 @@ from conevo.terms import counted
 __all__ = ["check"]
 
 
-@click.command(short_help="Check a world, such as one of your own.")
+@click.command()
 @click.argument("world", metavar="FILE.py[:ENVIRONMENT]")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON array.")
 def check(world: str, as_json: bool) -> int:

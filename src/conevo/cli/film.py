@@ -13,7 +13,7 @@ from conevo.errors import UsageError
 __all__ = ["film"]
 
 
-@click.command(short_help="Make a film of a run's fittest team (GIF, MP4).")
+@click.command()
 @click.argument("what", metavar="RUN|FILE")
 @epoch_options
 @click.option("--gif", is_flag=True, help="A GIF, for pages and slides.")

@@ -22,7 +22,7 @@ Rows = list[dict[str, Any]]
 WHAT = ("worlds", "controllers", "methods", "presets", "settings", "runs")
 
 
-@click.command("list", short_help="List worlds, controllers, methods, presets, settings or runs.")
+@click.command("list")
 @click.argument("what", type=click.Choice(WHAT))
 @click.argument("subject", metavar="[WORLD/ENVIRONMENT | FOLDER]", required=False)
 @click.option("--method", metavar="NAME", help="Method of the settings or presets (default: cone).")

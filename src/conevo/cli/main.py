@@ -38,7 +38,7 @@ VERBS = {
     "report": "Write a campaign's report: page, tables, figures, data.",
     "query": "Query a campaign's tables with SQL.",
     "show": "Print a finished or running run.",
-    "list": "List worlds, methods, presets, settings or runs.",
+    "list": "List worlds, controllers, methods, presets, settings or runs.",
 }
 IN_A_ROW = 2.0  # seconds between two interrupts that count as one
 MODULES = {"list": "listing", "shape-prey": "shape_prey"}

@@ -12,7 +12,7 @@ import click
 __all__ = ["query"]
 
 
-@click.command(short_help="Query a campaign's tables with SQL.")
+@click.command()
 @click.argument("arguments", metavar="[CAMPAIGN] SQL", nargs=-1, required=True)
 @click.option("--csv", "as_csv", is_flag=True, help="Print comma-separated values.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object per row.")

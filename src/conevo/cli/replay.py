@@ -13,7 +13,7 @@ from conevo.cli.epoch_options import epoch_options
 __all__ = ["replay"]
 
 
-@click.command(short_help="See a run's fittest team in the browser.")
+@click.command()
 @click.argument("what", metavar="RUN|FILE")
 @epoch_options
 @click.option("--out", metavar="FILE", help="Output file (default: a new one in replays/).")

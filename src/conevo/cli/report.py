@@ -9,7 +9,7 @@ import click
 __all__ = ["report"]
 
 
-@click.command(short_help="Write a campaign's report: page, tables, figures, data.")
+@click.command()
 @click.argument("name", metavar="CAMPAIGN")
 @click.option("--out", metavar="DIR", help="Output directory (default: report/ in the campaign).")
 def report(name: str, out: str | None) -> None:

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 __all__ = ["resume"]
 
 
-@click.command(short_help="Continue an interrupted run, or a finished one.")
+@click.command()
 @click.argument("run")
 @click.option(
     "--generations",

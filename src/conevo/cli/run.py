@@ -13,7 +13,7 @@ from conevo.errors import UsageError
 __all__ = ["run"]
 
 
-@click.command(short_help="Evolve a team and test it.")
+@click.command()
 @click.argument("world", metavar="WORLD/ENVIRONMENT", required=False)
 @setting_options
 @click.option(

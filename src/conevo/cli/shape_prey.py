@@ -12,7 +12,7 @@ from conevo.cli.run_to_end import output_options
 __all__ = ["shape_prey"]
 
 
-@click.command("shape-prey", short_help="Evolve prey for the pursuit world.")
+@click.command("shape-prey")
 @setting_options
 @output_options
 def shape_prey(**options: Any) -> None:

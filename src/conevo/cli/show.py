@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 __all__ = ["show"]
 
 
-@click.command(short_help="Print a finished or running run.")
+@click.command()
 @click.argument("run")
 @click.option(
     "--rows",

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 __all__ = ["signal"]
 
 
-@click.command(short_help="Measure how well trials distinguish genotypes.")
+@click.command()
 @click.argument("what", metavar="RUN|WORLD/ENVIRONMENT", required=False)
 @settings_only
 @click.option(

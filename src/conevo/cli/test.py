@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 __all__ = ["test"]
 
 
-@click.command(short_help="Test a run's fittest team in fresh scenarios.")
+@click.command()
 @click.argument("run")
 @click.option(
     "--scenarios",

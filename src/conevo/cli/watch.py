@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 __all__ = ["watch"]
 
 
-@click.command(short_help="Follow runs live in the browser.")
+@click.command()
 @click.argument("what", metavar="[RUN|CAMPAIGN]", required=False)
 @click.option(
     "--port",
