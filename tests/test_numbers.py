@@ -40,6 +40,7 @@ def test_an_error_is_shown_with_two_digits() -> None:
         "0.06 ± 0.20", "0.055 ± 0.012", "0.0551 ± 0.0060", "0.0551", "0.0551"
     ]  # fmt: skip
     assert plus_minus(0.5, 0.06, "+-") == "0.500 +- 0.060"
+    assert plus_minus(0.0, 2.6e-16) == "0.00000 ± 0.00000"  # the error of rounding
     assert plus_minus(None, None) == "-"
 
 

@@ -34,11 +34,11 @@ def decimals(value: float) -> int:
 def plus_minus(value: float | None, error: float | None, sign: str = "±") -> str:
     """Return a value with its error, rounded to two digits of the error: "0.055 ± 0.012".
 
-    Without an error, or with one of 0, the value alone has four decimals.
+    It has two to five decimals. Without an error, or with one of 0, the value alone has four.
     """
     if value is None or not error:
         return number(value, 4)
-    digits = max(2, 1 - math.floor(math.log10(error)))
+    digits = min(max(2, 1 - math.floor(math.log10(error))), 5)
     return f"{value:.{digits}f} {sign} {error:.{digits}f}"
 
 
