@@ -142,7 +142,7 @@ def _refuse_rotation(rotate: int, n_robots: int) -> None:
     if type(rotate) is not int or not 0 <= rotate < n_robots:
         raise UsageError(
             f"rotate = {rotate!r}: must be a whole number from 0 to {n_robots - 1}, less than the "
-            f"robots, of which there {'is' if n_robots == 1 else 'are'} {n_robots}"
+            f"number of robots, {n_robots}"
         )
 
 

@@ -25,7 +25,7 @@ __all__ = [
 
 @contextmanager
 def writing(path: Path) -> Iterator[None]:
-    """Turn the operating system's refusal to write ``path`` into one clear line.
+    """Convert the operating system's refusal to write ``path`` to one clear line.
 
     Raises:
         EnvironmentFailure: full disk, no permission, read-only file system and the like.
@@ -37,7 +37,7 @@ def writing(path: Path) -> Iterator[None]:
 
 
 def replace_file(path: Path, data: bytes) -> None:
-    """Put ``data`` in place of the file at ``path``: after a crash it is the old or the new one."""
+    """Replace the file at ``path``: after a crash it has the old or the new content."""
     draft = path.with_name(path.name + ".tmp")
     with writing(path):
         try:
@@ -106,7 +106,7 @@ def append_line(path: Path, line: str) -> None:
 
 
 def sync_file(path: Path) -> None:
-    """Wait until what is in a file is on the disk."""
+    """Wait until the content of a file is on the disk."""
     _sync(path)
 
 

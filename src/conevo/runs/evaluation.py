@@ -164,7 +164,7 @@ def _mean_shares(counts: npt.NDArray[np.int32]) -> npt.NDArray[np.float64]:
 
 
 def describe(outcome: Outcome, world: World, team: int = 0) -> Portrait:
-    """Return what one team of an outcome did."""
+    """Return the portrait of one team of an outcome."""
     chosen = setting_columns(world)
     settings = [world.castes[column] for column in chosen]
     counts: npt.NDArray[np.int64] = outcome.counts[team].astype(np.int64).sum(axis=0)

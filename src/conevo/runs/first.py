@@ -1,11 +1,11 @@
 """A run in two stages of one task: another method evolves the first, the run's own the second.
 
-The second stage begins with populations bred from the first one's champion, so clones can be
-evolved first and differentiate then. Both stages share the length that one run would have, so that
-such a run compares with any other of the same budget. Two settings ask for it, wherever settings
-of several runs are named; they belong to no component, so no configuration file has them::
+The second stage starts from populations bred from the first one's champion, so clones can evolve
+first and differentiate later. Both stages share the length of one run, so such a run can be
+compared with any other of the same budget. It has two settings, for example in plans; they do not
+belong to a component, so configuration files do not have them::
 
-    first = "homcne"       # the method of the first stage; "none", the default: there is one stage
+    first = "homcne"       # the method of the first stage; "none", the default: only one stage
     first_share = 0.5      # of run.budget_evaluations and run.generations
 """
 
@@ -42,14 +42,14 @@ class First:
 
 
 def take_first(settings: Mapping[str, Any], place: str) -> tuple[dict[str, Any], First | None]:
-    """Return settings without the two of a first stage, and what these ask for; None for nothing.
+    """Return settings without those of a first stage, and the first stage, None without one.
 
     Args:
         settings: "run.generations" -> 5 and the like.
         place: where they are, for messages.
 
     Raises:
-        UsageError: one of the two is not what it should be.
+        UsageError: one of the two has a value that is not allowed.
     """
     method, share = settings.get(FIRST, NONE), settings.get(SHARE, HALF)
     if not isinstance(method, str):

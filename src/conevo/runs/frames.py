@@ -33,7 +33,7 @@ def frame_of(run: Run, table: str) -> DataFrame:
     """Return a table of a run, one of ``TABLES``.
 
     ==============  ================================================================================
-    generations     a row per finished generation: what ``Run.generations`` has. ``n_hidden`` is the
+    generations     a row per finished generation, from ``Run.generations``. ``n_hidden`` is the
                     mean of the populations, ``favourites.X`` the number of robots that prefer X
     tests           a row per scenario of the testing phase, of the champion and of generation 0's
                     fittest team: the robots' mean fitness, and every measure
@@ -53,7 +53,7 @@ def frame_of(run: Run, table: str) -> DataFrame:
 
 
 def header_of(provenance: Record, config: Callable[[], RunConfig]) -> Record:
-    """Return the header of a world; where none was written, as by conevo 0.1.0, it is loaded."""
+    """Return the header of a world; without one, as of conevo 0.1.0, the world is loaded."""
     return provenance.get("world") or describe_world(config().build_world())
 
 
@@ -156,7 +156,7 @@ TABLES: dict[str, Callable[[Run, Record], DataFrame]] = {
     "robots": _robots,
     "finalists": _finalists,
 }
-"""The tables of a run and what makes them."""
+"""The functions that return the tables of a run, by name."""
 
 
 def typed(columns: Columns, rows: Iterable[Record]) -> DataFrame:

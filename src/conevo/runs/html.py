@@ -63,7 +63,7 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 
 
 def bar(*parts: tuple[float, str]) -> str:
-    """Return a bar of shares, each with its colour; what is left of 1 stays empty."""
+    """Return a bar of shares, each with its colour; the rest up to 1 stays empty."""
     inner = "".join(
         f'<i style="width:{100 * min(max(share, 0.0), 1.0):.1f}%;background:{colour}"></i>'
         for share, colour in parts
@@ -73,7 +73,7 @@ def bar(*parts: tuple[float, str]) -> str:
 
 
 def run_card(run: Run) -> str:
-    """Return what a notebook shows of a run: its learning curve, its test and its castes."""
+    """Return the card of a run: its learning curve, its test and its castes."""
     outline = run.outline
     title = f"{outline.task}, {title_of(outline.method)}, preset {outline.preset}"
     about = [f"seed {outline.seed}", run.status, str(run.path)]
@@ -95,7 +95,7 @@ def run_card(run: Run) -> str:
 
 
 def team_card(team: Team) -> str:
-    """Return what a notebook shows of a team: size, fitness and S of every robot."""
+    """Return the card of a team: size, fitness and S of every robot."""
     robots, slots, genes = team.genes.shape
     about = [
         counted(robots, "robot"),

@@ -26,15 +26,15 @@ INPUTS = "inputs"  # folder of a run, shaping or campaign
 
 
 def keep_inputs(config: RunConfig, directory: Path) -> RunConfig:
-    """Copy what a run needs into ``inputs/`` and return its configuration with these files.
+    """Copy the files of a run into ``inputs/`` and return its configuration with the copies.
 
     Args:
         config: of the run.
         directory: the run's, shaping's or campaign's; it may have inputs already.
 
     Raises:
-        UsageError: a file has changed since the configuration was made, or another one of its name
-            is there.
+        UsageError: a file has changed since the configuration was made, or ``inputs/`` has
+            another file of its name.
         EnvironmentFailure: a file cannot be read or written.
     """
     folder = directory / INPUTS

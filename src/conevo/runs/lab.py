@@ -245,16 +245,16 @@ class Lab:
         return state
 
     def rehearsed(self, first: State) -> State:
-        """Return the state before generation 0, with which all has been tried that is from a file.
+        """Return the state before generation 0, after trying a method and a simulator from files.
 
-        A method goes through the first generation with made-up scores, a simulator plays one team
+        A method executes the first generation with made-up scores, a simulator evaluates one team
         in two scenarios.
 
         Args:
             first: the state before generation 0.
 
         Raises:
-            UsageError: what they return is of no use.
+            UsageError: they return something that is not valid.
         """
         if self.config.method_entry.files:
             _refuse_unlike(rehearse(self.method, first), first, self.method.title)

@@ -1,10 +1,10 @@
 """A layer of a run's settings: a preset, a configuration file, or single settings.
 
-Every value remembers its place, which errors name, and the folder that files are named from.
+Every value has its place, which errors name, and the folder of relative paths.
 
-Presets (``presets/*.toml``) hold the tables of a configuration file for any world, with ``method``
-split by method; a world's own table replaces that one. A variant ("cone-1") takes its family's
-values ("cone") first, then its own::
+Presets (``presets/*.toml``) contain the tables of a configuration file for any world, with
+``method`` split by method; a world's own table replaces that one. A variant ("cone-1") takes its
+family's values ("cone") first, then its own::
 
     [any.run]
     [any.method.cone]

@@ -153,7 +153,7 @@ def _check_later(
 def _former_end(
     config: RunConfig, about: Record, records: Sequence[Record], seal: Record
 ) -> Record:
-    """Return what provenance keeps of the end that a run had, or was to have.
+    """Return the provenance entry for the former end of a run, actual or planned.
 
     Args:
         config: with the former length.

@@ -17,14 +17,14 @@ except ImportError as error:  # Windows
 
 __all__ = ["is_held", "is_taken", "no_locks", "take"]
 
-TRIES = 5  # of a lock that others may hold for a moment, just to look
+TRIES = 5  # others may take a lock for a moment, only to check it
 
 
 def take(handle: int, tries: int = TRIES) -> bool:
     """Take the lock of an open file for this process alone, until the file is closed.
 
     Returns:
-        Whether it is ours; if not, another process has it.
+        Whether it was free; if not, another process has it.
 
     Raises:
         OSError: the file system has no locks, or refuses for another reason.
@@ -35,8 +35,8 @@ def take(handle: int, tries: int = TRIES) -> bool:
 def is_taken(handle: int) -> bool:
     """Whether another process has taken the lock of an open file.
 
-    A shared lock is refused only where another process holds it alone, and processes that only
-    look do not refuse each other. Where a file system has no locks, no process holds one.
+    A shared lock is refused only if another process has an exclusive one, so checks do not disturb
+    each other. On a file system without locks, no process has one.
     """
     try:
         return not _flock(handle, fcntl.LOCK_SH, tries=1)
@@ -45,7 +45,7 @@ def is_taken(handle: int) -> bool:
 
 
 def is_held(path: Path) -> bool:
-    """Whether a process holds the lock file at ``path``; False if there is none."""
+    """Whether a process has locked the file at ``path``; False if it does not exist."""
     try:
         handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
     except OSError:

@@ -83,9 +83,9 @@ def price(method: Method, state: State, settings: RunSettings) -> int:
 
 
 def unscored(method: Method, state: State, settings: RunSettings) -> State:
-    """Return what a generation leaves with empty scores; nothing is evaluated.
+    """Return the state after a generation with empty scores; nothing is evaluated.
 
-    ask and tell are pure, so it can be priced like this.
+    This shows the cost of a generation, since ask and tell are pure.
     """
     generation, requests = state.progress.generation, 0
     while state.progress.generation == generation:
@@ -97,12 +97,12 @@ def unscored(method: Method, state: State, settings: RunSettings) -> State:
 
 
 def rehearse(method: Method, first: State) -> State:
-    """Return what the first generation leaves with made-up scores; nothing is evaluated.
+    """Return the state after a first generation with made-up scores; nothing is evaluated.
 
     ask and tell are pure, so a mistake in them shows before a run begins.
 
     Raises:
-        UsageError: what they return is of no use.
+        UsageError: they return something that is not valid.
     """
     state, has_portrait = first, False
     made_up = stream(first.progress.root, "rehearsal")

@@ -111,7 +111,7 @@ class FormerEnd(TypedDict):
 
 
 class Provenance(TypedDict):
-    """``provenance.json``: what made a run."""
+    """``provenance.json``: the origin of a run."""
 
     run_id: RunId
     preset: str
@@ -220,7 +220,7 @@ class Validated(TypedDict):
 
 
 class Finalist(TypedDict):
-    """One of the teams of which validation chooses the champion."""
+    """One of the teams from which validation chooses the champion."""
 
     generation: Count
     selection: Selected

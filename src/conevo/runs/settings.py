@@ -46,7 +46,7 @@ __all__ = [
 ]
 
 BOUNDS = {"ge": ">=", "gt": ">", "le": "<=", "lt": "<"}
-LARGEST = 2**63 - 1  # what a whole number can be in a configuration file
+LARGEST = 2**63 - 1  # largest whole number in a configuration file
 TYPES = {int: "whole number", float: "number", str: "text", bool: "true, false"}
 TEXT = re.compile(r"(?:\(([^)]*)\) )?(.*?)\.?")  # below a field: "(unit) meaning."
 
@@ -82,7 +82,7 @@ class RunSettings:
     difference takes count, too."""
     target: float | None = None
     """the run ends when the fittest team's main task performance is as good as this: at least, or,
-    of a measure of which smaller is better, at most."""
+    for a measure where smaller is better, at most."""
     checkpoint_every: Annotated[int, Ge(1), Le(10_000_000)] = 1
     """generations between two checkpoints."""
     n_finalists: Annotated[int, Ge(1), Le(1000)] = 10
@@ -119,7 +119,7 @@ class Setting:
 
 
 def refuse_contradiction(run: RunSettings, method: Any, n_robots: int) -> None:
-    """Refuse settings of a run and its method of which one makes the other meaningless.
+    """Refuse settings of a run and its method if one makes the other meaningless.
 
     Args:
         run: the run's.
@@ -179,7 +179,7 @@ def settings_of(config: RunConfig) -> list[tuple[str, Setting, Any]]:
 
 
 def preset_purpose(preset: str) -> str:
-    """Return what a preset is for: the beginning of its file's first comment."""
+    """Return the purpose of a preset: the beginning of its file's first comment."""
     source = resources.files(__package__) / "presets" / f"{preset}.toml"
     comment = source.read_text(encoding="utf-8").split("\n\n")[0]
     words = " ".join(line.strip("# ") for line in comment.splitlines())

@@ -142,7 +142,7 @@ def start_stages(
         lab = Lab.equip(stage, threads, device)
         try:
             state = lab.rehearsed(lab.first_state(stand_in or state))
-        except UsageError as error:  # of two stages that share what was planned for one run
+        except UsageError as error:  # two stages may share the length of one run
             which = f"stage {len(on) + 1} ({stage.method}): " if any(stand_in_of) else ""
             raise UsageError(f"{which}{error}") from error
         on.append(lab.device)
@@ -476,7 +476,7 @@ def _read(path: Path) -> dict[str, Any]:
         is_changed = len(run_ids) != len(stages) or any(
             identify(stage, one.task) != run_id
             for stage, one, run_id in zip(stages, outlines, run_ids, strict=True)
-            if "/" in one.task  # conevo 0.1.0 did not write what a world in a file is called
+            if "/" in one.task  # conevo 0.1.0 did not write the name of a world in a file
         )
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise UsageError(f"{path} is damaged: {error}") from error
