@@ -159,7 +159,7 @@ def test_a_campaign_of_the_first_release_is_other_code(tmp_path: Path) -> None:
     del about["code"]
     about["conevo"], about["sessions"] = "0.1.0", []
     file.write_text(json.dumps(about))
-    with pytest.raises(UsageError, match=r"begun by conevo 0\.1\.0 \(code not recorded\)"):
+    with pytest.raises(UsageError, match=r"started by conevo 0\.1\.0 \(code not recorded\)"):
         made.admit_code()
     made.admit_code(accept=True)
     made.admit_code()
