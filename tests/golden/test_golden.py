@@ -4,12 +4,9 @@ import importlib.util
 import json
 from pathlib import Path
 
-import pytest
-
 HERE = Path(__file__).parent
 
 
-@pytest.mark.slow
 def test_worlds_and_methods_give_the_outcomes_on_record() -> None:
     """Kernels call no library mathematics; what methods draw is numpy's."""
     spec = importlib.util.spec_from_file_location("outcomes", HERE / "outcomes.py")
