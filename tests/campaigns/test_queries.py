@@ -161,6 +161,8 @@ def test_a_folder_without_runs_and_a_foreign_file_are_refused(tmp_path) -> None:
         ("WITH one AS (SELECT 1) INSERT INTO budgets SELECT 1, 2", "INSERT is not a query"),
         ("COPY runs TO 'stolen.csv'", "COPY is not a query"),
         ("SET enable_external_access = true", "SET is not a query"),
+        ("SELECT 1; SELECT 2", "2 SQL statements, must be one"),
+        ("FROM runs; DESCRIBE runs; SHOW TABLES", "3 SQL statements, must be one"),
     ],
 )
 def test_a_query_only_asks_and_says_no_in_one_line(tmp_path, monkeypatch, sql, says) -> None:
@@ -185,6 +187,7 @@ def test_a_query_only_asks_and_says_no_in_one_line(tmp_path, monkeypatch, sql, s
         "SUMMARIZE runs",
         "EXPLAIN SELECT 1",
         "PIVOT runs ON method USING count(*)",
+        "SELECT 1;  -- and a comment",
     ],
 )
 def test_everything_that_only_asks_is_a_query(tmp_path, sql) -> None:

@@ -106,7 +106,7 @@ class Tables:
         """Return the same as ``query``, but refuse other statements than queries.
 
         Raises:
-            UsageError: a statement that is not a query, or as ``query``.
+            UsageError: a statement that is not a query, several, or as ``query``.
         """
         self._refuse_orders(sql)
         return self.query(sql)
@@ -124,7 +124,7 @@ class Tables:
             return self._connection.execute(sql).df()
 
     def _refuse_orders(self, sql: str) -> None:
-        """Raise UsageError unless a text consists of queries, at least one."""
+        """Raise UsageError unless a text is one query: DuckDB returns the last result only."""
         with _refusing():
             statements = self._connection.extract_statements(sql)
         for one in statements:
@@ -132,6 +132,8 @@ class Tables:
                 raise UsageError(f"{one.type.name} is not a query; ask as in {QUERY}")
         if not statements:
             raise UsageError(f"no SQL statement, as in {QUERY}")
+        if len(statements) > 1:
+            raise UsageError(f"{len(statements)} SQL statements, must be one, as in {QUERY}")
 
     def query(self, sql: str) -> tuple[list[str], list[tuple[Any, ...]]]:
         """Return the column names and the rows of an SQL statement's result.
