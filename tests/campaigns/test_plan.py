@@ -49,6 +49,24 @@ def test_conditions_choose_runs_and_later_ones_win_and_factors_win_over_all(tmp_
     assert {run.configs()[0].run.checkpoint_every for run in forced} == {7}
 
 
+def test_a_later_layer_wins_with_or_without_the_section_in_its_keys(tmp_path):
+    path = write_plan(tmp_path, factors="epochs = [2]", more='"run.epochs" = 1\nn_tests = 3')
+    path.write_text(path.read_text().replace('"run.n_tests" = 2\n', ""))
+    with path.open("a") as file:
+        file.write('[[where]]\nmethod = "cone"\nsettings = { "run.n_tests" = 4, genotypes = 8 }\n')
+    plan = read_plan(path)
+    found = [run.configs()[0] for run in plan.at(settings={"generations": 5}).write_out()]
+    assert {(one.run.generations, one.run.epochs) for one in found} == {(5, 2)}
+    assert [one.run.n_tests for one in found[:2]] == [3, 4]
+    assert [one.method_config.genotypes for one in found[:2]] == [6, 8]
+    for twice in ({"generations": 2, "run.generations": 3}, {"epochs": 1}, {"run.epochs": 1}):
+        with pytest.raises(UsageError, match=r"the same setting is given|epochs is a factor in"):
+            plan.at(settings=twice)
+    for more in ("generations = 3", "genotypes = 3"):
+        with pytest.raises(UsageError, match="the same setting is given as gen"):
+            read_plan(write_plan(tmp_path, more=more)).write_out()
+
+
 def test_a_factor_may_belong_to_some_runs_only(tmp_path):
     path = write_plan(tmp_path, factors='"run.epochs" = [1, 3]')
     with path.open("a") as file:

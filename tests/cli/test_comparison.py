@@ -45,6 +45,14 @@ def test_seeds_count_from_the_one_that_is_named(say, tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
+def test_a_setting_may_be_given_without_its_section(say) -> None:
+    words = ["run", TASK, "--preset", "smoke", "--method", "cone,mesp", "--seeds", "1", "--dry-run"]
+    short, full = (say(*words, "--set", f"{key}=2") for key in ("generations", "run.generations"))
+    assert (short.code, short.out) == (0, full.out)
+    both = say(*words, "--set", "generations=2", "--set", "run.generations=3")
+    assert (both.code, "is given as generations, too" in both.err) == (2, True)
+
+
 @pytest.mark.parametrize(
     ("more", "words"),
     [

@@ -25,7 +25,7 @@ from conevo.evolution.methods.registry import MethodEntry, name_in
 from conevo.evolution.methods.registry import resolve as resolve_method
 from conevo.runs.config import RunConfig
 from conevo.runs.first import FIRST, SHARE, resolve_stages, take_first, without_method
-from conevo.runs.layers import PRESETS
+from conevo.runs.layers import PRESETS, overridden, spelt_otherwise, split_keys
 from conevo.runs.shaping import tasks_up_to
 from conevo.worlds.registry import WorldEntry
 from conevo.worlds.registry import resolve as resolve_world
@@ -197,13 +197,18 @@ class Plan:
         """Return the plan with another scale, number of seeds or further settings.
 
         Raises:
-            UsageError: an unknown preset, or fewer than one seed.
+            UsageError: an unknown preset, fewer than one seed, a setting that is given twice, or
+                one that is a factor.
         """
         if preset is not None and preset not in PRESETS:
             raise unknown_name("preset", preset, PRESETS)
         if seeds is not None and not 1 <= seeds <= MOST_SEEDS:
             raise UsageError(f"--seeds {seeds}: a campaign has 1 to {MOST_SEEDS:,} seeds")
+        split_keys(settings or {}, "on the command line", None)  # refuses one that is given twice
         given = {key: located(value, Path.cwd()) for key, value in (settings or {}).items()}
+        for factor in [*self.factors, *(name for one in self.where for name in one.factors)]:
+            if key := factor if factor in given else spelt_otherwise(factor, given):
+                raise UsageError(f"--set {key}: {factor} is a factor {self.place}, with levels")
         forced = () if not given else (Where({}, given),)
         return dataclasses.replace(
             self,
@@ -326,11 +331,12 @@ class Plan:
         """
         found = dict(self.settings)
         for one in self.where:
-            found |= one.settings if one.applies(names) else {}
+            found = overridden(found, one.settings) if one.applies(names) else found
+        of_levels: dict[str, Any] = {}
         for factor, level in further.items():
             settings = self.levels[factor][level] if factor in self.levels else {factor: level}
-            found |= settings if other is None else without_method(settings, other)
-        return found
+            of_levels |= settings if other is None else without_method(settings, other)
+        return overridden(found, of_levels)
 
     @property
     def values(self) -> list[Any]:

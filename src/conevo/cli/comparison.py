@@ -38,6 +38,7 @@ def plan_of(order: Order, config: RunConfig, n_seeds: int, shape: bool) -> Plan:
     from conevo.campaigns.inputs import located
     from conevo.campaigns.plan import Plan
     from conevo.evolution.methods.registry import name_in
+    from conevo.runs.layers import overridden
 
     if order.config is not None:
         raise UsageError("--seeds and --config are mutually exclusive; give settings with --set")
@@ -46,7 +47,7 @@ def plan_of(order: Order, config: RunConfig, n_seeds: int, shape: bool) -> Plan:
     names = [name_in(method) for method in methods]
     settings = dict(order.overrides)
     if len(methods) > 1 and config.preset == "smoke" and not config.run.budget_evaluations:
-        settings |= SMOKE | settings
+        settings = overridden(SMOKE, settings)
     parts = [config.task, *names, config.preset, *(["shaped"] if shape else [])]
     if settings:
         text = json.dumps(settings, sort_keys=True, default=str)

@@ -35,9 +35,11 @@ __all__ = [
     "Value",
     "as_layer",
     "build",
+    "overridden",
     "read_file",
     "read_preset",
     "section_of",
+    "spelt_otherwise",
     "split_keys",
 ]
 
@@ -87,6 +89,17 @@ def as_layer(tables: Mapping[str, Any], place: str, folder: Path | None = None) 
             raise UsageError(f"{section} {place} must be a table: [{section}]")
         layer[section] = {key: Value(value, place, folder) for key, value in values.items()}
     return layer
+
+
+def overridden(settings: Mapping[str, Any], later: Mapping[str, Any]) -> dict[str, Any]:
+    """Return single settings with ``later`` over them: "generations" is also "run.generations"."""
+    return {k: v for k, v in settings.items() if not spelt_otherwise(k, later)} | dict(later)
+
+
+def spelt_otherwise(key: str, settings: Mapping[str, Any]) -> str:
+    """Return the key of the same setting with its section, or without; "" if there is none."""
+    others = {key.partition(".")[2]} if "." in key else {f"{one}.{key}" for one in SECTIONS}
+    return min(others & settings.keys(), default="")
 
 
 def split_keys(
