@@ -20,6 +20,7 @@ from conevo.campaigns.campaign import Campaign
 from conevo.campaigns.tables import RunValue, Tables
 from conevo.cli.lookup import sealed
 from conevo.evolution.methods.registry import METHODS
+from conevo.numbers import plus_minus
 from conevo.report.claims import verdicts
 from conevo.report.files import write_report
 from conevo.report.statistics import compare, holm
@@ -39,7 +40,7 @@ def by_cell(values: list[RunValue]) -> dict[str, dict[str, list[float]]]:
 
 def spread(values: list[float]) -> str:
     """Return mean and standard deviation of runs."""
-    return f"{fmean(values):.4g} ± {stdev(values):.2g}" if len(values) > 1 else f"{values[0]:.4g}"
+    return plus_minus(fmean(values), stdev(values) if len(values) > 1 else None)
 
 
 def p(value: float | None) -> str:
@@ -84,7 +85,9 @@ def performance_table(tables: Tables) -> str:
             share = "-" if not best else f"{100 * fmean(values) / best:.1f} %"
             title = METHODS[method].title
             start = spread(first[task][method])
-            rows.append([task, title, len(values), measure[task], start, spread(values), share])
+            rows.append(
+                [task, title, len(values), measure[task].name, start, spread(values), share]
+            )
     head = ["task", "method", "n", "measure", "generation 0", "champion", "of the optimum"]
     return pages.table(head, rows)
 

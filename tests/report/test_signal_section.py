@@ -57,7 +57,7 @@ def test_comparisons_with_a_blind_method_say_so(folder) -> None:
     for pair, verdict in told.items():
         assert verdict.endswith(", no signal") == ("Multi-Agent ESP" in pair)
     assert "No signal: selection among a method's genotypes was nearly blind" in table.note
-    assert "(reliability below 0.05 at first" in section.text[-1]
+    assert "(reliability below 0.05 first and last" in section.text[-1]
 
 
 def test_without_a_study_there_is_no_section(tmp_path) -> None:

@@ -133,7 +133,7 @@ def _text(found: dict[str, Any]) -> str:
         f"{found['task']}, {title_of(found['method'])}: fitness of a {rows[0]['unit']}",
         table([*head, "rounds for .5"], cells),
     ]
-    if not has_signal(rows[0]["icc_of_scheme"]):
+    if not any(has_signal(row["icc_of_scheme"]) for row in rows):
         lines.append("\nNo signal: selection among these genotypes is nearly blind.")
     for row in rows:
         if row["left_out"]:

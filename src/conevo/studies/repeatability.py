@@ -128,7 +128,6 @@ def has_signal(reliability: float | None) -> bool:
     is 22 % of the gain of an exact fitness.
 
     Args:
-        reliability: of a genotype's fitness in generation 0, by the method's scheme; None if all
-            had the same fitness.
+        reliability: of a genotype's fitness by the method's scheme; None if all had the same.
     """
     return reliability is not None and reliability >= LEAST_RELIABILITY

@@ -17,7 +17,7 @@ BY_ID = {claim.id: claim for claim in CLAIMS}
 
 
 def verdict_of(
-    folder: Path, method: str, first: float | None, last: float | None = 0.9, claim: str = "R9"
+    folder: Path, method: str, first: float | None, last: float | None = 0.0, claim: str = "R9"
 ) -> Verdict:
     """Return the verdict on a claim with studies of signal of one method's runs."""
     columns = ", ".join(f'"{name}" {kind}' for name, kind in SCHEMA["signal"].items())
@@ -42,7 +42,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.parametrize("first", [0.0, 0.0499, -0.1, None])
-def test_a_method_without_signal_in_generation_0_leaves_a_claim_untested(first, folder) -> None:
+def test_a_method_without_signal_first_and_last_leaves_a_claim_untested(first, folder) -> None:
     found = verdict_of(folder, "cone", first)
     assert found.verdict == "not tested: no signal"
     assert "not tested: no signal, fitness carries no information about genotypes" in found.why
@@ -50,7 +50,7 @@ def test_a_method_without_signal_in_generation_0_leaves_a_claim_untested(first, 
 
 def test_with_signal_or_without_a_study_it_is_judged(folder) -> None:
     assert verdict_of(folder, "cone", 0.05).verdict == "reproduced"
-    assert verdict_of(folder, "cone", 0.05, last=0.0).verdict == "reproduced"
+    assert verdict_of(folder, "cone", 0.0, last=0.05).verdict == "reproduced"
     assert verdict_of(folder, "nobody", 0.0).verdict == "reproduced"
 
 

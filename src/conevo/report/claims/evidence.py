@@ -24,8 +24,8 @@ class RunOf(NamedTuple):
     """A run of some method in some environment.
 
     exchanges, exchange_share: as in the table of runs; None of methods that never exchange.
-    reliability: of a genotype's fitness in generation 0, by the method's scheme, 0 if all had the
-    same fitness; None without a study of signal.
+    reliability: of a genotype's fitness by the method's scheme, in the first or the last
+    populations, whichever is larger; 0 if all had the same fitness; None without a study of signal.
     """
 
     run: str
@@ -193,8 +193,8 @@ def read_evidence(tables: Tables) -> list[Evidence]:
     _, rows = tables.query(
         "SELECT world, preset, variant, environment, method, run, seed, budget, exchanges,"
         " exchange_share, reliability FROM runs JOIN budgets USING (run) LEFT JOIN"
-        " (SELECT run, coalesce(icc_of_scheme, 0) AS reliability FROM signal"
-        " WHERE generation = 'first') USING (run) ORDER BY ALL"
+        " (SELECT run, max(coalesce(icc_of_scheme, 0)) AS reliability FROM signal"
+        " GROUP BY run) USING (run) ORDER BY ALL"
     )
     variants: dict[tuple[str, str], dict[str, set[str]]] = defaultdict(lambda: defaultdict(set))
     for world, preset, variant, _, method, *_ in rows:

@@ -45,7 +45,7 @@ def claims(tables: Tables) -> Section:
         "between populations in a generation, and of those that could have; where that is next to "
         "nothing (fewer than one pair, and fewer than a tenth) statements about CONE are not "
         "tested. Nor are statements about methods without signal, where runs have a study of it: "
-        f"reliability of fitness in generation 0 below {LEAST_RELIABILITY}. "
+        f"reliability of fitness below {LEAST_RELIABILITY} in the first and the last populations. "
         "Significant: p < 0.05, by the t-test uncorrected as in the thesis and "
         "by Mann-Whitney with Holm's correction over the claim; alike: no significant difference, "
         "and the interval of the difference inside ±15 % of the larger mean. Power: how often "

@@ -91,8 +91,8 @@ def comparisons(scope: Scope) -> Section | None:
         names = " and ".join(sorted({cell.treatment.title for cell in blind}))
         text.append(
             f"Selection by {names} was nearly blind in {counted(len(blind), 'cell')}"
-            f" (reliability below {LEAST_RELIABILITY} at first, section Signal). Comparisons of "
-            "these cells do not test the methods."
+            f" (reliability below {LEAST_RELIABILITY} first and last, section Signal). Comparisons "
+            "of these cells do not test the methods."
         )
         untested |= dict.fromkeys(blind, NO_SIGNAL)
     exhibits: list[Exhibit] = [

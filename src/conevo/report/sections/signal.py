@@ -23,14 +23,16 @@ class MeasuredSignal(NamedTuple):
     error: float | None = None
     reliability: float | None = None
     rounds: float | None = None
+    best: float | None = None
 
 
 NOTE = (
     "Genotypes of the first and last populations, tried again and again with other partners, in "
     "other scenarios. ICC: intra-class correlation, the share of a trial's fitness that is the "
     "genotype's own, mean of the runs ± its standard error. Reliability: that of the mean of the "
-    "trials that the method gives each genotype, by Spearman-Brown; below {least} at first a "
-    "method has no signal. Rounds for .5: rounds of which the mean would have a reliability of .5."
+    "trials that the method gives each genotype, by Spearman-Brown; below {least} in "
+    "both, a method has no signal. Rounds for .5: rounds of which the mean would have a "
+    "reliability of .5."
 )
 
 
@@ -65,22 +67,24 @@ def signal(scope: Scope) -> Section | None:
 
 
 def blind_cells(scope: Scope) -> set[Cell]:
-    """Return the cells whose runs have studies of signal, and had none at first."""
+    """Return the cells whose runs have studies of signal, and had none first or last."""
     found = _found(scope)
-    return {cell for cell, own in found.items() if not has_signal(own["first"].reliability)}
+    return {cell for cell, own in found.items() if not has_signal(own["first"].best)}
 
 
 def _found(scope: Scope) -> dict[Cell, dict[str, MeasuredSignal]]:
     """Return the signals "first" and "last" of each cell that has any.
 
-    Fitness that is always the same has an ICC and a reliability of 0.
+    Fitness that is always the same has an ICC and a reliability of 0. The best reliability is the
+    larger one of each run.
     """
     found: dict[Cell, dict[str, MeasuredSignal]] = {}
     for cell, generation, *rest in scope.per_cell(
         "SELECT cell, generation, first(unit ORDER BY seed), first(scheme ORDER BY seed), count(*),"
         " avg(coalesce(icc, 0)), sqrt(sum(standard_error ** 2)) / count(standard_error),"
-        " avg(coalesce(icc_of_scheme, 0)), avg(rounds_for_half)"
-        " FROM own JOIN signal USING (run) JOIN runs USING (run)"
+        " avg(coalesce(icc_of_scheme, 0)), avg(rounds_for_half), avg(best)"
+        " FROM own JOIN (SELECT *, max(coalesce(icc_of_scheme, 0)) OVER (PARTITION BY run) AS best"
+        " FROM signal) USING (run) JOIN runs USING (run)"
         " GROUP BY cell, generation ORDER BY cell"
     ):
         found.setdefault(cell, {})[generation] = MeasuredSignal(*rest)
@@ -100,5 +104,5 @@ def _row(scope: Scope, cell: Cell, own: dict[str, MeasuredSignal]) -> dict[str, 
             f"reliability_{generation}": one.reliability,
             f"rounds_{generation}": one.rounds,
         }
-    is_there = has_signal(first.reliability)
+    is_there = has_signal(first.best)
     return row | {"verdict": "signal" if is_there else "not tested: no signal"}
