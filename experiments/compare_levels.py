@@ -13,6 +13,7 @@ marker ``<!-- BASELINE pooled -->`` it also gets one over all cells.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -139,13 +140,16 @@ def comparison_table(rows: Sequence[Row], factor: str, level: str) -> str:
 def pooled_table(rows: Sequence[Row], factor: str, level: str) -> str:
     """Return the mean relative difference over the cells of a comparison.
 
-    A row for each level over all cells, and one for each of its methods. The baseline's mean is
-    taken as exact. Cells with a single run on either side do not count.
+    A row for each level over all cells, and one for each of its methods. Cells with a single run
+    on either side do not count. The intervals are Welch's of ratios, by the delta method: the
+    baseline's standard deviation counts times the ratio.
     """
     pooled: dict[tuple[str, str], list[Comparison]] = {}
     for levels, rest, runs, same in groups(rows, factor, level):
         one = compare(*([float(row["value"]) for row in of] for of in (runs, same)))
         if one.low is not None and one.mean_b:
+            ratio = (one.mean_a or 0.0) / one.mean_b
+            one = replace(one, sd_b=ratio * (one.sd_b or 0.0))
             pooled.setdefault((rest, ""), []).append(one)
             if "method" in levels:
                 pooled.setdefault((rest, title_of(levels["method"])), []).append(one)

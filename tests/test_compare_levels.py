@@ -48,14 +48,18 @@ def test_a_level_is_compared_with_the_baseline_where_all_else_agrees():
 
 
 def test_cells_are_pooled_as_shares_of_their_baselines():
-    """CCGA +20 of 101.5, Multi-Agent ESP -10 of 51.5; each mean of two has the variance 1/4."""
+    """CCGA +20 of 101.5, Multi-Agent ESP -10 of 51.5; each mean of two has the variance 1/4;
+
+    that of a baseline counts times the square of the ratio.
+    """
     whole, ccga, mesp = lines(pooled_table(CREDIT, "credit", "equation"))
     shares = (20 / 101.5, -10 / 51.5)
     assert whole[:4] == ["value", "all", "2", f"{100 * sum(shares) / 2:+.1f} %"]
     assert ccga[1:4] == ["CCGA", "1", f"{100 * shares[0]:+.1f} %"]
     assert mesp[1:4] == ["Multi-Agent ESP", "1", f"−{-100 * shares[1]:.1f} %"]
-    variances = [0.25 * 2 / (2 * base) ** 2 for base in (101.5, 51.5)]
-    freedom = sum(variances) ** 2 / sum(2 * (v / 2) ** 2 for v in variances)
+    own = [0.25 / (2 * base) ** 2 for base in (101.5, 51.5)]
+    variances = own + [(1 + share) ** 2 * v for share, v in zip(shares, own, strict=True)]
+    freedom = sum(variances) ** 2 / sum(v**2 for v in variances)
     reach = t.ppf(0.975, freedom) * math.sqrt(sum(variances))
     low, high = (100 * (sum(shares) / 2 + sign * reach) for sign in (-1, 1))
     assert whole[4] == f"−{-low:.1f} % to {high:+.1f} %"
