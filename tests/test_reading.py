@@ -65,11 +65,14 @@ def test_only_regular_files_are_opened_and_nothing_waits(tmp_path: Path) -> None
 def test_what_the_system_refuses_is_the_machines_fault(tmp_path: Path) -> None:
     (tmp_path / "loop").symlink_to(tmp_path / "loop")
     for path, words in (
-        ("none", "No such file"),
         ("loop", "Too many levels"),
         ("a" * 300, "too lo"),
     ):
         with pytest.raises(EnvironmentFailure, match=f"cannot read .*: .*{words}"):
+            read_bytes(tmp_path / path)
+    for path, words in (("none", "No such file"), ("file/x", "Not a directory")):
+        (tmp_path / "file").touch()
+        with pytest.raises(UsageError, match=f"cannot read .*{path}: {words}"):
             read_bytes(tmp_path / path)
     with pytest.raises(UsageError, match=r"null (byte|character)"):
         read_bytes(tmp_path / "a\0b")

@@ -84,6 +84,7 @@ def read_bytes(path: Path, limit: int = MOST_ARRAYS, name: str = "") -> bytes:
 
     Raises:
         DamagedFile: it is not a regular file, or is larger.
+        UsageError: there is no such file.
         EnvironmentFailure: it cannot be read.
     """
     name = name or str(path)
@@ -99,6 +100,7 @@ def _opened(path: Path, name: str) -> Iterator[BinaryIO]:
 
     Raises:
         DamagedFile: it is not a regular file.
+        UsageError: there is no such file.
         EnvironmentFailure: it cannot be read.
     """
     try:
@@ -109,7 +111,9 @@ def _opened(path: Path, name: str) -> Iterator[BinaryIO]:
             _refuse_special(os.fstat(handle), name)
             yield file
     except OSError as error:
-        raise EnvironmentFailure(f"cannot read {name}: {error.strerror or error}") from error
+        is_missing = isinstance(error, FileNotFoundError | NotADirectoryError)
+        failure = UsageError if is_missing else EnvironmentFailure
+        raise failure(f"cannot read {name}: {error.strerror or error}") from error
     except ValueError as error:  # a null byte in the path
         raise UsageError(f"cannot read {shown(name)}: {error}") from error
 

@@ -5,7 +5,7 @@ import pytest
 
 from campaigns.plans import write_plan
 from conevo.campaigns.plan_file import preset_names, read_plan, read_preset
-from conevo.errors import EnvironmentFailure, UsageError
+from conevo.errors import UsageError
 from conevo.runs.layers import PRESETS
 
 SCALES = ("smoke", "thesis")
@@ -259,8 +259,8 @@ def test_a_wrong_plan_is_one_clear_line(tmp_path, old, new, says):
     assert "\n" not in str(caught.value)
 
 
-def test_a_plan_that_cannot_be_read_is_the_machine_s_fault(tmp_path):
-    with pytest.raises(EnvironmentFailure, match="No such file"):
+def test_a_plan_that_is_not_there_is_a_wrong_request(tmp_path):
+    with pytest.raises(UsageError, match="No such file"):
         read_plan(tmp_path / "none.toml")
 
 

@@ -224,7 +224,7 @@ def test_a_dry_run_prints_every_run_and_writes_nothing(conevo, tmp_path):
         ("campaign start rover-complex --address auto", "only the executor ray"),
         ("campaign start rover-complex --store s3://x", "only the executor ray"),
         ("campaign start rover-complex --cores 1 --threads 2", "--threads 2"),
-        ("campaign start rover-complex --json --quiet", "are mutually exclusive"),
+        ("campaign start rover-complex --json --quiet", "are mutually exclusive: give one of them"),
         ("campaign status tin", "unknown campaign 'tin' in campaigns/; did you mean 'tiny'"),
         ("campaign slurm rover-complex --hours 0.01", "--hours 0.01: must be from 0.1"),
         ("campaign slurm rover-complex --mem 8'G", "is not an option for sbatch"),
@@ -236,7 +236,7 @@ def test_a_dry_run_prints_every_run_and_writes_nothing(conevo, tmp_path):
         ("query tin SELECT", "did you mean 'tiny'"),
         ("query tiny SELECT", "no finished run yet"),
         ("query a b c", "a campaign and one SQL text"),
-        ("query tiny SELECT --csv --json", "are mutually exclusive"),
+        ("query tiny SELECT --csv --json", "are mutually exclusive: give one of them"),
         ("show campaigns/tiny", "is a campaign"),
         ("run rover/complex-1 --out campaigns/tiny", "already holds a campaign"),
     ],
@@ -245,7 +245,7 @@ def test_a_wrong_word_is_one_clear_line_and_nothing_is_written(conevo, tmp_path,
     tiny_campaign(tmp_path / "campaigns")
     before = sorted(tmp_path.rglob("*"))
     code, out, err = conevo(*words.split())
-    assert code == (3 if "cannot read" in says else 2)
+    assert code == 2
     assert out == ""
     assert says in err
     assert len(err.splitlines()) == 1

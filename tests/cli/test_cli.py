@@ -106,7 +106,20 @@ def test_show_finds_a_run_by_the_beginning_of_its_name(say) -> None:
 def test_show_says_so_if_a_sealed_file_was_changed(say, tmp_path: Path) -> None:
     run = evolve_tiny(tmp_path / "run")
     (run.path / "champion.npz").write_bytes(b"")
-    assert "modified since the run: champion.npz" in say("show", "run").out
+    assert "modified since the run: champion.npz\n" in say("show", "run").out
+    (run.path / "test.json").unlink()
+    assert "; modified since the run: champion.npz; missing: test.json\n" in say("show", "run").out
+    (run.path / "champion.npz").unlink()
+    assert "; missing: champion.npz, test.json\n" in say("show", "run").out
+
+
+@pytest.mark.parametrize("name", ["provenance.json", "generations.jsonl"])
+@pytest.mark.parametrize("verb", ["show run", "resume run --generations 9"])
+def test_a_run_that_lost_its_records_is_damaged(say, tmp_path: Path, verb: str, name: str) -> None:
+    (evolve_tiny(tmp_path / "run").path / name).unlink()
+    said = say(*verb.split())
+    assert (said.code, said.err.count("\n")) == (2, 1)
+    assert "is damaged: it has lost its" in said.err
 
 
 def test_test_prints_fresh_scenarios(say, tmp_path: Path) -> None:
@@ -171,7 +184,7 @@ BAD = [
     (["run", TASK, "--threads", "0"], "0 is not in the range 1<=x<=4096"),
     (["run", TASK, "--budget-evaluations", "-5"], "run.budget_evaluations = -5"),
     (["run", TASK, "--preset", "smoke", "--budget-evaluations", "5"], "does not pay for one"),
-    (["run", TASK, "--json", "--quiet"], "are mutually exclusive"),
+    (["run", TASK, "--json", "--quiet"], "are mutually exclusive: give one of them"),
     (["run", TASK, "--sed", "1"], "--sed"),
     (["rum", TASK], "did you mean 'run'"),
     (["resume", "nothing"], "unknown run 'nothing'"),
@@ -219,17 +232,39 @@ def test_a_configuration_without_a_world_is_named(say, tmp_path: Path) -> None:
 
 
 def test_what_the_machine_refuses_is_one_line_with_code_3(say, tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("")
     for arguments, words in (
-        (tiny("--out", "file/run"), "cannot write file/run: "),
         (tiny("--out", "/proc/run"), "cannot write /proc/run: "),
-        (tiny("--config", "none.toml"), "cannot read none.toml: No such file"),
+        (tiny("--config", "a" * 300), "cannot read aaa"),
     ):
         said = say(*arguments)
         assert said.code == 3
         assert said.err.startswith("conevo: error: ")
         assert said.err.count("\n") == 1
         assert words in said.err
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (tiny("--out", "file/run"), "file is a file, not a directory"),
+        (tiny("--out", "file/run/x", "--dry-run"), "file is a file, not a directory"),
+        (tiny("--seeds", "1", "--out", "file/x"), "file is a file, not a directory"),
+        (tiny("--config", "none.toml"), "cannot read none.toml: No such file"),
+        (tiny("--config", "file/x.toml"), "cannot read file/x.toml: Not a directory"),
+        (["run", "pursuit/team-2", "--prey", "none.npz"], "cannot read none.npz: No such file"),
+        (["run", "none.py:dark-1"], "cannot read the world file none.py: No such file"),
+        (["check", "none.py"], "cannot read the world file none.py: No such file"),
+        (["campaign", "start", "none.toml"], "cannot read none.toml: No such file"),
+    ],
+)
+def test_a_path_that_is_not_there_is_a_wrong_request(say, tmp_path, words, says) -> None:
+    (tmp_path / "file").write_text("")
+    said = say(*words)
+    assert said.code == 2
+    assert said.err.startswith("conevo: error: ")
+    assert said.err.count("\n") == 1
+    assert says in said.err
     assert [p.name for p in tmp_path.iterdir()] == ["file"]
 
 
@@ -321,7 +356,7 @@ def test_a_run_begins_with_what_another_one_ended_with(say) -> None:
         assert (said.code, said.err) == (0, "")
         assert words in say("show", option[2:]).out
     both = say("run", "rover/complex-2", *same, "--from", "first", "--from-champion", "first")
-    assert (both.code, "mutually exclusive" in both.err) == (2, True)
+    assert (both.code, "mutually exclusive: give one of them" in both.err) == (2, True)
     noisy = ("run", "rover/complex-2", *same, "--set", "method.start_noise=.02", "--out", "noisy")
     for more in ((), ("--from", "first"), ("--dry-run",), ("--shape",), ("--shape", "--dry-run")):
         said = say(*noisy, *more)

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from conevo.errors import EnvironmentFailure, UsageError
+from conevo.errors import UsageError
 from conevo.playback.quantized import Channel
 from conevo.replay.trajectory import Trajectory
 from conevo.rng import fold
@@ -166,8 +166,8 @@ def test_another_file_is_not_replaced(tmp_path):
     assert path.read_text() == "mine"
 
 
-def test_a_missing_file_is_the_machines_fault(tmp_path):
-    with pytest.raises(EnvironmentFailure, match=r"none\.npz: No such file"):
+def test_a_missing_file_is_a_wrong_request(tmp_path):
+    with pytest.raises(UsageError, match=r"none\.npz: No such file"):
         Trajectory.load(tmp_path / "none.npz")
 
 

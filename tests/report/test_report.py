@@ -284,6 +284,8 @@ def test_only_an_unchanged_report_is_replaced(tmp_path) -> None:
     (tmp_path / "own" / "thesis.tex").write_text("mine")
     with pytest.raises(UsageError, match="is not a report"):
         write_report(Campaign(root), tmp_path / "own")
+    with pytest.raises(UsageError, match=r"thesis\.tex is a file, not a directory"):
+        write_report(Campaign(root), tmp_path / "own" / "thesis.tex" / "report")
     assert (tmp_path / "own" / "thesis.tex").read_text() == "mine"
     assert sorted(path.name for path in tmp_path.iterdir()) == ["camp", "other", "out", "own"]
 

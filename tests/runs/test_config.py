@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from conevo.errors import EnvironmentFailure, UsageError
+from conevo.errors import UsageError
 from conevo.evolution.methods.registry import METHODS
 from conevo.runs.assignments import parse_assignment
 from conevo.runs.config import resolve
@@ -238,8 +238,8 @@ def test_bad_file_is_named(text: str, words: list[str], tmp_path: Path) -> None:
         assert word in str(caught.value)
 
 
-def test_missing_file_is_an_environment_failure(tmp_path: Path) -> None:
-    with pytest.raises(EnvironmentFailure, match=r"none\.toml: No such file"):
+def test_a_missing_file_is_a_wrong_request(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match=r"none\.toml: No such file"):
         resolve(TASK, file=tmp_path / "none.toml")
 
 

@@ -305,7 +305,7 @@ def test_a_lost_or_damaged_origin_is_not_silently_replaced(tmp_path: Path) -> No
     with pytest.raises(UsageError, match=r"origin\.npz is damaged"):
         shaping.resume(threads=1)
     (stage / "origin.npz").unlink()
-    with pytest.raises(EnvironmentFailure, match=r"cannot read .*origin\.npz"):
+    with pytest.raises(UsageError, match=r"cannot read .*origin\.npz"):
         shaping.resume(threads=1)
 
 

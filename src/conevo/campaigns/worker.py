@@ -147,7 +147,11 @@ def core_seconds() -> float:
 def _describe(error: BaseException) -> dict[str, str]:
     """Return the origin and message of an error, and the traceback of one that is unexpected."""
     if isinstance(error, ConevoError):
-        origin = "machine" if isinstance(error, EnvironmentFailure) else "request"
+        # A file that was there when the campaign started may be missing on one machine only.
+        is_machine = isinstance(error, EnvironmentFailure) or isinstance(
+            error.__cause__, FileNotFoundError
+        )
+        origin = "machine" if is_machine else "request"
         return {"origin": origin, "message": str(error), "traceback": ""}
     trace = traceback.format_exc()
     if line := line_of(error):

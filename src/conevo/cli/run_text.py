@@ -20,6 +20,7 @@ from conevo.runs.outline import Outline
 from conevo.runs.provenance import declared
 from conevo.runs.records import own_numbers
 from conevo.runs.run import Run
+from conevo.runs.shaping import Shaping
 from conevo.studies.exchange import exchanged, per_generation
 from conevo.terms import S_SCALE, counted, quoted
 
@@ -30,6 +31,7 @@ __all__ = [
     "heading_of",
     "measures_text",
     "run_text",
+    "seal_text",
     "spaced",
     "state_text",
     "title",
@@ -146,14 +148,24 @@ def _former_test(run: Run) -> list[str]:
     return [f"Of the former length, {length}; the new one is tested when it is finished:"]
 
 
+def seal_text(found: Run | Shaping) -> str:
+    """Return the names of files that were modified or are gone since the seal, "" without any."""
+    changed = found.changed_files
+    missing = [name for name in changed if not (found.path / name).is_file()]
+    kinds = {
+        "modified since the run": [name for name in changed if name not in missing],
+        "missing": missing,
+    }
+    return "".join(f"; {kind}: {', '.join(names)}" for kind, names in kinds.items() if names)
+
+
 def state_text(run: Run) -> str:
     """Return a run's directory, state and cost in two lines."""
     records, about = run.generations(), run.provenance
     state = run.status
     if state == "finished":
         state += f" {about['finished']} (stopped by: {about['stopped_by']})"
-        changed = run.changed_files
-        state += f"; modified since the run: {', '.join(changed)}" if changed else ""
+        state += seal_text(run)
     planned, budget = run.outline.generations, run.outline.budget_evaluations
     evaluations = records[-1]["team_evaluations"] if records else 0
     done = progress(len(records), planned, evaluations, budget)

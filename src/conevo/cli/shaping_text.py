@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from conevo.cli.format import progress, table
-from conevo.cli.run_text import controlled, generations_table, spaced, title
+from conevo.cli.run_text import controlled, generations_table, seal_text, spaced, title
 from conevo.cli.testing_text import measures_of, spreads
 from conevo.evolution.methods.registry import title_of
 from conevo.numbers import duration, number
@@ -27,8 +27,7 @@ def shaping_text(shaping: Shaping, n_rows: int = 0) -> str:
             none.
     """
     stages = shaping.stages
-    state, changed = shaping.status, shaping.changed_files
-    state += f"; modified since the run: {', '.join(changed)}" if changed else ""
+    state = shaping.status + seal_text(shaping)
     records = shaping.generations()
     seconds = sum(record["seconds"] for record in records)
     parts = [

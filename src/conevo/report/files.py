@@ -51,7 +51,7 @@ from conevo.report.sections.performance import performance
 from conevo.report.sections.scope import Scope, scopes
 from conevo.report.sections.signal import signal
 from conevo.runs.drafts import draft_of
-from conevo.runs.durable import writing
+from conevo.runs.durable import refuse_inside_file, writing
 
 __all__ = ["sections_of", "write_report"]
 
@@ -221,11 +221,12 @@ def _inline(figure: Figure) -> str:
 
 
 def _refuse_changed(out: Path) -> None:
-    """Refuse to replace anything but a report as it was written.
+    """Refuse to replace anything but a report as it was written, or to write inside a file.
 
     Raises:
         UsageError: it is something else, or was changed.
     """
+    refuse_inside_file(out)
     if not out.exists() or (out.is_dir() and not any(out.iterdir())):
         return
     manifest = out / MANIFEST

@@ -23,7 +23,13 @@ from conevo.errors import EnvironmentFailure, UsageError
 from conevo.reading import read_bytes, read_json, read_text
 from conevo.runs import locks
 from conevo.runs.drafts import draft_of, remove_abandoned, remove_torn
-from conevo.runs.durable import is_there, replace_file, sync_directory, writing
+from conevo.runs.durable import (
+    is_there,
+    refuse_inside_file,
+    replace_file,
+    sync_directory,
+    writing,
+)
 from conevo.terms import quoted
 
 __all__ = [
@@ -81,12 +87,13 @@ def _appear(draft: Path, path: Path) -> None:
 
 
 def refuse_existing(path: Path, *, is_new: bool = False) -> None:
-    """Raise UsageError, with advice, if a path exists and is not an empty directory.
+    """Raise UsageError, with advice, if a path is inside a file, or is not an empty directory.
 
     Args:
         path: of a directory.
         is_new: whether it did not exist a moment ago, so that another process is creating it.
     """
+    refuse_inside_file(path)
     if not is_there(path) or (path.is_dir() and not any(path.iterdir())):
         return
     kind = kind_of(path)

@@ -15,6 +15,7 @@ __all__ = [
     "append_line",
     "appearing_file",
     "refuse_file",
+    "refuse_inside_file",
     "replace_file",
     "sync_directory",
     "sync_file",
@@ -92,9 +93,17 @@ def is_there(path: Path) -> bool:
 
 
 def refuse_file(path: Path) -> None:
-    """Raise UsageError if there is something at ``path`` already."""
+    """Raise UsageError if there is something at ``path`` already, or it is inside a file."""
+    refuse_inside_file(path)
     if is_there(path):
         raise UsageError(f"{path} exists already; choose another place with --out, or remove it")
+
+
+def refuse_inside_file(path: Path) -> None:
+    """Raise UsageError if a file is in the place of a directory that is to contain ``path``."""
+    for folder in path.parents:
+        if os.path.exists(folder) and not os.path.isdir(folder):
+            raise UsageError(f"{folder} is a file, not a directory")
 
 
 def append_line(path: Path, line: str) -> None:

@@ -158,10 +158,12 @@ class Store(Directory):
         """Return versions, machine and sessions.
 
         Raises:
-            DamagedFile: it is damaged, or lacks the end of a run that is sealed.
+            DamagedFile: it is lost or damaged, or lacks the end of a run that is sealed.
         """
         from conevo.runs.records import Provenance
 
+        if not os.path.lexists(self.path / PROVENANCE):
+            raise DamagedFile(f"{self.path} is damaged: it has lost its {PROVENANCE}")
         ending = ("finished", "stopped_by") if self.is_finished else ()  # written before the seal
         about, extension = read_json(self.path / PROVENANCE, Provenance), self._read_extension()
         for key in ending:
@@ -409,8 +411,7 @@ class Store(Directory):
             method, blank: as for ``load_checkpoint``.
 
         Raises:
-            UsageError: the file is damaged or foreign.
-            EnvironmentFailure: the file is lost.
+            UsageError: the file is lost, damaged or foreign.
         """
         if "origin" not in self.read_provenance():
             return None
