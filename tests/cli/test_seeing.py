@@ -219,7 +219,10 @@ BAD = [
     ),
     (("replay", "epoch.npz", "--beside", "e1.npz"), "shown side by side: different scenarios"),
     (("replay", "runs"), "is not a run"),
-    (("film", "cone", "--gif", "--mp4"), "--gif, --mp4 and --poster are mutually exclusive"),
+    (
+        ("film", "cone", "--gif", "--mp4"),
+        "--gif, --mp4 and --poster are mutually exclusive: give one of them",
+    ),
     (("film", "cone", "--gif", "--out", "a.mp4"), "a.mp4"),
     (("film", "cone", "--out", "a.avi"), "a.avi"),
     (("film", "cone", "--out", "a.png"), "--poster"),

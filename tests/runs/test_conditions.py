@@ -94,7 +94,7 @@ def test_what_cannot_be_played_is_one_line(run: conevo.Run) -> None:
         ({"world": {"world.itertions": 3}}, "did you mean 'world.iterations'"),
         ({"world": {"world.iterations": 0}}, "must be"),
         ({"robots": 10_000}, "n_robots = 10000"),
-        ({"rotate": 3}, "rotate = 3: must be a whole number from 0 to 2, .*number of robots, 3"),
+        ({"rotate": 3}, "rotate = 3: must be a whole number from 1 to 2, .*number of robots, 3"),
         ({"rotate": -1}, "rotate = -1: must be"),
         ({"rotate": 1.5}, "rotate = 1.5: must be a whole number"),
         ({"rotate": "1"}, "rotate = '1': must be a whole number"),

@@ -66,7 +66,7 @@ def film(
 
     wanted = {"gif": gif, "mp4": mp4, "png": poster is not None}
     if sum(wanted.values()) > 1:
-        raise UsageError("--gif, --mp4 and --poster are mutually exclusive")
+        raise UsageError("--gif, --mp4 and --poster are mutually exclusive: give one of them")
     kind = choose_format(out, next((name for name in wanted if wanted[name]), ""))
     if out:
         refuse_file(Path(out))

@@ -108,7 +108,9 @@ class Order:
     def _refuse_twice(self, key: str, option: str, value: Any) -> None:
         given = {key, key.partition(".")[2]} & set(self.overrides)
         if value is not None and given:
-            raise UsageError(f"{option} and --set {given.pop()} are mutually exclusive")
+            raise UsageError(
+                f"{option} and --set {given.pop()} are mutually exclusive: give one of them"
+            )
 
     @property
     def methods(self) -> tuple[str, ...]:

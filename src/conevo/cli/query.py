@@ -30,7 +30,7 @@ def query(arguments: tuple[str, ...], as_csv: bool, as_json: bool) -> None:
     from conevo.errors import UsageError
 
     if as_csv and as_json:
-        raise UsageError("--csv and --json are mutually exclusive")
+        raise UsageError("--csv and --json are mutually exclusive: give one of them")
     if len(arguments) > 2:
         raise UsageError('query takes a campaign and one SQL text: conevo query NAME "SELECT ..."')
     found = find_campaign(arguments[0]) if len(arguments) == 2 else only_campaign()

@@ -61,7 +61,7 @@ def run(
     Try: conevo run rover/complex-1 --method cone,homcne --seeds 3
     """
     if origin is not None and champion is not None:
-        raise UsageError("--from and --from-champion are mutually exclusive")
+        raise UsageError("--from and --from-champion are mutually exclusive: give one of them")
     if (origin or champion) and (shape or seeds is not None):
         raise UsageError("--from and --from-champion start one run: leave out --shape and --seeds")
     if first is not None and (shape or origin or champion or seeds is not None):

@@ -91,7 +91,7 @@ def drop_output() -> None:
 def style_of(as_json: bool, quiet: bool, verbose: bool) -> str:
     """Return the style of reports: "json", "quiet", "verbose", "live" (a terminal) or "plain"."""
     if as_json + quiet + verbose > 1:
-        raise UsageError("--json, --quiet and --verbose are mutually exclusive")
+        raise UsageError("--json, --quiet and --verbose are mutually exclusive: give one of them")
     if as_json or quiet or verbose:
         return "json" if as_json else "quiet" if quiet else "verbose"
     return "live" if sys.stdout.isatty() else "plain"

@@ -75,7 +75,9 @@ def test(
     is_changed = on is not None or bool(settings) or robots is not None or rotate is not None
     if stages:
         if is_changed:
-            raise UsageError("--stages and --on, --set, --robots or --rotate exclude each other")
+            raise UsageError(
+                "--stages and --on, --set, --robots or --rotate exclude each other: leave one out"
+            )
         shaping = find_shaping(run)
         for stage in shaping.stages[-1:]:
             note_other_code(stage)

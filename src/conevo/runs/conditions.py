@@ -140,8 +140,10 @@ def _changed(
 
 def _refuse_rotation(rotate: int, n_robots: int) -> None:
     if type(rotate) is not int or not 0 <= rotate < n_robots:
+        if n_robots == 1:
+            raise UsageError(f"rotate = {rotate!r}: a team of one robot has nothing to rotate")
         raise UsageError(
-            f"rotate = {rotate!r}: must be a whole number from 0 to {n_robots - 1}, less than the "
+            f"rotate = {rotate!r}: must be a whole number from 1 to {n_robots - 1}, less than the "
             f"number of robots, {n_robots}"
         )
 
