@@ -186,13 +186,21 @@ def test_every_tested_robot_has_a_favourite_and_its_share(
         _ = conevo.Run(run.path).test_result
 
 
-@pytest.mark.parametrize("out", ["file/run", "/proc/run", "/dev/null/run"])
-def test_a_place_that_cannot_be_written_is_an_environment_failure(out: str, tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("")
+def test_a_place_that_cannot_be_written_is_an_environment_failure(tmp_path: Path) -> None:
     with pytest.raises(EnvironmentFailure) as caught:
-        fresh_store(tmp_path / out)
+        fresh_store(Path("/proc/run"))
     assert caught.value.exit_code == 3
-    assert f"cannot write {tmp_path / out}: " in str(caught.value)
+    assert "cannot write /proc/run: " in str(caught.value)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("out", ["file/run", "/dev/null/run"])
+def test_a_place_inside_a_file_is_a_wrong_request(out: str, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(UsageError) as caught:
+        fresh_store(tmp_path / out)
+    assert caught.value.exit_code == 2
+    assert str(caught.value) == f"{(tmp_path / out).parent} is a file, not a directory"
     assert [p.name for p in tmp_path.iterdir()] == ["file"]
 
 
