@@ -23,7 +23,7 @@ OTHER = "this machine has no 'cuda:1', on which the run was last played: it is p
 
 @pytest.fixture(autouse=True)
 def nothing_said_before():
-    provenance._say_that_there_is_no.cache_clear()
+    provenance._warn_of_missing.cache_clear()
 
 
 def begun(path: Path, device: str, generations: int = 5) -> conevo.Run:
