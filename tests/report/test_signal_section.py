@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import duckdb
 import pytest
 
 from conevo.campaigns.campaign import Campaign
@@ -45,6 +46,26 @@ def test_every_method_with_a_study_has_its_signal(folder) -> None:
         "is nearly blind, and comparisons of these cells hardly test methods."
     ]
     assert [cell.treatment.method for cell in blind] == ["mesp"]
+
+
+def test_signal_in_the_last_populations_alone_is_enough(tmp_path) -> None:
+    cell = Cell("rover", "complex-1", "mesp", reliability=0.08)
+    root = write_campaign(tmp_path / "c", [cell], 2, 2)
+    stored = root / "tables" / "signal.parquet"
+    with duckdb.connect() as connection:  # .08 first and .04 last, the other way round
+        connection.execute(
+            f"CREATE TABLE swapped AS SELECT * REPLACE (CASE generation WHEN 'first' THEN 'last'"
+            f" ELSE 'first' END AS generation) FROM '{stored}'"
+        )
+        connection.execute(f"COPY swapped TO '{stored}' (FORMAT parquet)")
+    with Tables(root / "tables") as tables:
+        (scope,) = scopes(tables)
+        section = signal(scope)
+        blind = blind_cells(scope)
+    assert section is not None
+    (row,) = section.exhibits[0].rows
+    assert row["reliability_first"] == pytest.approx(0.04)
+    assert (row["verdict"], blind) == ("signal", set())
 
 
 def test_comparisons_with_a_blind_method_say_so(folder) -> None:

@@ -92,11 +92,11 @@ def sizes(cells: Sequence[Answer]) -> str:
 def counts(cells: Sequence[Answer]) -> list[str]:
     """Return the number of statements that hold (by Mann-Whitney and Holm), and the others."""
     of = {outcome: [c for c in cells if c.by_rank is outcome] for outcome in Decision}
-    told = [f"{len(of[Decision.HOLDS])} of {len(cells)} hold"]
+    parts = [f"{len(of[Decision.HOLDS])} of {len(cells)} hold"]
     if worst := sorted(of[Decision.CONTRADICTED], key=lambda cell: cell.weight):
         names = [f"{place_of(cell.statement)} {what_of(cell.statement)}" for cell in worst]
-        told.append(f"{len(worst)} contradicted ({'; '.join(_few(names))})")
-    return told + [f"{len(of[one])} {why}" for one, why in UNDECIDED.items() if of[one]]
+        parts.append(f"{len(worst)} contradicted ({'; '.join(_few(names))})")
+    return parts + [f"{len(of[one])} {why}" for one, why in UNDECIDED.items() if of[one]]
 
 
 def power(found: float | None) -> list[str]:

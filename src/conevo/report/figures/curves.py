@@ -128,7 +128,7 @@ def lines(
             field.title(*place, title)
         field.frame(used, closed=False)
         field.ticks_below(used, x_ticks, inside=columns > 1)
-        field.ticks_beside(used, y_ticks)
+        field.ticks_at_sides(used, y_ticks)
         name_axes(figure, x_label, y_label)
         put_legend(figure, signs)
         return saved(figure)

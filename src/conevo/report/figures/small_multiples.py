@@ -101,7 +101,7 @@ class Panels:
                 low = up - 1.6 * long
                 self.axes.text(across, low, short(value), ha=side, va="top", fontsize=SMALL)
 
-    def ticks_beside(self, used: Sequence[tuple[int, int]], values: Sequence[float]) -> None:
+    def ticks_at_sides(self, used: Sequence[tuple[int, int]], values: Sequence[float]) -> None:
         """Mark values on the vertical axes, and name them left of the first column."""
         long = TICK / self.shape[0]
         marks, left = np.array(values, dtype=np.float64), np.full(len(values), self.x[0])
