@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from conevo import numbers
 from conevo.replay.page import replay_page
 from conevo.runs.outline import digest_of
 from conevo.watch.server import LiveServer
@@ -23,6 +24,7 @@ from conevo.watch.state import Watched
 from replay.synthetic import made_up
 from replay.viewing import hexadecimal, inside, overflow, pixels, until
 from runs.tiny import evolve_tiny
+from watch.followed import append, record, write_run
 
 pytest_plugins = ["replay.browser"]
 pytestmark = pytest.mark.browser
@@ -144,6 +146,17 @@ def test_every_run_is_listed_as_it_stands(live, runs):
     assert "damaged" in found["broken"]["run"] or "config" in found["broken"]["run"]
     assert "1 finished, 1 running, 1 interrupted, 1 damaged" in live.inner_text("#summary")
     live.screenshot(path=runs / "overview.png")
+
+
+def test_numbers_look_as_in_every_command(tab, tmp_path):
+    values = [0.0, 0.25, 4e-4, -0.00012345, 9.99996e-5, 4e-5, -1.25e-12, 999.96, 1234567.8, 2.5e9]
+    for value in values:
+        append(write_run(tmp_path / f"{value}", n=0), record(0, team_fitness=value))
+    with served(tmp_path) as address:
+        tab.goto(address)
+        tab.wait_for_selector("#runs tr[data-label]")
+        shown = {label: row["fitness"] for label, row in table(tab).items()}
+    assert shown == {f"{value}": numbers.number(value) for value in values}
 
 
 def test_a_new_generation_appears_without_reloading(live, runs, evolved):

@@ -1,11 +1,12 @@
 // Numbers, times and states as text.
 
-/** Return a number with four significant digits, "–" for none. */
+/** Return a number as `conevo.numbers` writes it: four significant digits, "1,234", "4e-05"; "–" for none. */
 export function number(value: number | null | undefined): string {
   if (value === null || value === undefined || !Number.isFinite(value)) return "–";
-  if (value !== 0 && Math.abs(value) < 1e-3) return value.toExponential(2);
-  if (Math.abs(value) >= 1e7) return value.toExponential(3);
-  return Math.abs(value) >= 1000 ? count(value) : String(Number(value.toPrecision(4)));
+  if (Math.abs(value) >= 1000 && Math.abs(value) < 1e7) return count(value);
+  const rounded = Number(value.toPrecision(4));
+  if (rounded === 0 || (Math.abs(rounded) >= 1e-4 && Math.abs(rounded) < 1e7)) return String(rounded);
+  return rounded.toExponential().replace(/(?<=e[+-])(?=\d$)/, "0"); // exponents have two digits
 }
 
 /** Return a whole number with separated thousands. */
