@@ -39,6 +39,10 @@ CHECKED = (
     "src/conevo/studies/*.py",
     "src/conevo/watch/*.py",
     "src/conevo/worlds/**/*.py",
+    "tests/fuzz/*.py",
+    "tests/golden/*.py",
+    "tests/kernels/*.py",
+    "tests/watch/*.py",
     "viewer/*.py",
 )
 # Each phrase, a regular expression in which a space is any white space, and what to write.

@@ -1,4 +1,4 @@
-"""What happens to files: seeded, so that any of it can be made again from its number."""
+"""Kinds of damage to files: seeded, so that each can be repeated from its number."""
 
 from __future__ import annotations
 
@@ -58,14 +58,14 @@ def flip(path: Path, rng: random.Random) -> str:
 
 
 def cut(path: Path, rng: random.Random) -> str:
-    """Take the end off."""
+    """Cut off the end."""
     data = path.read_bytes()
     path.write_bytes(data[: rng.randrange(len(data) + 1)])
     return "cut"
 
 
 def content(path: Path, rng: random.Random) -> str:
-    """Put other content in its place."""
+    """Replace the content."""
     found = rng.choice((
         b"", b"\n", b"{}", b"[]", b"null", b"3", b'"x"', b"\0" * 100, b"{" , NESTED,
         b'{"a": ' * 50_000, b"a = " + NESTED, b"{}\n" * 3, rng.randbytes(300), b"9" * 5000,
@@ -77,7 +77,7 @@ def content(path: Path, rng: random.Random) -> str:
 
 
 def place(path: Path, rng: random.Random) -> str:
-    """Put something in its place that is not a file."""
+    """Replace it with something that is not a file."""
     how = rng.choice(("none", "folder", "pipe", "device", "dangling", "loop", "socket", "hole"))
     path.unlink()
     if how == "folder":
@@ -138,7 +138,7 @@ def mutate_json(path: Path, rng: random.Random) -> str:
 
 
 def mutate_toml(path: Path, rng: random.Random) -> str:
-    """Drop, double or change a line."""
+    """Remove, repeat or change a line."""
     lines = path.read_text().splitlines()
     at = rng.randrange(len(lines))
     how = rng.choice(("drop", "double", "value", "value", "value", "rename"))
@@ -213,7 +213,7 @@ def packed_zeros(size: int, says: int) -> bytes:
 
 
 def bomb(path: Path, rng: random.Random) -> str:
-    """Let it unpack to three GB."""
+    """Make it unpack to three GB."""
     path.write_bytes(packed_zeros(3 * 2**30, rng.choice((3 * 2**30, 100))))
     return "a bomb"
 

@@ -73,7 +73,7 @@ READERS: dict[str, tuple[str, ...]] = {
 
 
 def build(folder: Path) -> None:
-    """Make one of everything in a folder."""
+    """Write one of everything into a folder."""
     run = evolve_tiny(folder / "run", run__generations=2)
     evolve_tiny(folder / "half", run__generations=2)
     (folder / "half" / "DONE").unlink()
@@ -86,7 +86,7 @@ def build(folder: Path) -> None:
     campaign.carry_on(Serial(1))
     report = campaign.paths.report
     report.mkdir()
-    (report / "manifest.json").write_text('{"files": {}}')  # as of a report of nothing
+    (report / "manifest.json").write_text('{"files": {}}')  # as of an empty report
     record(run, threads=1).save(folder / "epoch.npz")
     shipped = Path(conevo.__file__).parent / "worlds" / "pursuit" / "prey-v2.npz"
     shutil.copy(shipped, folder / "prey.npz")

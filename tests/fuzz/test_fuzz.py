@@ -22,7 +22,7 @@ from fuzz.damages import damage
 from fuzz.house import READERS, build, find
 
 MOST_SECONDS = 20
-LOOKED_AT = {"lock", "ledger.sqlite", "ledger.sqlite-journal"}  # may be made by looking
+LOOKED_AT = {"lock", "ledger.sqlite", "ledger.sqlite-journal"}  # may be written by reading commands
 CASES = [(name, command) for name, commands in READERS.items() for command in commands]
 ROUNDS = int(os.environ.get("CONEVO_FUZZ_ROUNDS", "12"))  # of the exhaustive test
 
@@ -53,8 +53,8 @@ def call(command: str, folder: Path) -> tuple[int, str, str]:
 
     os.chdir(folder)
     before = [signal.signal(one, too_slow) for one in (signal.SIGPROF, signal.SIGALRM)]
-    signal.setitimer(signal.ITIMER_PROF, MOST_SECONDS)  # of the processor, however busy it is
-    signal.alarm(6 * MOST_SECONDS)  # a command that waits for ever takes none of it
+    signal.setitimer(signal.ITIMER_PROF, MOST_SECONDS)  # of processor time, whatever the load
+    signal.alarm(6 * MOST_SECONDS)  # a command that waits forever uses none
     code = 0
     try:
         with (
@@ -83,7 +83,7 @@ def call(command: str, folder: Path) -> tuple[int, str, str]:
 
 
 def watch(path: Path) -> int:
-    """Look as the live page does."""
+    """Read a folder as the live page does."""
     from conevo.watch.state import Watched
 
     try:
@@ -99,7 +99,7 @@ def watch(path: Path) -> int:
 
 
 def tree(folder: Path) -> dict[str, tuple[int, int]]:
-    """Return what is in a folder: size and time of change of every file."""
+    """Return the contents of a folder: size and modification time of every file."""
     found = {}
     for root, folders, files in os.walk(folder):
         for name in (*folders, *files):
@@ -112,7 +112,7 @@ def tree(folder: Path) -> dict[str, tuple[int, int]]:
 
 
 def problem(name: str, command: str, seed: int, house: Path, work: Path) -> str:
-    """Damage a file, let a command read it, and return what is wrong, nothing if all is well."""
+    """Damage a file, let a command read it, and return the problem, empty if all is well."""
     rng = random.Random(f"{name} {command} {seed}")
     shutil.copytree(house, work, symlinks=True)
     try:

@@ -1,7 +1,7 @@
-"""What shipped worlds and methods give: digests that must not change with the code.
+"""Outcomes of shipped worlds and methods: digests that must not change with the code.
 
-``python tests/golden/outcomes.py`` prints them; a change of a world's or a method's version writes
-them anew, ``> tests/golden/outcomes.json``, and says why.
+``python tests/golden/outcomes.py`` prints them. Whoever changes the version of a world or a method
+rewrites them, ``> tests/golden/outcomes.json``, and gives the reason.
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ def teams_of(sizes: tuple[int, int, int], robots: int, n: int) -> tuple[Any, Any
 
 
 def of_worlds() -> Iterator[tuple[str, str]]:
-    """Yield what random teams do in every world, and how one of them is recorded."""
+    """Yield the outcomes of random teams in every world, and the record of one of them."""
     for path, sizes in WORLDS.items():
         world = conevo.world(path, iterations=ITERATIONS)
         rollout = conevo.Rollout(world, n_threads=2)
@@ -94,7 +94,7 @@ def of_worlds() -> Iterator[tuple[str, str]]:
 
 
 def of_methods() -> Iterator[tuple[str, str]]:
-    """Yield what every method evolves in five generations of a tiny run."""
+    """Yield the results of five generations of a tiny run of every method."""
     for task, world in RUNS.items():
         for method in METHODS:
             known = conevo.METHODS[method].config_class.__dataclass_fields__

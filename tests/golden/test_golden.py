@@ -1,4 +1,4 @@
-"""The same bits as those on record, which a new version of a world or method writes anew."""
+"""Outcomes equal the recorded ones bit for bit; a new version of a world or method has new ones."""
 
 import importlib.util
 import json
@@ -8,7 +8,7 @@ HERE = Path(__file__).parent
 
 
 def test_worlds_and_methods_give_the_outcomes_on_record() -> None:
-    """Kernels call no library mathematics; what methods draw is numpy's."""
+    """Kernels call no library mathematics; methods draw from numpy's generators."""
     spec = importlib.util.spec_from_file_location("outcomes", HERE / "outcomes.py")
     assert spec is not None
     assert spec.loader is not None

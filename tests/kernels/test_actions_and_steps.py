@@ -1,4 +1,4 @@
-"""What all worlds share of actions and steps, against plain Python."""
+"""The actions and steps that all worlds share, against plain Python."""
 
 import itertools
 import math
@@ -63,7 +63,7 @@ def array(values, dtype):
     return wp.array(np.asarray(values), dtype=dtype, device="cpu")
 
 
-def test_every_action_counts_once_and_switches_are_those_from_one_iteration_to_the_next():
+def test_every_action_counts_once_and_switches_are_changes_between_iterations():
     lives = np.random.default_rng(3).integers(-1, 3, (5, 60)).astype(np.int32)
     action, switches, counts = zeros(5), zeros(5), array(np.full(5 * 6, 7), int)
     wp.launch(live, 1, [array(lives, int), action, switches, counts], device="cpu")
@@ -93,7 +93,7 @@ def test_the_last_action_is_the_last_even_where_rounding_would_go_beyond_it():
     assert a.numpy().tolist() == [3]
 
 
-def test_the_highest_output_is_the_first_of_equals_among_those_asked_for():
+def test_ties_for_the_highest_output_go_to_the_first_among_those_asked_for():
     outputs = np.random.default_rng(4).integers(-2, 3, (40, 8)).astype(np.float32)
     for n in (1, 3, 8):
         best = zeros(40)

@@ -33,7 +33,7 @@ def test_names_sizes_and_arrays() -> None:
     assert made.pages.shape == (24, 5)
 
 
-def test_a_plain_struct_has_the_default_alone() -> None:
+def test_a_plain_struct_has_only_the_default() -> None:
     @wp.struct
     class Plain:
         """One array."""

@@ -91,7 +91,7 @@ def test_uniform_is_splitmix_of_its_counter():
     )
     expected = [splitmix.uniform(seed, *map(int, c)) for c in zip(t, a, b, strict=True)]
     assert u.numpy().tolist() == expected
-    assert uniforms(np.array([seed], np.uint64), t, a, b).tolist() == expected  # numpy's too
+    assert uniforms(np.array([seed], np.uint64), t, a, b).tolist() == expected  # also numpy's
 
 
 def test_uniform_is_uniform_and_neighbours_are_uncorrelated():
@@ -165,11 +165,11 @@ def test_sigmoid_is_the_logistic_function_within_a_millionth():
     wp.launch(squash, len(a), [array(a, float), y], device="cpu")
     assert np.abs(y.numpy() - 1 / (1 + np.exp(-a.astype(float)))).max() < 1e-6
     assert (np.diff(y.numpy()) >= -1e-6).all()
-    assert y.numpy().tobytes() == sigmoid_of(a).tobytes()  # numpy's is the same bits
+    assert y.numpy().tobytes() == sigmoid_of(a).tobytes()  # numpy's equals it bit for bit
 
 
 def run_kernel(mind, n_sensors, n_outputs, genes, slots, sensors):
-    """Outputs [T, 2, O] of the second of two teams of two robots; the first one's stay empty."""
+    """Outputs [T, 2, O] of the second of two teams of two robots; those of the first stay empty."""
     kind = mind.mind(n_sensors, n_outputs)
     made = []
     for struct in (SrnWeights, SrnMemory):

@@ -1,4 +1,4 @@
-"""The compiled kernels are those of the sources: never stale, never compiled twice, CUDA too."""
+"""The compiled kernels match the sources: never stale, never compiled twice, also for CUDA."""
 
 import json
 import os
@@ -40,12 +40,12 @@ print(json.dumps({"hash": rollout.fingerprint, "seen": sums}))
 
 
 def play(source: Path, cache: Path) -> dict:
-    """Run the package at ``source`` in a process of its own, with compiled kernels in ``cache``."""
+    """Run the package at ``source`` in its own process, with compiled kernels in ``cache``."""
     environment = os.environ | {"PYTHONPATH": str(source), "WARP_CACHE_PATH": str(cache)}
     done = subprocess.run(
         [sys.executable, "-c", PLAY], env=environment, capture_output=True, text=True, check=True
     )
-    assert done.stderr == ""  # Warp says nothing, GPU or not
+    assert done.stderr == ""  # Warp prints nothing, with or without a GPU
     return json.loads(done.stdout)
 
 
@@ -87,17 +87,17 @@ def test_edited_kernels_are_never_stale_and_unchanged_ones_never_compiled_again(
         edit(source, file, old, new)
         changed = play(source, cache)
         fresh = play(source, tmp_path / f"fresh-{len(hashes)}")
-        assert changed == fresh  # what a machine without any cache computes
+        assert changed == fresh  # the results of a machine without a cache
         hashes.add(changed["hash"])
         edit(source, file, new, old)
     assert len(hashes) == 1 + len(edits)
     known = compiled(cache)
-    assert play(source, cache) == first  # taken back: the first compilation serves again
+    assert play(source, cache) == first  # undone: the first compilation is used again
     assert compiled(cache) == known
 
 
 def test_edits_that_matter_change_what_is_computed(tmp_path):
-    """The edit of a parameter of the rules above would show: rovers start with less energy."""
+    """An edit of a parameter of the rules above is noticed: rovers start with less energy."""
     source = tmp_path / "source"
     shutil.copytree(PACKAGE, source / "conevo", ignore=shutil.ignore_patterns("__pycache__"))
     edit(

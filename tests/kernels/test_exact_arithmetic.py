@@ -1,7 +1,8 @@
 """The source that Warp generates calls nothing that differs between targets.
 
-A library's sine, exponential or power is another function on a CPU and on a GPU, and on the next
-version of either. What is left is rounded correctly or exact everywhere, so the bits are the same.
+A library's sine, exponential or power differs between a CPU and a GPU, and between versions of
+either. All other operations are exact or rounded correctly everywhere, so results are equal bit
+for bit.
 """
 
 import re
@@ -44,7 +45,7 @@ DEFINED = re.compile(r"^(?:static|extern|template|WP_API|void)\b[^\n(;=]*?\b(\w+
 
 
 def source_of(kernel, target):
-    """Return what Warp would compile of a kernel."""
+    """Return the source that Warp would compile for a kernel."""
     engine.start()
     with engine.building:
         kernel.module.get_module_hash(1)
@@ -54,7 +55,7 @@ def source_of(kernel, target):
 
 
 def is_integer(name, before):
-    """Return whether a variable was last declared as an integer in what stands before its use."""
+    """Return whether the last declaration of a variable before its use is as an integer."""
     kinds = re.findall(rf"\bwp::(\w+)&? {name}\b", before)
     return bool(kinds) and re.fullmatch(r"u?int(32|64)", kinds[-1]) is not None
 

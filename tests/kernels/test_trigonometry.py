@@ -51,7 +51,7 @@ def around(values, n=3):
     return np.concatenate(found)
 
 
-# Headings and steps' directions lie within two turns, where the arc of a step ends included.
+# Headings and directions of steps lie within two turns, including the ends of a step's arc.
 USED = np.concatenate(
     [np.linspace(-4 * math.pi, 4 * math.pi, 400_001), np.geomspace(1e-30, 1, 1000)]
 ).astype(np.float32)
@@ -75,7 +75,7 @@ def test_the_sine_of_a_small_angle_keeps_its_last_places():
 
 
 def pairs():
-    """Vectors: in all directions and of many lengths, on axes and diagonals, and next to them."""
+    """Vectors in all directions and of many lengths, on axes and diagonals, and next to them."""
     rng = np.random.default_rng(1)
     directions = rng.uniform(-math.pi, math.pi, 200_000)
     lengths = 10.0 ** rng.uniform(-12, 12, len(directions))
@@ -91,7 +91,7 @@ def test_the_arc_tangent_is_right_to_3e_7():
     assert np.abs(aimed(y, x) - exact).max() < 3e-7
 
 
-def test_axes_have_the_angles_that_they_should():
+def test_axes_have_the_right_angles():
     y = np.array([0, 0, 1, -1, 0, 1e-20, -1e-20], np.float32)
     x = np.array([0, 3, 0, 0, -2, -1, -1], np.float32)
     pi = math.pi
@@ -99,7 +99,7 @@ def test_axes_have_the_angles_that_they_should():
     assert aimed(y, x).tolist() == expected.tolist()
 
 
-def test_numpy_gives_the_same_bits():
+def test_numpy_agrees_bit_for_bit():
     for angles in (USED, FAR, EDGES):
         both = np.stack(cosine_sine_of(angles), axis=1)
         assert both.dtype == np.float32

@@ -1,4 +1,4 @@
-"""Which arrays lie in shared memory, and what a launch fetches and stores there."""
+"""Which arrays lie in shared memory, and which parts a launch fetches and stores there."""
 
 import numpy as np
 import pytest
@@ -20,7 +20,7 @@ class Small:
 
 @wp.struct
 class Other:
-    """Arrays of its mind."""
+    """Arrays of its controllers."""
 
     hidden: wp.array2d[float]
 
@@ -32,7 +32,7 @@ SHAPES = {Small: {"x": (4,), "kind": (3,), "grid": (10, 2)}, Other: {"hidden": (
     ("limit", "small", "other"),
     [
         (0, (), ()),
-        (31, (("kind", 3),), ()),  # 16 bytes, as all begin at a multiple of them
+        (31, (("kind", 3),), ()),  # 16 bytes, since every array starts at a multiple of 16
         (32, (("kind", 3), ("x", 4)), ()),
         (159, (("kind", 3), ("x", 4)), ()),
         (160, (("kind", 3), ("x", 4)), (("hidden", 32),)),

@@ -1,4 +1,4 @@
-"""Run folders written by hand, for tests of what follows them."""
+"""Run folders written by hand, for tests of the live page, which follows them."""
 
 import dataclasses
 import fcntl
@@ -53,7 +53,7 @@ def record(generation, **changes):
 
 
 def tables(method="cone", seed=1, world="rover-v2/complex-1", generations=10, budget=0, **settings):
-    """Return the configuration of a run, as far as it is shown; settings as in method__gst=0.2."""
+    """Return the displayed part of a run's configuration; settings are given as method__gst=0.2."""
     names = {"world": world, "method": method, "preset": "desk", "seed": seed}
     run = names | {"generations": generations, "budget_evaluations": budget}
     found = {"run": run, "world": {}, "method": {}}
@@ -64,7 +64,7 @@ def tables(method="cone", seed=1, world="rover-v2/complex-1", generations=10, bu
 
 
 def provenance(config, **changes):
-    """Return what a run's provenance says, given the text of its configuration."""
+    """Return the provenance of a run, given the text of its configuration."""
     names = ("preset", "command", "device", "created", "conevo", "python", "numpy", "warp")
     about = dict.fromkeys((*names, "platform", "cpu"), "made up")
     about |= {"run_id": "0" * 12, "kernel_hash": "0" * 16, "sessions": []}
@@ -77,13 +77,13 @@ def session(**made):
 
 
 def append(path, *records, torn=""):
-    """Add lines to a run's log, and the beginning of one that is not finished."""
+    """Add lines to a run's log, and the beginning of an incomplete one."""
     with (path / "generations.jsonl").open("a", encoding="utf-8") as file:
         file.write("".join(f"{json.dumps(one)}\n" for one in records) + torn)
 
 
 def write_run(path, n=3, is_finished=False, torn="", about=None, **settings):
-    """Write a run of n generations; about: what its provenance says besides."""
+    """Write a run of n generations; about: further entries of its provenance."""
     path.mkdir(parents=True)
     ending = {"finished": "now", "stopped_by": "generations"} if is_finished else {}
     configure(path, (about or {}) | ending, **settings)
@@ -102,7 +102,7 @@ def configure(path, about, **settings):
 
 
 def write_shaping(path, stages):
-    """Write a shaping with stages of (generations planned, generations finished); None not yet."""
+    """Write a shaping with stages of (generations planned, finished); None if not started yet."""
     path.mkdir(parents=True)
     worlds = [f"rover-v2/complex-{k}" for k in range(1, len(stages) + 1)]
     planned = [
@@ -118,7 +118,7 @@ def write_shaping(path, stages):
 
 
 def write_campaign(path):
-    """Write a campaign of homcne and mesp with two seeds; nothing has begun."""
+    """Write a campaign of homcne and mesp with two seeds; no run has started."""
     file = path.with_suffix(".toml")
     file.parent.mkdir(parents=True, exist_ok=True)
     file.write_text(PLAN)
@@ -128,8 +128,8 @@ def write_campaign(path):
 
 
 @contextmanager
-def at_work(path):
-    """Hold a directory's lock, as the process that is at work there does."""
+def locked(path):
+    """Hold a directory's lock, as a process that works there does."""
     handle = os.open(path / "lock", os.O_RDWR | os.O_CREAT)
     try:
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -6,7 +6,7 @@ import pytest
 from conevo.campaigns.campaign import Campaign
 from conevo.watch.state import Watched
 from conevo.worlds.rover import drawn as rover
-from watch.followed import append, at_work, record, write_campaign, write_run
+from watch.followed import append, locked, record, write_campaign, write_run
 
 
 def by_label(watched):
@@ -24,7 +24,7 @@ def labels_of(campaign):
     return list(campaign.planned)
 
 
-def test_runs_of_a_campaign_stand_as_its_ledger_and_their_files_say(campaign):
+def test_runs_of_a_campaign_are_listed_from_its_ledger_and_their_files(campaign):
     homcne_1, mesp_1, homcne_2, _ = labels_of(campaign)
     write_run(campaign.paths.run(homcne_1), 4, is_finished=True, method="homcne", generations=4)
     campaign.ledger.end(homcne_1, "finished", core_seconds=8.0)
@@ -33,7 +33,7 @@ def test_runs_of_a_campaign_stand_as_its_ledger_and_their_files_say(campaign):
     campaign.ledger.begin(mesp_1, 1, time.time() - 3.0)
     campaign.ledger.end(homcne_2, "failed", "out of luck")
     watched = Watched([campaign.path])
-    with at_work(campaign.path):
+    with locked(campaign.path):
         for _ in range(3):
             state = watched.snapshot()
     assert [run["status"] for run in state["runs"]] == ["finished", "running", "failed", "pending"]
@@ -44,7 +44,7 @@ def test_runs_of_a_campaign_stand_as_its_ledger_and_their_files_say(campaign):
     assert (group["title"], group["running"]) == ("Two methods, two seeds", True)
     # 8 seconds for each run, one core, three of them over
     assert group["ends_at"] - time.time() == pytest.approx(8 - 3 + 8, abs=1.0)
-    state = watched.snapshot()  # the coordinator has gone
+    state = watched.snapshot()  # the coordinator has ended
     assert [run["status"] for run in state["runs"]] == [
         "finished",
         "interrupted",
@@ -52,12 +52,12 @@ def test_runs_of_a_campaign_stand_as_its_ledger_and_their_files_say(campaign):
         "pending",
     ]
     assert (state["groups"][0]["running"], state["groups"][0]["ends_at"]) == (False, None)
-    with at_work(campaign.paths.run(mesp_1)):  # a worker that outlived it
+    with locked(campaign.paths.run(mesp_1)):  # a worker that outlived it
         assert watched.snapshot()["runs"][1]["status"] == "running"
 
 
 def plan_run(campaign, label):
-    """Let a run be the one that is planned."""
+    """Make a run match the one that is planned."""
     file = campaign.paths.run(label) / "provenance.json"
     about = json.loads(file.read_text()) | {"run_id": campaign.planned[label].run_ids[0]}
     file.write_text(json.dumps(about | {"finished": "now", "stopped_by": "generations"}))
@@ -123,7 +123,7 @@ def test_methods_are_compared_by_medians_over_team_evaluations(tmp_path):
     assert curves["lines"][1]["performance"][at[200] : at[200] + 2] == [6.0, None]
     assert median[at[100] - 1] is None  # nothing has ended there
     assert [median[at[x]] for x in (100, 200)] == [3.0, 6.0]
-    # b has not got that far and c has ended, and is not drawn as if it had gone on
+    # b has not reached this point; c has ended, and its curve ends there too
     assert curves["lines"][2]["performance"][at[300]] is None
     assert median[at[300]] is None
     assert [of[at[x]] for x in (100, 200, 300)] == [3, 3, 1]
@@ -145,7 +145,7 @@ def test_presets_and_environments_are_never_mixed(tmp_path):
     ]
 
 
-def test_colours_of_methods_and_castes_do_not_depend_on_what_is_there(tmp_path):
+def test_colours_of_methods_and_castes_do_not_depend_on_the_other_runs(tmp_path):
     path = write_run(tmp_path / "a", method="new", n=0)
     append(path, record(0, castes={"hi": 1, "odd": 1, "non-specialized": 1}))
     state = Watched([path]).snapshot()
@@ -205,7 +205,7 @@ def test_a_damaged_run_is_named_and_all_others_are_shown(tmp_path, name, content
     assert problems["bad"] or (name, content) == ("generations.jsonl", b"")
 
 
-def test_whatever_goes_wrong_in_one_place_all_others_are_shown(campaign, monkeypatch):
+def test_an_error_in_one_place_leaves_all_others_shown(campaign, monkeypatch):
     write_run(campaign.path.parent / "run")
     watched = Watched([campaign.path, campaign.path.parent / "run"])
     monkeypatch.setattr(Campaign, "standings", lambda self: 1 / 0)

@@ -1,4 +1,4 @@
-"""The live page in a real browser: runs that go on, servers that go, names that are no markup."""
+"""The live page in a real browser: runs that continue, servers that stop, names like markup."""
 
 from __future__ import annotations
 
@@ -46,12 +46,12 @@ def evolved(tmp_path_factory):
 def runs(evolved, tmp_path):
     """A folder with a finished run, one that is running, one interrupted, one damaged.
 
-    A lock is held as a process at work holds it.
+    A lock is held as by the process of a run.
     """
     folder = tmp_path / "runs"
     for name, method, generations in (
         ("done", "cone", None),
-        ("at work", "homcne", 3),
+        ("in progress", "homcne", 3),
         ("stopped", "cone", 2),
         ("broken", "cone", 1),
     ):
@@ -61,7 +61,7 @@ def runs(evolved, tmp_path):
             log = folder / name / "generations.jsonl"
             log.write_text("".join(lines_of(evolved / method)[:generations]))
     (folder / "broken" / "config.toml").write_text("[run\n")
-    with held(folder / "at work"):
+    with held(folder / "in progress"):
         yield folder
 
 
@@ -127,10 +127,14 @@ def details(tab, field):
     return tab.locator(f"#details [data-field={field}]").inner_text()
 
 
-def test_every_run_is_listed_as_it_stands(live, runs):
+def test_every_run_is_listed_with_its_status_and_results(live, runs):
     found = table(live)
-    assert set(found) == {"done", "at work", "stopped", "broken"}
-    for label, status in (("done", "finished"), ("at work", "running"), ("stopped", "interrupted")):
+    assert set(found) == {"done", "in progress", "stopped", "broken"}
+    for label, status in (
+        ("done", "finished"),
+        ("in progress", "running"),
+        ("stopped", "interrupted"),
+    ):
         records, row = records_of(runs / label), found[label]
         assert row["status"] == status
         assert row["generation"] == f"{len(records)}/5"
@@ -139,8 +143,11 @@ def test_every_run_is_listed_as_it_stands(live, runs):
         assert number(row["performance"]) == pytest.approx(value, rel=5e-4)
         assert number(row["fitness"]) == pytest.approx(last["team_fitness"], rel=5e-4)
         assert number(row["S"]) == pytest.approx(last["specialization"], rel=5e-4, abs=1e-6)
-    assert [found[name]["method"] for name in ("done", "at work")] == ["CONE", "HomCNE"]
-    assert "left" in found["at work"]["time left"] or "any moment" in found["at work"]["time left"]
+    assert [found[name]["method"] for name in ("done", "in progress")] == ["CONE", "HomCNE"]
+    assert (
+        "left" in found["in progress"]["time left"]
+        or "any moment" in found["in progress"]["time left"]
+    )
     assert found["done"]["time left"] == ""
     assert found["broken"]["status"] == "damaged"
     assert "damaged" in found["broken"]["run"] or "config" in found["broken"]["run"]
@@ -161,21 +168,21 @@ def test_numbers_look_as_in_every_command(tab, tmp_path):
 
 def test_a_new_generation_appears_without_reloading(live, runs, evolved):
     live.evaluate("window.marker = 1")
-    live.click("#runs tr[data-label='at work'] td")
+    live.click("#runs tr[data-label='in progress'] td")
     live.wait_for_selector("#details:not([hidden])")
     line = lines_of(evolved / "homcne")[3]
-    with (runs / "at work" / "generations.jsonl").open("a") as log:
+    with (runs / "in progress" / "generations.jsonl").open("a") as log:
         log.write(line[:40])
         log.flush()
         log.write(line[40:])
     until(
         live,
-        "() => document.querySelector(\"tr[data-label='at work']\").innerText.includes('4/5')",
+        "() => document.querySelector(\"tr[data-label='in progress']\").innerText.includes('4/5')",
     )
     until(live, "() => document.querySelector('[data-field=generation]').innerText.includes('4')")
     record = json.loads(line)
     value = next(iter(record["performance"].values()))
-    assert number(table(live)["at work"]["performance"]) == pytest.approx(value, rel=5e-4)
+    assert number(table(live)["in progress"]["performance"]) == pytest.approx(value, rel=5e-4)
     assert live.evaluate("window.marker") == 1
 
 
@@ -200,10 +207,10 @@ def test_a_click_on_a_run_shows_its_details(live, runs, label):
     last = records[-1]
     assert live.inner_text("#details h2") == label
     assert f"{len(records)} of 5" in details(live, "generation")
-    said = details(live, "performance")
+    message = details(live, "performance")
     for name, value in last["performance"].items():
-        found = re.search(rf"{name} ([\d.,]*\d)", said)
-        assert found, said
+        found = re.search(rf"{name} ([\d.,]*\d)", message)
+        assert found, message
         assert number(found[1]) == pytest.approx(value, rel=5e-4)
     numbers = [number(one) for one in re.findall(r"[\d.,]*\d", details(live, "fitness"))]
     assert numbers == pytest.approx([last["team_fitness"], last["best_fitness"]], rel=5e-4)
@@ -241,15 +248,15 @@ def test_castes_over_generations_are_drawn_in_their_colours(live, runs):
 
 
 def test_a_run_leads_to_the_replay_of_its_champion(live, runs):
-    live.click("#runs tr[data-label='at work'] td")
-    fitness = [record["team_fitness"] for record in records_of(runs / "at work")]
+    live.click("#runs tr[data-label='in progress'] td")
+    fitness = [record["team_fitness"] for record in records_of(runs / "in progress")]
     link = live.locator("#details a.replay")
     assert f"generation {int(np.argmax(fitness))}" in link.inner_text()
     with live.context.expect_page() as opened:
         link.click()
     replay = opened.value
     replay.wait_for_selector("body[data-ready=yes]")
-    assert "at work" in replay.inner_text("body")
+    assert "in progress" in replay.inner_text("body")
     replay.evaluate("conevo.play()")
     until(replay, "() => conevo.state().t > 2")
 
@@ -274,11 +281,11 @@ def test_runs_can_be_filtered_and_sorted(live):
     order = live.eval_on_selector_all(
         "#runs tbody tr", "rows => rows.map((row) => row.dataset.label)"
     )
-    assert order.index("stopped") < order.index("at work") < order.index("done")
+    assert order.index("stopped") < order.index("in progress") < order.index("done")
 
 
 def test_names_never_become_markup(tab, tmp_path, evolved):
-    """The name of a folder, and whatever hostile files say."""
+    """Neither the name of a folder nor any text in hostile files."""
     shutil.copytree(evolved / "cone", tmp_path / "runs" / HOSTILE)
     worse = tmp_path / "runs" / "worse"
     shutil.copytree(evolved / "cone", worse)
@@ -308,7 +315,7 @@ def test_names_never_become_markup(tab, tmp_path, evolved):
         assert tab.evaluate("window.pwned") is None
 
 
-def test_a_server_that_goes_and_comes_back(tab, runs, complaints):
+def test_a_server_that_stops_and_returns(tab, runs, complaints):
     """A process of its own, as a user starts it; its replay is recorded from the run."""
     command = [sys.executable, "-m", "conevo", "watch", "--no-browser"]
 
@@ -334,16 +341,16 @@ def test_a_server_that_goes_and_comes_back(tab, runs, complaints):
         process.kill()
         process.communicate()
         tab.wait_for_selector("#problem:visible")
-        said = tab.get_by_role("alert").inner_text().strip()
-        assert 10 < len(said) < 300
-        assert "\n" not in said
-        assert len(table(tab)) == 4  # what was known stays
+        message = tab.get_by_role("alert").inner_text().strip()
+        assert 10 < len(message) < 300
+        assert "\n" not in message
+        assert len(table(tab)) == 4  # earlier results stay
         process, _ = start(address[1])
         tab.wait_for_selector("#problem", state="hidden")
     finally:
         process.kill()
         process.communicate()
-    # A browser tells its console of every request that nobody answers.
+    # A browser logs every unanswered request to its console.
     assert [one for one in complaints if "net::ERR_" not in one] == []
     complaints.clear()
 
@@ -364,7 +371,7 @@ def test_the_table_below_a_chart_is_no_wider_than_the_chart(live):
     assert live.eval_on_selector_all("#panels .wide", wide) == [0]
 
 
-def test_an_empty_folder_says_so(tab, tmp_path):
+def test_an_empty_folder_is_shown_to_have_no_runs(tab, tmp_path):
     Path(tmp_path / "runs").mkdir()
     with served(tmp_path / "runs") as address:
         tab.goto(address)

@@ -17,12 +17,12 @@ from conevo.watch.server import LiveServer, serve
 from conevo.watch.state import Watched
 from watch.followed import append, record, write_run
 
-SECRET = "what no page may tell"
+SECRET = "a secret that no page may show"
 
 
 @pytest.fixture
 def folder(tmp_path):
-    """A folder with two runs; beside it something that is not to be read."""
+    """A folder with two runs; next to it a file that must not be read."""
     (tmp_path / "secret.json").write_text(SECRET)
     write_run(tmp_path / "runs" / "run")
     write_run(tmp_path / "runs" / "<i>&?#%2f")
@@ -190,7 +190,7 @@ def test_another_host_is_refused(server, host):
     assert f"only http://127.0.0.1:{server.port}/ and http://localhost" in answer
 
 
-def test_this_machine_has_two_names(server):
+def test_the_local_host_has_two_names(server):
     assert ask(server, "/", host=f"localhost:{server.port}")[0] == 200
 
 
@@ -222,7 +222,7 @@ def test_requests_of_other_sites_are_refused(server):
         (b"GET / what HTTP/1.1\r\n\r\n", 400),
     ],
 )
-def test_nonsense_is_refused_and_the_server_goes_on(server, capfd, request_, status):
+def test_nonsense_is_refused_and_the_server_keeps_running(server, capfd, request_, status):
     answer = send(server, request_)
     head, _, body = answer.partition("\r\n\r\n")
     assert f" {status} " in answer.splitlines()[0]
@@ -230,10 +230,10 @@ def test_nonsense_is_refused_and_the_server_goes_on(server, capfd, request_, sta
     assert body.count("\n") == 1
     assert "<" not in body or "text/html" not in head
     assert ask(server, "/state.json")[0] == 200
-    assert capfd.readouterr() == ("", "")  # nothing is said of single requests
+    assert capfd.readouterr() == ("", "")  # single requests are not logged
 
 
-def test_what_follows_a_refused_request_is_not_read(server):
+def test_data_after_a_refused_request_is_not_read(server):
     smuggled = f"GET /state.json HTTP/1.1\r\nHost: 127.0.0.1:{server.port}\r\n\r\n".encode()
     for method in (b"POST", b"GET"):
         head = (
@@ -253,10 +253,10 @@ def test_a_connection_serves_many_requests(server):
     connection.close()
 
 
-def test_clients_that_go_or_wait_do_not_stop_others(server, capfd):
+def test_clients_that_leave_or_wait_do_not_stop_others(server, capfd):
     slow = socket.create_connection(("127.0.0.1", server.port))
     slow.sendall(b"GET /state.json HT")
-    for _ in range(5):  # sends a request and is gone
+    for _ in range(5):  # sends a request and leaves
         with socket.create_connection(("127.0.0.1", server.port)) as gone:
             gone.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, b"\x01\0\0\0\0\0\0\0")
             gone.sendall(f"GET / HTTP/1.1\r\nHost: 127.0.0.1:{server.port}\r\n\r\n".encode())
@@ -318,7 +318,7 @@ def test_making_a_replay_may_take_longer_than_asking_for_it(folder, monkeypatch)
         assert ask(server, "/replay/run")[::2] == (200, "run")
 
 
-def test_there_are_only_so_many_connections(server, monkeypatch, capfd):
+def test_the_number_of_connections_is_limited(server, monkeypatch, capfd):
     monkeypatch.setattr("conevo.watch.server.MOST", 3)
     held = [socket.create_connection(("127.0.0.1", server.port), timeout=10) for _ in range(3)]
     until = time.monotonic() + 5
@@ -346,18 +346,18 @@ def test_a_replay_that_cannot_be_made_is_one_line(folder):
 
 
 def test_one_replay_is_made_at_a_time(folder):
-    at_work, most, calls = 0, 0, []
+    active, most, calls = 0, 0, []
     begun, go_on = threading.Event(), threading.Event()
 
     def replay(label):
-        nonlocal at_work, most
-        at_work += 1
-        most = max(most, at_work)
+        nonlocal active, most
+        active += 1
+        most = max(most, active)
         calls.append(label)
         begun.set()
         go_on.wait(10)
         time.sleep(0.02)
-        at_work -= 1
+        active -= 1
         return label
 
     with serving(folder, replay) as server:
@@ -365,7 +365,7 @@ def test_one_replay_is_made_at_a_time(folder):
         for thread in others:
             thread.start()
         assert begun.wait(10)
-        assert ask(server, "/state.json")[0] == 200  # goes on meanwhile
+        assert ask(server, "/state.json")[0] == 200  # continues meanwhile
         assert not go_on.is_set()
         go_on.set()
         for thread in others:
@@ -373,7 +373,7 @@ def test_one_replay_is_made_at_a_time(folder):
     assert (most, calls) == (1, ["run"] * 4)
 
 
-def test_only_this_machine_is_listened_to(server):
+def test_the_server_listens_to_the_local_host_only(server):
     assert server.socket.getsockname()[0] == "127.0.0.1"
     assert server.address == f"http://127.0.0.1:{server.port}/"
 

@@ -1,4 +1,4 @@
-"""Runs with other settings have curves, medians and names of their own."""
+"""Runs with other settings have their own curves, medians and names."""
 
 from conevo.campaigns.plan import levels_of
 from conevo.watch.settings import comparisons, differences
@@ -23,7 +23,7 @@ def panels_in(folder):
     return found
 
 
-def test_runs_with_other_settings_have_a_median_of_their_own_that_names_them(tmp_path):
+def test_runs_with_other_settings_have_their_own_median_that_names_them(tmp_path):
     with_settings(tmp_path / "a", seed=1, method__gst=0.1, world__n_robots=5)
     with_settings(tmp_path / "b", seed=2, method__gst=0.1, world__n_robots=5)
     with_settings(tmp_path / "c", seed=1, method__gst=0.2, world__n_robots=5)
@@ -50,7 +50,7 @@ def test_methods_in_worlds_with_other_settings_are_not_compared(tmp_path):
     ]
 
 
-def test_runs_that_differ_in_very_much_are_still_told_apart(tmp_path):
+def test_runs_with_very_many_differences_are_still_distinguished(tmp_path):
     for k in range(3):
         names = {f"world__n_{n}": k if n > 5 else 0 for n in range(9)} | {"method__z": k}
         with_settings(tmp_path / f"r{k}", **names)
@@ -76,7 +76,7 @@ def begun_with(path, digit):
     return {"path": path, "run_id": "0" * 12, "generation": 9, "checkpoint": digit * 32}
 
 
-def test_runs_from_other_origins_have_medians_of_their_own(tmp_path):
+def test_runs_from_other_origins_have_their_own_medians(tmp_path):
     begun = [("a", 1, "A", "a"), ("b", 2, "A", "a"), ("c", 1, "B", "b")]
     for name, seed, origin, checkpoint in begun:
         about = {"origin": begun_with(f"runs/{origin}", checkpoint)}
@@ -98,7 +98,7 @@ def test_runs_from_other_origins_have_medians_of_their_own(tmp_path):
     ]
 
 
-def test_runs_by_other_code_have_medians_of_their_own_once_they_have_begun(tmp_path):
+def test_runs_by_other_code_have_their_own_medians_once_they_have_started(tmp_path):
     sessions = {name: [session(conevo="0.2", code=name)] for name in "xy"}
     for name, made in (("a", "x"), ("b", "x"), ("c", "y")):
         write_run(tmp_path / name, 2, about={"sessions": sessions[made]})

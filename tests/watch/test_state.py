@@ -10,7 +10,7 @@ from conevo.errors import UsageError
 from conevo.watch.state import Watched
 from watch.followed import (
     append,
-    at_work,
+    locked,
     record,
     tables,
     write_campaign,
@@ -29,7 +29,7 @@ def by_label(watched):
     return {run["label"]: run for run in watched.snapshot()["runs"]}
 
 
-def test_a_run_stands_as_its_files_say(tmp_path):
+def test_a_run_is_listed_with_the_contents_of_its_files(tmp_path):
     run = one(Watched([write_run(tmp_path / "a run", budget=1000)]))
     assert {key: run[key] for key in ("label", "task", "method", "preset", "seed")} == {
         "label": "a run",
@@ -113,7 +113,7 @@ def test_a_damaged_provenance_is_one_line(tmp_path, content):
     assert (one(watched)["problem"], one(watched)["generation"]) == ("", 2)
 
 
-def test_very_many_generations_are_thinned_evenly_with_the_first_and_the_last(tmp_path):
+def test_very_many_generations_are_thinned_evenly_and_the_first_and_last_stay(tmp_path):
     path = write_run(tmp_path / "run", 5003, generations=6000)
     watched = Watched([path])
     lines = watched.snapshot()["panels"][0]["over"]["generation"]
@@ -213,12 +213,12 @@ def test_settings_of_the_wrong_kind_are_damage(tmp_path):
         assert one(Watched([path]))["problem"].startswith("config.toml is damaged: run.")
 
 
-def test_only_what_was_appended_is_read(tmp_path):
+def test_only_appended_lines_are_read(tmp_path):
     path = write_run(tmp_path / "run")
     watched = Watched([path])
     one(watched)
     log = path / "generations.jsonl"
-    with log.open("r+b") as file:  # the same file: what was read is not looked at again
+    with log.open("r+b") as file:  # the same file: the part already read is not read again
         file.write(b"x" * 20)
     append(path, record(3))
     assert (one(watched)["generation"], one(watched)["problem"]) == (4, "")
@@ -257,19 +257,19 @@ def test_status(tmp_path):
     path = write_run(tmp_path / "run")
     watched = Watched([path])
     assert one(watched)["status"] == "interrupted"
-    with at_work(path):
+    with locked(path):
         assert one(watched)["status"] == "running"
-        assert one(watched)["status"] == "running"  # looking has not taken the lock
+        assert one(watched)["status"] == "running"  # reading has not taken the lock
     assert one(watched)["status"] == "interrupted"
     (path / "DONE").write_text("{}")
     assert (one(watched)["status"], one(watched)["share"]) == ("finished", 1.0)
 
 
-def test_looking_leaves_the_lock_to_others(tmp_path):
+def test_reading_leaves_the_lock_to_others(tmp_path):
     path = write_run(tmp_path / "run")
     (path / "lock").touch()
     one(Watched([path]))
-    with at_work(path):
+    with locked(path):
         pass
 
 
@@ -278,23 +278,23 @@ def test_time_left_is_judged_by_the_last_ten_generations(tmp_path):
     append(path, *(record(k, seconds=100.0 if k < 10 else 3.0) for k in range(20)))
     os.utime(path / "generations.jsonl", (1000, 1000))
     watched = Watched([path])
-    assert one(watched)["ends_at"] is None  # nobody is at work
-    with at_work(path):
+    assert one(watched)["ends_at"] is None  # no process is running
+    with locked(path):
         assert one(watched)["ends_at"] == 1000 + 20 * 3.0
 
 
 def test_time_left_ends_with_the_budget(tmp_path):
     path = write_run(tmp_path / "run", 4, generations=1000, budget=750)  # 100 a generation
     os.utime(path / "generations.jsonl", (1000, 1000))
-    with at_work(path):
+    with locked(path):
         run = one(Watched([path]))
     assert run["ends_at"] == 1000 + 3 * 2.0  # the eighth generation cannot be paid
     assert run["share"] == pytest.approx(400 / 750, abs=1e-4)
 
 
-def test_no_time_left_is_said_before_the_first_generation(tmp_path):
+def test_no_time_left_is_shown_before_the_first_generation(tmp_path):
     path = write_run(tmp_path / "run", 0)
-    with at_work(path):
+    with locked(path):
         run = one(Watched([path]))
     assert (run["status"], run["ends_at"], run["performance"]) == ("running", None, {})
     watched = Watched([path])
@@ -303,7 +303,7 @@ def test_no_time_left_is_said_before_the_first_generation(tmp_path):
         watched.champion("run")
 
 
-def test_the_champion_is_the_fittest_team_the_earlier_one_if_equal(tmp_path):
+def test_the_champion_is_the_fittest_team_and_ties_go_to_the_earlier_one(tmp_path):
     path = write_run(tmp_path / "run", 0)
     fitness = [None, 3.0, 7.0, 7.0, None, 1.0]
     append(path, *(record(k, team_fitness=value) for k, value in enumerate(fitness)))
@@ -312,12 +312,12 @@ def test_the_champion_is_the_fittest_team_the_earlier_one_if_equal(tmp_path):
     assert watched.champion("run") == (path, 2)
 
 
-def test_stages_are_numbered_through(tmp_path):
+def test_generations_are_numbered_through_all_stages(tmp_path):
     path = write_shaping(tmp_path / "shaping", [(3, 3), (4, 2), (5, None)])
     os.utime(path / "stage-2" / "generations.jsonl", (2000, 2000))
     os.utime(path / "stage-1" / "generations.jsonl", (1000, 1000))
     watched = Watched([path])
-    with at_work(path):
+    with locked(path):
         run = one(watched)
     assert (run["kind"], run["stage"], run["n_stages"]) == ("shaping", 2, 3)
     assert (run["generation"], run["generations"], run["evaluations"]) == (5, 12, 500)
@@ -344,7 +344,7 @@ def test_stages_are_numbered_through(tmp_path):
 def test_runs_appear_and_go_in_a_folder(tmp_path):
     folder = tmp_path / "runs"
     watched = Watched(folders=[folder])
-    assert watched.snapshot()["runs"] == []  # there is no folder yet
+    assert watched.snapshot()["runs"] == []  # the folder does not exist yet
     write_run(folder / "b")
     write_run(folder / ".a.draft")
     (folder / "other").mkdir()
@@ -372,7 +372,7 @@ def test_a_run_that_was_named_and_goes_away_is_one_line(tmp_path):
     assert (one(watched)["problem"], one(watched)["generation"]) == ("", 1)
 
 
-def test_what_holds_nothing_is_refused(tmp_path):
+def test_a_folder_without_runs_is_refused(tmp_path):
     with pytest.raises(UsageError, match="is not a run, a shaping or a campaign"):
         Watched([tmp_path])
 
@@ -431,7 +431,7 @@ def test_numbers_are_always_json(tmp_path):
     assert (run["fitness"], run["performance"]) == (None, {"value": None})
 
 
-def test_what_is_not_read_yet_is_counted_and_read_next_time(tmp_path):
+def test_unread_runs_are_counted_and_read_next_time(tmp_path):
     paths = [write_run(tmp_path / k) for k in "abc"]
     watched = Watched(paths)
     state = watched.snapshot(patience=-1)
