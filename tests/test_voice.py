@@ -39,6 +39,7 @@ CHECKED = (
     "src/conevo/studies/*.py",
     "src/conevo/watch/*.py",
     "src/conevo/worlds/**/*.py",
+    "tests/campaigns/*.py",
     "tests/fuzz/*.py",
     "tests/golden/*.py",
     "tests/kernels/*.py",

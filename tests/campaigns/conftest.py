@@ -1,4 +1,4 @@
-"""A server that speaks S3, for campaigns whose nodes share no files."""
+"""A server with the interface of S3, for campaigns whose nodes share no files."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pytest
 @pytest.fixture(scope="session")
 def s3_server() -> Iterator[str]:
     """Yield the address of the server."""
-    pytest.importorskip("flask_cors")  # the server's, which moto does not bring by itself
+    pytest.importorskip("flask_cors")  # needed by the server, but not installed with moto
     server = pytest.importorskip("moto.server").ThreadedMotoServer("127.0.0.1", port=0)
     server.start()
     host, port = server.get_host_and_port()
@@ -21,7 +21,7 @@ def s3_server() -> Iterator[str]:
 
 @pytest.fixture
 def bucket(s3_server: str, monkeypatch: pytest.MonkeyPatch) -> str:
-    """Return the address of a new bucket, found and opened by what the environment names."""
+    """Return the address of a new bucket; environment variables name the server and the keys."""
     fs = pytest.importorskip("pyarrow.fs")
     for name, value in {
         "AWS_ACCESS_KEY_ID": "tester",

@@ -1,4 +1,4 @@
-"""The processes that carry out a campaign's runs, and how far these have come."""
+"""The processes that carry out a campaign's runs, and their progress."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def workers(root: Path) -> dict[int, list[str]]:
     for place in Path("/proc").glob("[0-9]*"):
         try:
             words = (place / "cmdline").read_text().split("\0")[:-1]
-        except OSError:  # gone since
+        except OSError:  # ended meanwhile
             continue
         if "conevo.campaigns.worker" in words and str(root.resolve()) in words:
             found[int(place.name)] = words
@@ -24,15 +24,15 @@ def workers(root: Path) -> dict[int, list[str]]:
 
 
 def n_generations(campaign: Campaign, label: str) -> int:
-    """Return how many generations a run has behind it, 0 if it has not begun."""
+    """Return the number of finished generations of a run, 0 if it has not started."""
     path = campaign.paths.run(label) / "generations.jsonl"
     return path.read_bytes().count(b"\n") if path.is_file() else 0
 
 
 def until(condition: Callable[[], Any], seconds: float = 90) -> Any:
-    """Wait for a condition, and fail if it does not come about."""
+    """Wait for a condition, and fail if it stays false."""
     deadline = time.monotonic() + seconds
     while not (found := condition()):
-        assert time.monotonic() < deadline, "waited in vain"
+        assert time.monotonic() < deadline, "the condition stayed false"
         time.sleep(0.02)
     return found

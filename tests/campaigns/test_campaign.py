@@ -1,4 +1,4 @@
-"""What the coordinator does, with an executor that does nothing by itself; see also contracts."""
+"""The coordinator, with an executor that does nothing by itself; see also tests/contracts."""
 
 import json
 import shutil
@@ -17,7 +17,7 @@ from conevo.runs.run import Run
 
 
 class Scripted:
-    """Carries a job out when it is waited for, or does with it what a test says."""
+    """Carries out a job when the coordinator waits for it, or does what a test prescribes."""
 
     name = "scripted"
 
@@ -43,7 +43,7 @@ class Scripted:
 
 
 def end_as(campaign, **how):
-    """Return a fate: the worker writes down that it ended so."""
+    """Return a fate: the worker records that it ended in this way."""
     about = {"message": "", "origin": "", "traceback": "", "core_seconds": 1.0} | how
 
     def fate(job):
@@ -54,7 +54,7 @@ def end_as(campaign, **how):
     return fate
 
 
-def test_a_campaign_is_carried_out_and_its_runs_are_as_any_other(tmp_path):
+def test_a_campaign_is_carried_out_and_its_runs_are_ordinary_runs(tmp_path):
     campaign = tiny_campaign(tmp_path)
     executor = Scripted()
     entries = campaign.carry_on(executor)
@@ -88,7 +88,7 @@ def test_cores_are_never_shared_and_none_is_idle_at_the_end(tmp_path):
     assert [job.threads for job in executor.begun] == [1, 1, 2, 2]
 
 
-def test_a_run_has_the_threads_that_were_asked_for(tmp_path):
+def test_a_run_has_the_requested_threads(tmp_path):
     campaign = tiny_campaign(tmp_path)
     executor = Scripted(cores=4, fate=end_as(campaign, status="failed"))
     campaign.carry_on(executor, threads=3)
@@ -104,7 +104,7 @@ def test_a_lost_worker_is_tried_again_and_then_failed_with_its_reason(tmp_path):
     assert (first.state, first.reason) == ("failed", "killed by signal 9 (attempt 3 of 3)")
 
 
-def test_a_run_that_fails_by_itself_is_not_tried_again_but_by_request(tmp_path):
+def test_a_run_that_fails_by_itself_is_tried_again_only_on_request(tmp_path):
     campaign = tiny_campaign(tmp_path)
     fate = end_as(campaign, status="failed", origin="request", message="why")
     executor = Scripted(fate=fate)
@@ -124,7 +124,7 @@ def test_a_refusal_of_the_machine_is_tried_again(tmp_path):
     assert {(e.state, e.attempts) for e in entries.values()} == {("failed", ATTEMPTS)}
 
 
-def test_an_old_ending_does_not_speak_for_a_new_worker(tmp_path):
+def test_an_old_ending_does_not_count_for_a_new_worker(tmp_path):
     campaign = tiny_campaign(tmp_path)
     for label in campaign.planned:
         end_as(campaign, status="finished")(RunJob(tmp_path, label, 1))
@@ -133,7 +133,7 @@ def test_an_old_ending_does_not_speak_for_a_new_worker(tmp_path):
     assert "worker exited without reporting" in next(iter(entries.values())).reason
 
 
-def test_what_is_on_the_disk_counts_not_the_ledger(tmp_path):
+def test_files_count_rather_than_the_ledger(tmp_path):
     campaign = tiny_campaign(tmp_path)
     campaign.carry_on(Scripted())
     first, second, *_ = campaign.planned
@@ -146,7 +146,7 @@ def test_what_is_on_the_disk_counts_not_the_ledger(tmp_path):
     assert entries[second].state == "finished"
 
 
-def test_an_order_to_stop_is_obeyed_and_what_was_at_work_goes_on_later(tmp_path):
+def test_an_order_to_stop_is_obeyed_and_running_runs_continue_later(tmp_path):
     campaign = tiny_campaign(tmp_path)
 
     def fate(job):
@@ -165,7 +165,7 @@ def test_an_order_to_stop_is_obeyed_and_what_was_at_work_goes_on_later(tmp_path)
         campaign.stop()
 
 
-def test_only_one_coordinator_is_at_work(tmp_path):
+def test_only_one_coordinator_is_running(tmp_path):
     campaign = tiny_campaign(tmp_path)
 
     def fate(job):
@@ -193,7 +193,7 @@ def test_more_seeds_extend_a_campaign_and_other_settings_do_not(tmp_path):
     assert len(Campaign(campaign.path).planned) == 6
 
 
-def test_nothing_is_written_where_something_else_is_or_for_a_plan_that_cannot_be(tmp_path):
+def test_nothing_is_written_over_other_files_or_for_an_impossible_plan(tmp_path):
     plan = read_plan(write_plan(tmp_path))
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "letter.txt").write_text("dear")
@@ -219,7 +219,7 @@ def test_a_foreign_run_in_its_place_is_left_alone(tmp_path):
     )
 
 
-def test_without_a_place_for_compiled_kernels_no_run_begins(tmp_path, monkeypatch):
+def test_without_a_place_for_compiled_kernels_no_run_starts(tmp_path, monkeypatch):
     def refuse(rollout):
         raise EnvironmentFailure("compiled kernels cannot be kept in /none")
 

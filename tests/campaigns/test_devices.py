@@ -1,4 +1,4 @@
-"""Campaigns on GPUs, of which this machine may have none: what is asked and what is refused."""
+"""Campaigns on GPUs, which this machine need not have: requested devices, and refused ones."""
 
 import json
 import subprocess
@@ -26,7 +26,7 @@ def campaign(tmp_path):
 
 
 class Recorder:
-    """An executor that only notes what it is given; ``finish`` ends its oldest job."""
+    """An executor that only notes its jobs; ``finish`` ends the oldest one."""
 
     name = "recorder"
 
@@ -54,7 +54,7 @@ def test_devices_are_named_as_warp_does(text, expected):
 
 
 @pytest.mark.parametrize(
-    ("text", "says"),
+    ("text", "message"),
     [
         ("", "'' is not a device"),
         ("gpu", "'gpu' is not a device; allowed: auto, cpu, cuda, cuda:0, or several"),
@@ -66,8 +66,8 @@ def test_devices_are_named_as_warp_does(text, expected):
         ("auto,cuda:0", "several devices are written cuda:0,cuda:1"),
     ],
 )
-def test_what_is_not_a_device_is_refused(text, says):
-    with pytest.raises(UsageError, match=says):
+def test_other_names_than_those_of_devices_are_refused(text, message):
+    with pytest.raises(UsageError, match=message):
         parse_devices(text)
 
 
@@ -83,11 +83,11 @@ def test_every_worker_slot_has_a_device(campaign):
     campaign.carry_on(executor, devices=("cuda:0", "cuda:1"))
     first = [job.device for job in executor.jobs[:4]]
     assert first == ["cuda:0", "cuda:1", "cuda:0", "cuda:1"]
-    # Whoever takes the place of a worker that has ended takes its device.
+    # The successor of a worker that has ended takes its device.
     assert executor.jobs[4].device == "cuda:0"
 
 
-def test_the_device_reaches_the_run_that_is_begun(campaign, monkeypatch):
+def test_the_device_reaches_the_run_that_is_started(campaign, monkeypatch):
     label = next(iter(campaign.planned))
     job = RunJob(campaign.path, label, 1, "cuda:1")
     assert worker_command(job)[-4:] == [str(campaign.path.resolve()), label, "1", "cuda:1"]
@@ -98,29 +98,29 @@ def test_the_device_reaches_the_run_that_is_begun(campaign, monkeypatch):
     monkeypatch.setattr(worker.signal, "signal", lambda *_: None)
     monkeypatch.setattr(sys.stdin, "isatty", lambda: True, raising=False)
     worker.main()
-    assert asked == ["cuda:1", 1]  # nothing was begun, and so nothing finished
+    assert asked == ["cuda:1", 1]  # nothing was started, so nothing is finished
     monkeypatch.setattr(
         sys, "argv", ["worker", *worker_command(RunJob(campaign.path, label, 1))[-3:]]
     )
     worker.main()
-    assert asked[2:] == ["cpu", 1]  # where none is named
+    assert asked[2:] == ["cpu", 1]  # if none is named
 
 
-def test_a_device_that_is_not_here_ends_a_campaign_before_a_run_is_begun(campaign, capsys):
+def test_a_missing_device_ends_a_campaign_before_a_run_is_started(campaign, capsys):
     for executor in ("serial", "processes"):
         with pytest.raises(SystemExit) as ended:
             main(["campaign", "start", str(campaign.path), "--executor", executor,
                   "--device", "cuda:7"])  # fmt: skip
         assert ended.value.code == 3
-        said = capsys.readouterr()
-        assert said.out == ""
-        assert said.err.startswith("conevo: error: device 'cuda:7': ")
-        assert said.err.count("\n") == 1
+        output = capsys.readouterr()
+        assert output.out == ""
+        assert output.err.startswith("conevo: error: device 'cuda:7': ")
+        assert output.err.count("\n") == 1
     assert not (campaign.path / "runs").exists()
     assert not (campaign.path / "ledger.sqlite").exists()
 
 
-def test_devices_that_are_here_are_accepted(two_cards):
+def test_devices_of_this_machine_are_accepted(two_cards):
     assert make_executor("processes", 2, devices=("cuda:0", "cuda:1")).cores == 2
     with pytest.raises(EnvironmentFailure, match="'cuda:2': allowed here: cpu, cuda:0, cuda:1"):
         make_executor("processes", 2, devices=("cuda:2",))
@@ -136,7 +136,7 @@ def test_auto_is_every_card_or_the_cpu(two_cards, monkeypatch):
     assert ready(**asked, device=None).devices == ()
 
 
-def test_a_run_goes_on_where_it_was_on_the_cpu_or_on_the_device_that_is_named(campaign, caplog):
+def test_a_run_continues_on_its_device_or_the_cpu_or_the_named_device(campaign, caplog):
     label, other = list(campaign.planned)[:2]
     path = campaign.paths.run(label)
     run = worker.start(campaign.planned[label].configs()[0], path, threads=1)
@@ -154,7 +154,7 @@ def test_a_run_goes_on_where_it_was_on_the_cpu_or_on_the_device_that_is_named(ca
     assert about["device"] == about["sessions"][0]["device"] == devices_here(("auto",))[0]
 
 
-def test_who_interrupts_a_campaign_on_cards_is_told_how_it_goes_on_there(
+def test_an_interrupted_campaign_on_cards_shows_how_to_continue_there(
     two_cards, campaign, monkeypatch, capsys
 ):
     def interrupted(*_, **how):
@@ -181,15 +181,15 @@ def test_a_slurm_task_has_its_device_and_looks_for_it_first(campaign, tmp_path):
     pythonpath = {"PYTHONPATH": ":".join(sys.path)}
     done = subprocess.run(["bash", str(script)], env=environment | pythonpath, check=False)
     assert done.returncode == 3
-    said = (campaign.path / "logs" / "slurm-0.txt").read_text()
-    assert "device 'cuda:7': " in said
-    assert said.count("\n") == 1
+    output = (campaign.path / "logs" / "slurm-0.txt").read_text()
+    assert "device 'cuda:7': " in output
+    assert output.count("\n") == 1
     assert not (campaign.path / "runs").exists()
     text = script.read_text()
     assert '"$SLURM_CPUS_PER_TASK" cuda:7 \\\n' in text
     text = slurm.write_array(campaign.path, labels, device="auto").read_text()
     assert '"$SLURM_CPUS_PER_TASK" auto \\\n' in text
-    assert "campaigns.devices" not in text  # it is there on every node
+    assert "campaigns.devices" not in text  # it exists on every node
     with pytest.raises(UsageError, match="a task of the array has one device"):
         slurm.write_array(campaign.path, labels, device="cuda:0,cuda:1")
 
@@ -198,7 +198,7 @@ def test_a_slurm_task_has_its_device_and_looks_for_it_first(campaign, tmp_path):
     ("options", "advice"),
     [([], True), (["--gres", "gpu:1"], False), (["--sbatch", "--gpus-per-task=1"], False)],
 )
-def test_a_slurm_array_on_gpus_that_asks_for_none_is_told(campaign, capsys, options, advice):
+def test_a_slurm_array_on_gpus_that_requests_none_is_noted(campaign, capsys, options, advice):
     with pytest.raises(SystemExit) as ended:
         main(["campaign", "slurm", str(campaign.path), "--device", "cuda", *options])
     assert ended.value.code == 0
@@ -206,7 +206,7 @@ def test_a_slurm_array_on_gpus_that_asks_for_none_is_told(campaign, capsys, opti
 
 
 class FakeRay:
-    """As much of Ray as an executor asks of it, on a cluster with so many GPUs."""
+    """The part of Ray that an executor uses, on a cluster with that number of GPUs."""
 
     def __init__(self, gpus):
         self.gpus, self.asked = gpus, []
@@ -232,7 +232,7 @@ class FakeRay:
 
 @pytest.fixture
 def ray_with(monkeypatch):
-    """Return a function that puts a cluster with so many GPUs in place of Ray."""
+    """Return a function that replaces Ray by a cluster with a given number of GPUs."""
 
     def make(gpus):
         fake = FakeRay(gpus)
@@ -242,7 +242,7 @@ def ray_with(monkeypatch):
     return make
 
 
-def test_a_ray_task_asks_for_a_gpu_where_its_device_is_one(campaign, ray_with):
+def test_a_ray_task_requests_a_gpu_if_its_device_is_one(campaign, ray_with):
     label = next(iter(campaign.planned))
     fake = ray_with(2)
     executor = make_executor("ray", 4, devices=("cuda",))
@@ -254,7 +254,7 @@ def test_a_ray_task_asks_for_a_gpu_where_its_device_is_one(campaign, ray_with):
 
 
 @pytest.mark.parametrize(("gpus", "asked"), [(2, 1), (0, None)])
-def test_auto_is_a_gpu_per_task_where_ray_has_any(campaign, ray_with, gpus, asked):
+def test_auto_is_a_gpu_per_task_if_ray_has_any(campaign, ray_with, gpus, asked):
     label = next(iter(campaign.planned))
     fake = ray_with(gpus)
     make_executor("ray", 4, devices=("auto",)).submit(RunJob(campaign.path, label, 1, "auto"))
@@ -271,7 +271,7 @@ def test_a_ray_cluster_without_gpus_or_with_numbered_ones_is_refused(ray_with):
         make_executor("ray", 4, devices=("cuda:0", "cuda:1"))
 
 
-def test_the_check_of_a_node_is_quiet_where_all_is_well(monkeypatch, capsys):
+def test_the_check_of_a_node_is_quiet_if_all_is_well(monkeypatch, capsys):
     monkeypatch.setattr(sys, "argv", ["devices", "cpu"])
     devices.main()
     assert capsys.readouterr() == ("", "")
@@ -283,9 +283,7 @@ def test_the_check_of_a_node_is_quiet_where_all_is_well(monkeypatch, capsys):
      ("cuda:", 2, "allowed: auto, cpu"),
      ("cuda:7", 3, "device 'cuda:7': ")],
 )  # fmt: skip
-def test_a_name_that_no_device_has_is_the_users_mistake(
-    device, code, words, tmp_path, monkeypatch, capsys
-):
+def test_a_name_of_no_device_is_a_wrong_request(device, code, words, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(SystemExit) as caught:
         main(["run", "rover/complex-1", "--preset", "smoke", "--device", device])

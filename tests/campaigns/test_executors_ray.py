@@ -1,4 +1,4 @@
-"""Ray's own promises: lost nodes and workers, clusters by address, results through a store."""
+"""Contracts of Ray alone: lost nodes and workers, clusters by address, results through a store."""
 
 import os
 import shutil
@@ -27,7 +27,7 @@ settings = { "run.generations" = 30, "method.genotypes" = 40, "world.iterations"
 
 
 def parent(process):
-    """Return the number of a process' parent, 0 if it has gone."""
+    """Return the process number of a process' parent, 0 if it has ended."""
     try:
         return int(Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[1])
     except OSError:
@@ -43,7 +43,7 @@ def long_run(tmp_path):
 
 @pytest.fixture(scope="module")
 def undisturbed(tmp_path_factory):
-    """Return what the first run comes to if nobody disturbs it."""
+    """Return the outcome of the first run if it is not disturbed."""
     folder = tmp_path_factory.mktemp("undisturbed")
     planned = next(iter(tiny_campaign(folder, more=LONG, seeds=1).planned.values()))
     return outcome(start(planned.configs()[0], folder / "run", threads=1).resume())
@@ -59,7 +59,7 @@ def end_of(executor):
     return until(lambda: executor.wait(0.1))
 
 
-def test_ray_itself_carries_a_run_on_whose_ray_worker_was_killed(long_run, undisturbed):
+def test_ray_itself_continues_a_run_whose_ray_worker_was_killed(long_run, undisturbed):
     campaign, label = long_run
     executor = make_executor("ray", 1)
     try:
@@ -67,7 +67,7 @@ def test_ray_itself_carries_a_run_on_whose_ray_worker_was_killed(long_run, undis
         until(lambda: n_generations(campaign, label) > 2)
         (worker,) = workers(campaign.path)
         os.kill(parent(worker), signal.SIGKILL)
-        until(lambda: worker not in workers(campaign.path))  # it leaves when its parent is gone
+        until(lambda: worker not in workers(campaign.path))  # it ends when its parent has ended
         (ending,) = end_of(executor)
     finally:
         executor.stop()
@@ -137,7 +137,7 @@ def test_a_cluster_by_address_has_the_cores_of_its_nodes_and_survives_the_loss_o
 
 
 def test_no_cluster_at_an_address_is_one_clear_line(monkeypatch):
-    """Said by Ray itself, but not asked for: another test's cluster may be at work beside this."""
+    """Ray's own message, made up here: the cluster of another test may be running."""
     import ray
 
     def init(address, **_):
@@ -159,7 +159,7 @@ def test_a_node_that_does_not_start_in_time_is_one_clear_line(monkeypatch):
         make_executor("ray", 1)
 
 
-def test_ray_begins_nothing_that_calls_home_and_no_page():
+def test_ray_starts_no_usage_reports_and_no_dashboard():
     executor = make_executor("ray", 1)
     try:
         mine = [one for one in Path("/proc").glob("[0-9]*") if parent(one.name) == os.getpid()]
@@ -173,7 +173,7 @@ def test_ray_begins_nothing_that_calls_home_and_no_page():
         executor.stop()
 
 
-def test_what_is_missing_is_said_in_one_line(tmp_path):
+def test_a_missing_ray_is_one_line(tmp_path):
     code = (
         "import sys; sys.modules['ray'] = None\n"
         "from conevo.campaigns.executors.registry import make_executor\n"

@@ -1,4 +1,4 @@
-"""A campaign whose plan becomes longer: its runs go on, its studies and tables are made again."""
+"""A campaign whose plan becomes longer: its runs continue, studies and tables are made again."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ def test_a_budget_that_adds_nothing_is_a_longer_plan_too(tmp_path: Path) -> None
         assert Run(longer.paths.run(label)).provenance["run_id"] == planned.run_ids[0]
 
 
-def test_a_new_plan_is_there_whole_or_not_at_all(
+def test_a_new_plan_is_written_whole_or_not_at_all(
     campaign: Campaign, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     new = tmp_path / "new"
@@ -123,7 +123,7 @@ def test_a_new_plan_is_there_whole_or_not_at_all(
     assert call >= 6
 
 
-def test_a_worker_that_is_killed_while_it_extends_a_run_goes_on(
+def test_a_worker_that_is_killed_while_it_extends_a_run_continues(
     campaign: Campaign, whole: Campaign, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     longer = create(campaign.plan.at(settings=LONGER), campaign.path)

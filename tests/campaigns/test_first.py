@@ -70,7 +70,7 @@ def campaign(tmp_path_factory: pytest.TempPathFactory) -> Campaign:
 
 @pytest.fixture(scope="module")
 def label(campaign: Campaign) -> str:
-    """The label of the run that begins with clones."""
+    """The label of the run that starts with clones."""
     (found,) = (name for name, run in campaign.planned.items() if run.in_stages)
     return found
 
@@ -184,7 +184,7 @@ def test_both_stages_are_one_run_in_the_tables(campaign: Campaign, label: str) -
             1
         ]
         assert chosen == (len(one) + second.test_result["validation"]["chosen"],)
-        # An equal race: all three runs are compared.
+        # Budgets are equal: all three runs are compared.
         assert len(tables.query("SELECT DISTINCT budget FROM budgets")[1]) == 1
 
 
@@ -209,7 +209,7 @@ def test_its_progress_is_that_of_both_stages(campaign: Campaign, label: str) -> 
     assert found.share > 0.5
 
 
-def test_stages_that_have_begun_keep_their_length(campaign: Campaign) -> None:
+def test_stages_that_have_started_keep_their_length(campaign: Campaign) -> None:
     with pytest.raises(UsageError, match="stages keep their length"):
         create(campaign.plan.at(settings={"run.budget_evaluations": 80}), campaign.path)
 

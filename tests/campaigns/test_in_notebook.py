@@ -1,4 +1,4 @@
-"""A campaign's tables as DataFrames, and what a notebook displays of it."""
+"""A campaign's tables as DataFrames, and its card in a notebook."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def test_without_a_finished_run_frames_are_empty_with_the_same_types(
     assert not other.paths.tables.exists()
 
 
-def test_without_pandas_it_is_one_line(campaign: Campaign, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_missing_pandas_is_one_line(campaign: Campaign, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pandas", None)
     with pytest.raises(EnvironmentFailure, match=r"need pandas, .* pip install"):
         campaign.frame()

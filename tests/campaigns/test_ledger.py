@@ -21,7 +21,7 @@ def states(ledger):
     return {entry.label: entry.state for entry in ledger.entries()}
 
 
-def test_runs_stand_in_the_order_of_the_plan_also_when_some_are_added(ledger):
+def test_runs_are_in_the_order_of_the_plan_even_if_some_are_added(ledger):
     ledger.begin("two", 2, 10.0)
     ledger.enrol(["zero", "one", "two", "three"])
     assert states(ledger) == {
@@ -46,7 +46,7 @@ def test_endings_are_counted_and_their_costs_added(ledger):
     assert (one.state, one.attempts, one.reason) == ("pending", 0, "")
 
 
-def test_runs_of_a_coordinator_that_left_wait_and_no_attempt_is_counted(ledger):
+def test_runs_of_a_coordinator_that_ended_are_pending_and_no_attempt_is_counted(ledger):
     ledger.begin("two", 1, 0.0)
     ledger.end("one", "finished")
     ledger.release()
@@ -66,14 +66,14 @@ def test_a_ledger_that_was_never_written_is_empty(tmp_path):
     assert Ledger(tmp_path / "none.sqlite").entries() == []
 
 
-def test_a_damaged_ledger_is_said_to_be_damaged(tmp_path):
+def test_a_damaged_ledger_is_one_line(tmp_path):
     path = tmp_path / "ledger.sqlite"
     path.write_bytes(b"not a database at all" * 100)
     with pytest.raises(UsageError, match=r"damaged.*remove it"):
         Ledger(path).entries()
 
 
-def test_a_place_that_cannot_be_written_is_the_machine_s_fault(tmp_path):
+def test_a_place_that_cannot_be_written_is_a_fault_of_the_machine(tmp_path):
     with pytest.raises(EnvironmentFailure, match=r"cannot use .*ledger\.sqlite"):
         Ledger(tmp_path / "none" / "ledger.sqlite").enrol(["one"])
 
@@ -89,7 +89,7 @@ os.kill(os.getpid(), signal.SIGKILL)
 """
 
 
-def test_what_a_killed_writer_left_is_undone_by_whoever_reads_next(ledger):
+def test_the_next_reader_undoes_the_changes_of_a_killed_writer(ledger):
     ledger.begin("two", 1, 0.0)
     before = states(ledger)
     done = subprocess.run([sys.executable, "-c", KILLED, str(ledger.path)], check=False)

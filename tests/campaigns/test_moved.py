@@ -1,4 +1,4 @@
-"""A campaign holds what it needs and says what made it: moved, without its files, by other code."""
+"""A campaign has copies of its files and records its code: moved, without originals, other code."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def light_plan(folder: Path, head: str = "studies = []") -> Path:
     return path
 
 
-def test_a_moved_campaign_goes_on_without_the_files_of_its_plan(tmp_path: Path) -> None:
+def test_a_moved_campaign_continues_without_the_files_of_its_plan(tmp_path: Path) -> None:
     plan = read_plan(light_plan(tmp_path / "plans"))
     made = create(plan.at(seeds=1), tmp_path / "made")
     assert carried_out(made) == ["finished", "finished"]
@@ -99,7 +99,7 @@ def test_a_factor_of_prey_files_is_kept_by_their_names(tmp_path: Path) -> None:
     assert create(moved.plan.at(seeds=2), moved.path).planned.keys() > moved.planned.keys()
 
 
-def test_a_plan_made_in_python_names_files_from_where_it_is(
+def test_a_plan_made_in_python_names_files_relative_to_the_working_directory(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     plan = read_plan(light_plan(tmp_path / "plans")).at(seeds=1)
@@ -112,8 +112,8 @@ def test_a_plan_made_in_python_names_files_from_where_it_is(
     assert Campaign(made.path).plan.write_out() == list(made.planned.values())
 
 
-def begun_by_another(folder: Path) -> Campaign:
-    """Make a campaign of which half was made by another version."""
+def started_by_another(folder: Path) -> Campaign:
+    """Make a campaign of which another version made one half."""
     made = create(read_plan(write_plan(folder / "plans", "studies = []")), folder / "made")
     carried_out(made)
     made.paths.code.write_text(json.dumps({"codes": [OTHER]}))
@@ -129,10 +129,10 @@ def begun_by_another(folder: Path) -> Campaign:
     return Campaign(made.path)
 
 
-def test_other_code_does_not_carry_a_campaign_on_unless_it_is_accepted(
+def test_other_code_does_not_continue_a_campaign_unless_it_is_accepted(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    made = begun_by_another(tmp_path)
+    made = started_by_another(tmp_path)
     here = current_code()
     with pytest.raises(UsageError, match=r"was started by conevo .*abc123.*--accept-other-code"):
         carried_out(made)
@@ -152,7 +152,7 @@ def test_other_code_does_not_carry_a_campaign_on_unless_it_is_accepted(
 
 
 def test_a_campaign_of_the_first_release_is_other_code(tmp_path: Path) -> None:
-    made = begun_by_another(tmp_path)
+    made = started_by_another(tmp_path)
     made.paths.code.unlink()
     file = next(made.path.glob("runs/*/provenance.json"))
     about = json.loads(file.read_text())

@@ -1,6 +1,6 @@
-"""Runs in an object store: whole, or broken off anywhere, they go on to the same bits.
+"""Runs in an object store: whole or broken off anywhere, they continue bit for bit.
 
-The store is one that is asked through S3.
+The store has the interface of S3.
 """
 
 import shutil
@@ -34,7 +34,7 @@ def store(bucket):
 
 
 def advance(path, generations=1):
-    """Carry a run on by some generations."""
+    """Continue a run by some generations."""
 
     def watch(run, record):
         nonlocal generations
@@ -47,7 +47,7 @@ def advance(path, generations=1):
 
 
 def begun(campaign, label):
-    """Begin a run as a worker does, and leave it after two generations."""
+    """Start a run as a worker does, and leave it after two generations."""
     planned = campaign.planned[label]
     (config,) = planned.configs()
     start(config, campaign.paths.run(label), threads=1)
@@ -63,7 +63,7 @@ def outcome(path):
 
 
 def finish(store, folder, label):
-    """Carry a run on elsewhere, as a worker on another machine does, and return what it found."""
+    """Finish a run elsewhere, as a worker on another machine does, and return its outcome."""
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir()
     store.get_plan(folder)
@@ -75,7 +75,7 @@ def finish(store, folder, label):
 
 @pytest.fixture
 def undisturbed(campaign, label, tmp_path):
-    """What the run comes to where nothing is copied."""
+    """The outcome of the run if nothing is copied."""
     folder = tmp_path / "undisturbed"
     folder.mkdir()
     shutil.copy(campaign.paths.runs, folder)
@@ -106,7 +106,7 @@ def test_a_finished_run_comes_back_as_it_was(campaign, label, store, tmp_path):
     assert outcome(elsewhere / "runs" / label) == outcome(campaign.paths.run(label))
 
 
-def test_what_is_fetched_takes_the_place_of_what_was_there(campaign, label, store):
+def test_fetched_files_replace_existing_ones(campaign, label, store):
     path = begun(campaign, label)
     store.put_run(campaign.path, label)
     advance(path, 2)
@@ -116,7 +116,7 @@ def test_what_is_fetched_takes_the_place_of_what_was_there(campaign, label, stor
     assert not (path / "another").exists()
 
 
-def test_how_a_run_ended_is_forgotten_when_it_is_tried_again(campaign, label, store):
+def test_the_ending_of_a_run_is_removed_when_it_is_tried_again(campaign, label, store):
     store.forget_ending(campaign.path, label)
     ended = campaign.paths.ended(label)
     ended.parent.mkdir()
@@ -129,7 +129,7 @@ def test_how_a_run_ended_is_forgotten_when_it_is_tried_again(campaign, label, st
 
 
 @pytest.mark.slow
-def test_a_copy_that_breaks_off_anywhere_leaves_a_run_that_goes_on(
+def test_a_copy_that_breaks_off_anywhere_leaves_a_run_that_continues(
     campaign, label, store, tmp_path, undisturbed, monkeypatch
 ):
     path = begun(campaign, label)
@@ -164,9 +164,7 @@ def test_a_copy_that_breaks_off_anywhere_leaves_a_run_that_goes_on(
     assert len(firsts) > 6
 
 
-def test_a_run_that_is_at_work_meanwhile_can_be_copied(
-    campaign, label, store, tmp_path, undisturbed, monkeypatch
-):
+def test_a_running_run_can_be_copied(campaign, label, store, tmp_path, undisturbed, monkeypatch):
     path = begun(campaign, label)
     store.put_plan(campaign.path)
     read = Path.read_bytes
@@ -200,7 +198,7 @@ def test_a_sealed_run_is_whole_wherever_its_copy_breaks_off(campaign, label, sto
     assert names[-3].startswith("checkpoint-")
 
 
-def test_what_a_run_no_longer_has_is_no_longer_stored(campaign, label, store, tmp_path):
+def test_files_removed_from_a_run_are_removed_from_the_store(campaign, label, store, tmp_path):
     path = begun(campaign, label)
     store.put_run(campaign.path, label)
     two = set(store._names(f"runs/{label}"))
@@ -213,7 +211,7 @@ def test_what_a_run_no_longer_has_is_no_longer_stored(campaign, label, store, tm
 
 
 @pytest.mark.parametrize("uri", ["nowhere", "xyz://bucket/path", "s3://"])
-def test_an_address_that_is_none_is_refused(uri):
+def test_an_invalid_address_is_refused(uri):
     pytest.importorskip("pyarrow")
     with pytest.raises(UsageError, match=f"object store '{uri}'"):
         ObjectStore(uri)
@@ -252,6 +250,6 @@ def test_a_store_that_cannot_be_reached_is_one_line_without_the_password(
     assert "hidden" not in str(caught.value)
 
 
-def test_a_bucket_that_there_is_not_is_refused_before_anything_starts(campaign, bucket):
+def test_a_missing_bucket_is_refused_before_anything_starts(campaign, bucket):
     with pytest.raises(EnvironmentFailure, match=r"-none/inner/runs.jsonl: Bucket .* not found"):
         ObjectStore(f"{bucket}-none/inner").put_plan(campaign.path)

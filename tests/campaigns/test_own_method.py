@@ -51,7 +51,7 @@ def say(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
     return capsys.readouterr().out
 
 
-def test_it_is_next_to_the_others_and_nothing_of_its_file_is_run_to_show_it(
+def test_it_is_listed_with_the_others_and_its_file_is_not_run_to_show_it(
     made: Campaign, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     text = made.paths.plan.read_text() + made.paths.runs.read_text()
@@ -72,7 +72,7 @@ def test_it_is_next_to_the_others_and_nothing_of_its_file_is_run_to_show_it(
     assert seen["methods"]["random-search"]["title"] == "random search"
 
 
-def test_it_goes_on_from_the_campaigns_own_copy(made: Campaign) -> None:
+def test_it_continues_from_the_campaigns_own_copy(made: Campaign) -> None:
     longer = create(made.plan.at(seeds=2), made.path)
     states = [one.state for one in longer.carry_on(make_executor("serial", 1)).values()]
     assert states == ["finished"] * 4

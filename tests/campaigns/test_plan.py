@@ -30,7 +30,7 @@ def test_every_combination_of_levels_is_run_with_every_seed_seed_by_seed(tmp_pat
     assert config.run_id == runs[5].run_ids[0]
 
 
-def test_conditions_choose_runs_and_later_ones_win_and_factors_win_over_all(tmp_path):
+def test_conditions_select_runs_and_later_ones_override_and_factors_override_all(tmp_path):
     path = write_plan(tmp_path, factors='"run.epochs" = [1, 3]')
     with path.open("a") as file:
         file.write(
@@ -123,7 +123,7 @@ def test_named_levels_may_be_of_some_runs_only(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "says"),
+    ("old", "new", "message"),
     [
         ('["small", "large"]', '["small", "lage"]', "level of ranges 'lage'.*mean 'large'"),
         ("[levels.ranges]", "[levels.range]", "levels.range in .*: the plan has no factor 'range'"),
@@ -136,11 +136,11 @@ def test_named_levels_may_be_of_some_runs_only(tmp_path):
         ("[levels.ranges]", "[[levels]]", "levels in .* must be a table"),
     ],
 )
-def test_a_wrong_level_is_one_clear_line(tmp_path, old, new, says):
+def test_a_wrong_level_is_one_clear_line(tmp_path, old, new, message):
     path = write_plan(tmp_path, factors='ranges = ["small", "large"]', more=NAMED)
     assert old in path.read_text()
     path.write_text(path.read_text().replace(old, new, 1))
-    with pytest.raises(UsageError, match=says) as caught:
+    with pytest.raises(UsageError, match=message) as caught:
         read_plan(path).write_out()
     assert "\n" not in str(caught.value)
 
@@ -165,7 +165,7 @@ def test_two_worlds_of_one_name_are_refused(tmp_path):
             read_plan(file).write_out()
 
 
-def test_a_plan_is_what_it_was_after_being_written_and_read(tmp_path):
+def test_a_plan_is_the_same_after_being_written_and_read(tmp_path):
     path = write_plan(tmp_path, 'produces = ["figure 1"]', '"method.gst" = [0.1]')
     path.write_text(path.read_text().replace('"homcne", ', ""))
     plan = read_plan(path).at("desk", 3, {"run.epochs": 2})
@@ -198,7 +198,7 @@ def test_some_runs_of_a_plan_may_be_shapings(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "says"),
+    ("old", "new", "message"),
     [
         ("[settings]", "[setings]", "'setings'.*did you mean 'settings'"),
         ("title =", "tittle =", "'campaign.tittle'.*'campaign.title'"),
@@ -250,21 +250,21 @@ def test_some_runs_of_a_plan_may_be_shapings(tmp_path):
         ),
     ],
 )
-def test_a_wrong_plan_is_one_clear_line(tmp_path, old, new, says):
+def test_a_wrong_plan_is_one_clear_line(tmp_path, old, new, message):
     path = write_plan(tmp_path)
     assert old in path.read_text()
     path.write_text(path.read_text().replace(old, new, 1))
-    with pytest.raises(UsageError, match=says) as caught:
+    with pytest.raises(UsageError, match=message) as caught:
         read_plan(path).write_out()
     assert "\n" not in str(caught.value)
 
 
-def test_a_plan_that_is_not_there_is_a_wrong_request(tmp_path):
+def test_a_missing_plan_is_a_wrong_request(tmp_path):
     with pytest.raises(UsageError, match="No such file"):
         read_plan(tmp_path / "none.toml")
 
 
-def test_other_defaults_than_those_it_was_planned_with_are_noticed(tmp_path):
+def test_a_change_of_defaults_after_planning_is_noticed(tmp_path):
     import dataclasses
 
     run = read_plan(write_plan(tmp_path)).write_out()[0]

@@ -1,4 +1,4 @@
-"""Plans that come with conevo: the page leads to all of them; what they cost is what they say."""
+"""Plans that are part of conevo: the page lists all of them, and their stated costs are right."""
 
 import itertools
 import re
@@ -13,7 +13,7 @@ from conevo.worlds.pursuit.world import PursuitWorld
 PAGE = Path(__file__).resolve().parent.parent.parent / "docs" / "campaigns.md"
 PRESETS = Path(conevo.campaigns.plan_file.__file__).parent / "presets"
 N_NEURONS = 6
-# What the thesis shows of its experiments; all else are settings, environments and drawings.
+# Figures and tables of results; the others show settings, environments and drawings.
 SHOWN = {
     "figure": {
         "4": range(10, 13), "5": range(8, 18), "6": range(7, 10), "B": range(1, 10),
@@ -28,7 +28,7 @@ NUMBER = re.compile(r"\b(4|5|6|A|B|C|D)[.-](\d+)\b")
 
 
 def items(text):
-    """Return what "tables C-1 to C-3, figure 5.8" is: (kind, chapter, number) of each."""
+    """Return the items of "tables C-1 to C-3, figure 5.8": (kind, chapter, number) of each."""
     found = set()
     for kind, listed in re.findall(r"(figure|table)s? ((?:(?!figure|table).)*)", text):
         for part in re.split(r",| and ", listed):
@@ -48,14 +48,14 @@ def table(first):
 
 
 def rows():
-    """Return what each row of the page's table shows, and its presets."""
+    """Return the figures and tables of each row of the page's table, and its presets."""
     return [
         (items(cells[0]), re.findall(r"`([a-z-]+)`", cells[2])) for cells in table("of the thesis")
     ]
 
 
 def questions():
-    """Return the presets of open questions, and what the page says that each costs."""
+    """Return the presets of open questions, and the cost of each according to the page."""
     return {cells[0].strip("`"): cells[2] for cells in table("preset")}
 
 
@@ -82,7 +82,7 @@ def test_populations_share_six_hundred_genotypes(name, scale):
         assert 594 <= genotypes * populations <= 612
 
 
-def test_all_that_the_thesis_shows_is_on_the_page():
+def test_all_results_of_the_thesis_are_on_the_page():
     shown = {
         (kind, chapter, n)
         for kind, chapters in SHOWN.items()
@@ -93,7 +93,7 @@ def test_all_that_the_thesis_shows_is_on_the_page():
     assert reported == shown
 
 
-def test_a_preset_produces_what_the_page_says_it_does():
+def test_a_preset_produces_the_results_that_the_page_lists():
     by_preset = {}
     for found, presets in rows():
         for name in presets:
@@ -104,7 +104,7 @@ def test_a_preset_produces_what_the_page_says_it_does():
 
 
 @pytest.mark.parametrize("name", questions())
-def test_an_open_question_costs_what_its_plan_and_the_page_say(name):
+def test_an_open_question_has_the_cost_that_its_plan_and_the_page_state(name):
     plan = read_preset(name)
     lines = (PRESETS / f"{name}.toml").read_text().partition("\n\n[")[0].splitlines()
     comment = " ".join(line.strip("# ") for line in lines)

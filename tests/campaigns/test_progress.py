@@ -1,4 +1,4 @@
-"""What can be known of a run that no coordinator of ours carries out: SLURM's, or a resume's."""
+"""The state of runs that a coordinator has not started: those of SLURM, or resumed by hand."""
 
 import contextlib
 import json
@@ -32,7 +32,7 @@ def write_log(path, n, budget=0, more=""):
 
 
 def held(campaign, label):
-    """Return a context in which a process is at work on a run."""
+    """Return a context in which a process is working on a run."""
     path = campaign.paths.run(label)
     write_log(path, 3)
     return Directory(path, "run").locked()
@@ -49,7 +49,7 @@ def write_ended(campaign, label, **changes):
 # --- states -------------------------------------------------------------------------------------
 
 
-def test_a_run_that_any_process_holds_is_running(campaign):
+def test_a_run_locked_by_any_process_is_running(campaign):
     first, *others = campaign.planned
     with held(campaign, first):
         states = {label: entry.state for label, entry in campaign.standings().items()}
@@ -60,7 +60,7 @@ def test_a_run_that_any_process_holds_is_running(campaign):
 def test_a_run_whose_worker_had_no_coordinator_has_failed_with_its_reason(campaign):
     first, second, third, fourth = campaign.planned
     path = write_ended(campaign, first)
-    write_ended(campaign, second, status="finished")  # whoever says so: there is no such run
+    write_ended(campaign, second, status="finished")  # wrong: the run does not exist
     write_ended(campaign, third, message=3)
     write_ended(campaign, fourth).write_text("[" * 50_000)
     entry = campaign.standings()[first]
@@ -71,7 +71,7 @@ def test_a_run_whose_worker_had_no_coordinator_has_failed_with_its_reason(campai
     assert campaign.standings()[first].state == "pending"
 
 
-def test_what_a_coordinator_knows_counts_for_more_than_what_a_worker_wrote(campaign):
+def test_the_state_of_a_coordinator_counts_for_more_than_that_of_a_worker(campaign):
     first = next(iter(campaign.planned))
     write_ended(campaign, first)
     campaign.ledger.enrol(campaign.planned)
@@ -114,7 +114,7 @@ def test_a_worker_leaves_a_run_that_another_one_has(campaign, monkeypatch):
     run = start(planned.configs()[0], campaign.paths.run(label), threads=1)
     with Directory(run.path, "run").locked():
         assert not carry_out(campaign.path, label, 1)
-    assert not campaign.paths.ended(label).exists()  # that is for the other to write
+    assert not campaign.paths.ended(label).exists()  # the other one writes that
 
 
 # --- how far --------------------------------------------------------------------------------------
@@ -124,7 +124,9 @@ def test_a_worker_leaves_a_run_that_another_one_has(campaign, monkeypatch):
     ("n", "budget", "expected"),
     [(4, 0, (4, 10, 28, 0, 0.4)), (4, 56, (4, 10, 28, 56, 0.5)), (12, 0, (12, 10, 84, 0, 1.0))],
 )
-def test_a_run_is_as_far_as_its_last_line_and_its_settings_say(campaign, n, budget, expected):
+def test_the_progress_of_a_run_follows_from_its_last_line_and_its_settings(
+    campaign, n, budget, expected
+):
     label = next(iter(campaign.planned))
     path = campaign.paths.run(label)
     write_log(path, n, budget, more='{"generation": 99, "team_eval')
@@ -151,13 +153,13 @@ def test_a_run_without_readable_settings_has_no_plan(campaign, text):
     assert (found.generations, found.of, found.share) == (3, 0, 0.0)
 
 
-def test_a_run_that_has_not_begun_has_nothing(campaign):
+def test_a_run_that_has_not_started_has_no_progress(campaign):
     label = next(iter(campaign.planned))
     assert progress_of(campaign.paths, campaign.planned[label]) == NOTHING
     assert last_written(campaign.paths, label) is None
 
 
-def test_a_shaping_is_as_far_as_its_stages(tmp_path):
+def test_the_progress_of_a_shaping_is_that_of_its_stages(tmp_path):
     path = tmp_path / "p.toml"
     path.write_text('[campaign]\nseeds = 1\nshape = true\n[factors]\nworld = ["rover/complex-2"]\n'
                     'method = ["cone"]\n')  # fmt: skip

@@ -1,4 +1,4 @@
-"""Tables of a campaign: what counts as a run, as its value, and as the same budget."""
+"""Tables of a campaign: which runs count, their values, and equal budgets."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def tables_of(folder: Path, of: list[Cell], **further: object) -> Tables:
 
 
 def edit(folder: Path, sql: str, table: str = "runs") -> None:
-    """Replace a table by what a query over it (as ``old``) gives."""
+    """Replace a table by the result of a query over it (as ``old``)."""
     file = folder / "campaign" / "tables" / f"{table}.parquet"
     with duckdb.connect() as connection:
         connection.execute(f"CREATE TABLE old AS FROM read_parquet('{file}')")
@@ -66,8 +66,8 @@ def test_budgets_join_near_numbers_of_evaluations_and_keep_others_apart(tmp_path
     one = "rover/complex-1"
     of = [
         *cells([one], ["homcne"], budget=49848),
-        *cells([one], ["cone"], budget=58000),  # within a fifth of the one before
-        *cells([one], ["mesp"], budget=70001),  # not
+        *cells([one], ["cone"], budget=58000),  # within a fifth of the previous one
+        *cells([one], ["mesp"], budget=70001),  # not within a fifth
         *cells([one], ["ccga"], budget=49848, preset="desk"),
     ]
     with tables_of(tmp_path, of, seeds=1) as tables:
@@ -80,7 +80,7 @@ def test_budgets_join_near_numbers_of_evaluations_and_keep_others_apart(tmp_path
     }
 
 
-def test_runs_of_one_planned_budget_belong_together_whatever_they_spent(tmp_path) -> None:
+def test_runs_of_one_planned_budget_are_one_group_whatever_they_spent(tmp_path) -> None:
     one = "rover/complex-1"
     of = [
         *cells([one], ["homcne"], budget=61, planned=100),
@@ -109,7 +109,7 @@ def test_longer_evaluations_are_another_budget(tmp_path) -> None:
         assert len({one.budget for one in tables.values()}) == 2
 
 
-def test_a_run_that_ended_at_its_target_counts_with_the_budget_it_had(tmp_path) -> None:
+def test_a_run_that_ended_at_its_target_counts_with_its_planned_budget(tmp_path) -> None:
     of = [Cell("rover", "complex-1", "ccga"), Cell("rover", "complex-1", "cone", budget=300)]
     write_campaign(tmp_path / "campaign", of, seeds=1)
     with Tables(tmp_path / "campaign" / "tables") as tables:
@@ -122,7 +122,7 @@ def test_a_run_that_ended_at_its_target_counts_with_the_budget_it_had(tmp_path) 
         assert len({one.budget for one in tables.values()}) == 1
 
 
-def test_stages_of_shapings_stand_apart_and_equal_ones_count_once(tmp_path) -> None:
+def test_stages_of_shapings_are_separate_and_equal_ones_count_once(tmp_path) -> None:
     of = [Cell("gacc", "complex-1", "cone"), Cell("gacc", "complex-1", "cone", stage=1)]
     write_campaign(tmp_path / "campaign", of, seeds=2)
     with Tables(tmp_path / "campaign" / "tables") as tables:
@@ -152,7 +152,7 @@ def test_a_folder_without_runs_and_a_foreign_file_are_refused(tmp_path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("sql", "says"),
+    ("sql", "message"),
     [
         ("SELECT nothing FROM runs", "nothing"),
         ("SELECT * FROM read_text('/etc/hostname')", "disabled by configuration"),
@@ -165,11 +165,11 @@ def test_a_folder_without_runs_and_a_foreign_file_are_refused(tmp_path) -> None:
         ("FROM runs; DESCRIBE runs; SHOW TABLES", "3 SQL statements, must be one"),
     ],
 )
-def test_a_query_only_asks_and_says_no_in_one_line(tmp_path, monkeypatch, sql, says) -> None:
+def test_anything_but_a_query_is_refused_in_one_line(tmp_path, monkeypatch, sql, message) -> None:
     monkeypatch.chdir(tmp_path)
     with (
         tables_of(tmp_path, cells(["rover/complex-1"], ["cone"]), seeds=1) as tables,
-        pytest.raises(UsageError, match=says) as refused,
+        pytest.raises(UsageError, match=message) as refused,
     ):
         tables.ask(sql)
     assert "\n" not in str(refused.value)
@@ -190,24 +190,24 @@ def test_a_query_only_asks_and_says_no_in_one_line(tmp_path, monkeypatch, sql, s
         "SELECT 1;  -- and a comment",
     ],
 )
-def test_everything_that_only_asks_is_a_query(tmp_path, sql) -> None:
+def test_all_read_only_statements_are_queries(tmp_path, sql) -> None:
     with tables_of(tmp_path, cells(["rover/complex-1"], ["cone"]), seeds=1) as tables:
         columns, rows = tables.ask(sql)
     assert {len(row) for row in rows} == {len(columns)}
 
 
 @pytest.mark.parametrize(
-    ("sql", "says"),
+    ("sql", "message"),
     [
         ("COPY runs TO 'stolen.csv'", "disabled by configuration"),
         ("SET enable_external_access = true", "locked"),
     ],
 )
-def test_what_is_no_query_reaches_no_file_either(tmp_path, monkeypatch, sql, says) -> None:
+def test_a_refused_statement_reaches_no_file(tmp_path, monkeypatch, sql, message) -> None:
     monkeypatch.chdir(tmp_path)
     with (
         tables_of(tmp_path, cells(["rover/complex-1"], ["cone"]), seeds=1) as tables,
-        pytest.raises(UsageError, match=says) as refused,
+        pytest.raises(UsageError, match=message) as refused,
     ):
         tables.query(sql)
     assert "\n" not in str(refused.value)

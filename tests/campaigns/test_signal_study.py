@@ -1,4 +1,4 @@
-"""The signal as a study of a campaign: measured once per run, a table, and part of what is done."""
+"""The signal as a study of a campaign: measured once per run, in a table, part of its progress."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def campaign(tmp_path_factory: pytest.TempPathFactory) -> Campaign:
     return create(read_plan(plan), made.path)
 
 
-def test_a_study_that_a_plan_gets_later_is_all_that_is_missing(campaign) -> None:
+def test_only_a_study_added_to_a_plan_later_is_missing(campaign) -> None:
     before = {name: campaign.paths.run(name) / "DONE" for name in campaign.planned}
     sealed = {name: path.stat().st_mtime_ns for name, path in before.items()}
     assert not any(campaign.is_finished(label) for label in campaign.planned)
@@ -56,7 +56,7 @@ def test_a_study_that_a_plan_gets_later_is_all_that_is_missing(campaign) -> None
     assert "Signal" in titles
 
 
-def test_of_a_method_without_populations_the_study_says_why_there_is_none(tmp_path) -> None:
+def test_for_a_method_without_populations_the_study_gives_the_reason(tmp_path) -> None:
     where = f"""
 [[where]]
 method = ["{OWN}:team-es"]

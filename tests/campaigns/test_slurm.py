@@ -17,17 +17,17 @@ from conevo.errors import UsageError
 
 @pytest.fixture
 def task(tmp_path):
-    """Return a function that begins a task of the array; what it asks of SLURM is in said.txt."""
+    """Return a function that starts a task of the array; its SLURM commands are in scontrol.txt."""
     command = tmp_path / "bin" / "scontrol"
     command.parent.mkdir()
-    command.write_text(f'#!/bin/bash\necho "$@" >> {tmp_path}/said.txt\n')
+    command.write_text(f'#!/bin/bash\necho "$@" >> {tmp_path}/scontrol.txt\n')
     command.chmod(0o755)
 
     def begin(script, index):
         known = {
             "SLURM_ARRAY_JOB_ID": "77",
             "SLURM_ARRAY_TASK_ID": str(index),
-            "SLURM_JOB_ID": "77",  # of one task of an array it is that of the whole array
+            "SLURM_JOB_ID": "77",  # for one task of an array: the number of the whole array
             "SLURM_CPUS_PER_TASK": "1",
         }
         path = f"{command.parent}:{os.environ['PATH']}"
@@ -45,7 +45,7 @@ def test_the_tasks_carry_out_all_runs_and_the_campaign_finds_them(tmp_path, task
     done = [campaign.is_finished(label) for label in campaign.planned]
     assert done == [True, True, False, True]
     before = {path: path.stat().st_mtime_ns for path in campaign.path.glob("ended/*")}
-    assert task(script, 0).wait(60) == 0  # as after a requeue: what is finished is left alone
+    assert task(script, 0).wait(60) == 0  # as after a requeue: finished runs are left alone
     assert {path: path.stat().st_mtime_ns for path in before} == before
     standings = campaign.carry_on(make_executor("processes", 1))
     assert {one.state for one in standings.values()} == {"finished"}
@@ -54,7 +54,7 @@ def test_the_tasks_carry_out_all_runs_and_the_campaign_finds_them(tmp_path, task
     ]  # fmt: skip
 
 
-def test_a_task_whose_time_is_up_lets_its_worker_leave_and_goes_back_into_the_queue(tmp_path, task):
+def test_a_task_whose_time_is_over_stops_its_worker_and_is_requeued(tmp_path, task):
     more = '[[where]]\nmethod = "homcne"\nsettings = { "run.generations" = 1_000_000 }'
     campaign = tiny_campaign(tmp_path, more=more)
     label = next(iter(campaign.planned))
@@ -63,7 +63,7 @@ def test_a_task_whose_time_is_up_lets_its_worker_leave_and_goes_back_into_the_qu
     until(lambda: n_generations(campaign, label) > 3)
     job.send_signal(signal.SIGUSR1)
     assert job.wait(60) == 0
-    assert (tmp_path / "said.txt").read_text() == "requeue 77_0\n"
+    assert (tmp_path / "scontrol.txt").read_text() == "requeue 77_0\n"
     assert workers(campaign.path) == {}
     run = conevo.Run(campaign.paths.run(label))
     assert run.status == "interrupted"
@@ -73,16 +73,16 @@ def test_a_task_whose_time_is_up_lets_its_worker_leave_and_goes_back_into_the_qu
     job.send_signal(signal.SIGUSR1)
     assert job.wait(60) == 0
     assert run.provenance["sessions"][1]["from_generation"] in (done - 1, done)  # records go first
-    (tmp_path / "said.txt").unlink()
+    (tmp_path / "scontrol.txt").unlink()
     job = task(script, 0)
     until(lambda: workers(campaign.path))
-    job.send_signal(signal.SIGTERM)  # cancelled: whoever did that does not want it back
+    job.send_signal(signal.SIGTERM)  # cancelled by a user, who does not want it to be requeued
     assert job.wait(60) == 143
     assert workers(campaign.path) == {}
-    assert not (tmp_path / "said.txt").exists()
+    assert not (tmp_path / "scontrol.txt").exists()
 
 
-def test_a_task_goes_on_after_a_run_that_fails_and_is_listed_as_failed(tmp_path, task):
+def test_a_task_continues_after_a_failed_run_and_is_listed_as_failed(tmp_path, task):
     more = '[[where]]\nmethod = "homcne"\nsettings = { "run.budget_evaluations" = 1 }'
     campaign = tiny_campaign(tmp_path, more=more)
     failing, good, *_ = campaign.planned
@@ -93,7 +93,7 @@ def test_a_task_goes_on_after_a_run_that_fails_and_is_listed_as_failed(tmp_path,
     assert (campaign.is_finished(failing), campaign.is_finished(good)) == (False, True)
 
 
-def test_what_the_array_asks_for_is_what_was_said(tmp_path):
+def test_the_array_requests_the_given_resources(tmp_path):
     campaign = tiny_campaign(tmp_path)
     script = slurm.write_array(
         campaign.path,
@@ -125,7 +125,7 @@ def test_what_the_array_asks_for_is_what_was_said(tmp_path):
     assert sys.executable in slurm.write_array(campaign.path, ["a"]).read_text()
 
 
-def test_a_run_that_was_finished_and_is_to_go_on_is_not_passed_over(tmp_path):
+def test_a_finished_run_that_is_extended_is_not_skipped(tmp_path):
     campaign = tiny_campaign(tmp_path)
     ended = campaign.paths.ended("a")
     ended.parent.mkdir()
@@ -137,7 +137,7 @@ def test_a_run_that_was_finished_and_is_to_go_on_is_not_passed_over(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("labels", "asked", "says"),
+    ("labels", "asked", "message"),
     [
         ([], {}, "no unfinished run"),
         (["a"], {"hours": 0.05}, "--hours 0.05: must be from 0.1 .a worker has 180 s to leave. to"),
@@ -154,8 +154,8 @@ def test_a_run_that_was_finished_and_is_to_go_on_is_not_passed_over(tmp_path):
         (["a"], {"options": ["--mem=8G", "--mem=9G"]}, "--mem for sbatch is given twice"),
     ],
 )
-def test_an_array_that_cannot_be_is_refused(tmp_path, labels, asked, says):
+def test_an_impossible_array_is_refused(tmp_path, labels, asked, message):
     campaign = tiny_campaign(tmp_path)
-    with pytest.raises(UsageError, match=says):
+    with pytest.raises(UsageError, match=message):
         slurm.write_array(campaign.path, labels, **asked)
     assert not (campaign.path / "slurm.sh").exists()

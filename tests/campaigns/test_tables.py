@@ -23,7 +23,7 @@ from conevo.runs.store import Store
 
 
 def unread_of(page: Path) -> dict[str, str]:
-    """What a report says of files that could not be read."""
+    """The lines of a report about files that could not be read."""
     with (page.parent / "numbers" / "left-out.csv").open() as file:
         return {row["file"]: row["why"] for row in csv.DictReader(file)}
 
@@ -42,7 +42,7 @@ def tables(campaign):
         yield opened
 
 
-def test_every_run_has_its_row_as_it_was(campaign, tables):
+def test_every_run_has_a_row_with_its_own_data(campaign, tables):
     _, rows = tables.query(
         "SELECT run, method, seed, generations, evaluations, team_steps, measure, run_id, "
         "kernel_hash, optimum, n_robots FROM runs ORDER BY run"
@@ -148,7 +148,7 @@ def test_generations_and_castes_are_those_of_the_log(campaign, tables):
             assert dict(rows) == record["castes"]
 
 
-def test_studies_are_kept_whole(campaign, tables):
+def test_studies_are_stored_completely(campaign, tables):
     for label in campaign.planned:
         study = read_json(campaign.paths.study(label))
         for table in ("robots", "actions", "behaviours"):
@@ -181,7 +181,7 @@ def test_studies_of_earlier_versions_have_no_favourites_and_are_reported(campaig
     )
 
 
-def test_tables_are_made_again_only_when_more_is_finished(campaign):
+def test_tables_are_made_again_only_after_more_runs_are_finished(campaign):
     made = (campaign.paths.tables / "runs.parquet").stat().st_mtime_ns
     campaign.seal()
     assert (campaign.paths.tables / "runs.parquet").stat().st_mtime_ns == made
@@ -238,7 +238,7 @@ def test_a_damaged_run_is_left_out_and_the_rest_is_reported(campaign, tmp_path):
     assert unread[f"runs/{damaged}"] == f"runs/{damaged}/{words}"
     text = page.read_text()
     assert all(file in text and html.escape(why) in text for file, why in unread.items())
-    test.write_text(whole)  # as soon as it is whole it counts
+    test.write_text(whole)  # it counts as soon as it is complete
     copy.seal()
     with Tables(copy.paths.tables) as tables:
         assert tables.query("SELECT count(*) FROM runs")[1] == [(len(copy.planned),)]
