@@ -17,7 +17,7 @@ def pytest_configure():
 
     Processes that tests begin, and kill, do sync.
     """
-    os.fsync = os.fstat  # refuses what is no open file, as the real one does
+    os.fsync = os.fstat  # refuses a handle that is not open, as the real one does
 
 
 def pytest_collection_modifyitems(config, items):

@@ -1,4 +1,4 @@
-"""The verbs for campaigns, as a user types them; also what is refused, with nothing written."""
+"""The commands for campaigns, as a user types them, and wrong ones, which write nothing."""
 
 import json
 import re
@@ -97,8 +97,8 @@ method = ["{method}"]
 
 
 @pytest.mark.parametrize("command", [("start", "--dry-run"), ("start",), ("slurm",)])
-def test_a_plan_that_is_named_is_never_ignored(conevo, tmp_path, command):
-    """Whatever campaign is in the directory, and whether there is such a plan."""
+def test_a_named_plan_is_never_ignored(conevo, tmp_path, command):
+    """Whatever campaign is in the directory, and even if the plan does not exist."""
     (tmp_path / "a.toml").write_text(PLAN.format(world="rover/complex-1", method="homcne"))
     (tmp_path / "b.toml").write_text(PLAN.format(world="gacc/complex-1", method="mesp"))
     assert conevo("campaign", "slurm", "a.toml", "--out", "c")[0] == 0
@@ -137,7 +137,7 @@ def test_a_larger_plan_extends_and_a_smaller_one_is_refused(conevo, tmp_path):
     assert "--set run.generations=9" in err
 
 
-def test_a_time_limit_ends_with_0_and_says_how_to_go_on(conevo, tmp_path):
+def test_a_time_limit_ends_with_0_and_shows_how_to_continue(conevo, tmp_path):
     (tmp_path / "a.toml").write_text(PLAN.format(world="rover/complex-1", method="homcne"))
     code, _, err = conevo(
         "campaign", "start", "a.toml", "--executor", "serial", "--time-limit", "0.001s"
@@ -149,7 +149,7 @@ def test_a_time_limit_ends_with_0_and_says_how_to_go_on(conevo, tmp_path):
         assert (code, "expected a time above 0" in err) == (2, True)
 
 
-def test_failures_are_said_with_their_reason_and_can_be_tried_again(conevo, tmp_path):
+def test_failures_are_printed_with_their_reason_and_can_be_tried_again(conevo, tmp_path):
     path = write_plan(tmp_path, "studies = []")
     with path.open("a") as file:
         file.write('[[where]]\nmethod = "cone"\nsettings = { "run.budget_evaluations" = 1 }\n')
@@ -160,13 +160,13 @@ def test_failures_are_said_with_their_reason_and_can_be_tried_again(conevo, tmp_
     code, out, _ = conevo("campaign", "status", "tiny")
     assert code == 1
     assert "failed rover-v2-complex-1-cone-s1: run.budget_evaluations = 1" in out
-    assert "its copy of" not in out  # it has none of a world of the package
+    assert "its copy of" not in out  # it has no copy of a world of the package
     code, out, _ = conevo("campaign", "retry", "tiny", "--executor", "serial", "--json")
     assert code == 1
     assert [json.loads(line)["state"] for line in out.splitlines()] == ["failed"] * 2
 
 
-def test_a_campaign_says_where_a_world_fails_and_that_it_keeps_its_copy(conevo, tmp_path):
+def test_a_campaign_shows_where_a_world_fails_and_that_it_keeps_its_copy(conevo, tmp_path):
     fails = "        if int(keys[0]) % 7 == 3:\n            raise ValueError('boom')\n"
     shape = "        shape = (self"
     file = written(tmp_path / "mine.py", (shape, fails + shape))
@@ -213,7 +213,7 @@ def test_a_dry_run_prints_every_run_and_writes_nothing(conevo, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("words", "says"),
+    ("words", "message"),
     [
         ("campaign start rover-complx", "did you mean 'rover-complex'"),
         ("campaign start none.toml", "cannot read none.toml"),
@@ -241,19 +241,19 @@ def test_a_dry_run_prints_every_run_and_writes_nothing(conevo, tmp_path):
         ("run rover/complex-1 --out campaigns/tiny", "already holds a campaign"),
     ],
 )
-def test_a_wrong_word_is_one_clear_line_and_nothing_is_written(conevo, tmp_path, words, says):
+def test_a_wrong_word_is_one_clear_line_and_nothing_is_written(conevo, tmp_path, words, message):
     tiny_campaign(tmp_path / "campaigns")
     before = sorted(tmp_path.rglob("*"))
     code, out, err = conevo(*words.split())
     assert code == 2
     assert out == ""
-    assert says in err
+    assert message in err
     assert len(err.splitlines()) == 1
-    locks = {"lock", "ledger.sqlite"}  # taken to look, and left
+    locks = {"lock", "ledger.sqlite"}  # created by a check, and left there
     assert [path for path in sorted(tmp_path.rglob("*")) if path.name not in locks] == before
 
 
-def test_an_interrupted_campaign_says_how_to_go_on(conevo, tmp_path, monkeypatch):
+def test_an_interrupted_campaign_shows_how_to_continue(conevo, tmp_path, monkeypatch):
     from conevo.campaigns.executors.local import Serial
 
     tiny_campaign(tmp_path / "campaigns")

@@ -1,4 +1,4 @@
-"""The command line: a whole session of it, every bad input in one line, and an instant help."""
+"""The command line: a whole session, every bad input in one line, and instant help."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def test_a_session_from_run_to_the_commands_it_recommends(say, tmp_path: Path) -
         ("cone", "1"), ("cone", "2"), ("mesp", "1"),
     ]  # fmt: skip
     assert {row["status"] for row in listed} == {"finished"}
-    done = [f"{n} of {n} generations" for n in (10, 10, 5)]  # two were continued
+    done = [f"{n} of {n} generations" for n in (10, 10, 5)]  # two of them were continued
     assert [row["generations"] for row in listed] == done
 
 
@@ -103,7 +103,7 @@ def test_show_finds_a_run_by_the_beginning_of_its_name(say) -> None:
     assert "is ambiguous; it matches" in said.err
 
 
-def test_show_says_so_if_a_sealed_file_was_changed(say, tmp_path: Path) -> None:
+def test_show_reports_a_changed_sealed_file(say, tmp_path: Path) -> None:
     run = evolve_tiny(tmp_path / "run")
     (run.path / "champion.npz").write_bytes(b"")
     assert "modified since the run: champion.npz\n" in say("show", "run").out
@@ -144,7 +144,7 @@ def test_an_interrupted_run_is_shown_and_resumed(say, tmp_path: Path) -> None:
     assert content(path) == content(evolve_tiny(tmp_path / "whole", run__generations=60).path)
 
 
-def test_an_interrupted_extension_says_which_length_its_testing_phase_is_of(
+def test_an_interrupted_extension_shows_the_length_of_its_testing_phase(
     say, tmp_path: Path
 ) -> None:
     run = evolve_tiny(tmp_path / "run")
@@ -231,7 +231,7 @@ def test_a_configuration_without_a_world_is_named(say, tmp_path: Path) -> None:
     assert "which world? empty.toml names none: give run.world there, or name one as" in said.err
 
 
-def test_what_the_machine_refuses_is_one_line_with_code_3(say, tmp_path: Path) -> None:
+def test_refusals_of_the_machine_are_one_line_with_code_3(say, tmp_path: Path) -> None:
     for arguments, words in (
         (tiny("--out", "/proc/run"), "cannot write /proc/run: "),
         (tiny("--config", "a" * 300), "cannot read aaa"),
@@ -245,7 +245,7 @@ def test_what_the_machine_refuses_is_one_line_with_code_3(say, tmp_path: Path) -
 
 
 @pytest.mark.parametrize(
-    ("words", "says"),
+    ("words", "message"),
     [
         (tiny("--out", "file/run"), "file is a file, not a directory"),
         (tiny("--out", "file/run/x", "--dry-run"), "file is a file, not a directory"),
@@ -258,13 +258,13 @@ def test_what_the_machine_refuses_is_one_line_with_code_3(say, tmp_path: Path) -
         (["campaign", "start", "none.toml"], "cannot read none.toml: No such file"),
     ],
 )
-def test_a_path_that_is_not_there_is_a_wrong_request(say, tmp_path, words, says) -> None:
+def test_a_missing_path_is_a_wrong_request(say, tmp_path, words, message) -> None:
     (tmp_path / "file").write_text("")
     said = say(*words)
     assert said.code == 2
     assert said.err.startswith("conevo: error: ")
     assert said.err.count("\n") == 1
-    assert says in said.err
+    assert message in said.err
     assert [p.name for p in tmp_path.iterdir()] == ["file"]
 
 
@@ -296,7 +296,7 @@ def test_existing_runs_are_refused_with_what_can_be_done(say) -> None:
     assert "here is finished" in said.err
 
 
-def test_help_names_every_verb(say) -> None:
+def test_help_lists_every_command(say) -> None:
     said = say("--help")
     assert said.code == 0
     for verb, summary in VERBS.items():
@@ -337,7 +337,7 @@ def test_importing_conevo_and_its_commands_loads_nothing_heavy() -> None:
     assert found.stdout.strip() == "[]"
 
 
-def test_public_names_are_few_and_there() -> None:
+def test_public_names_are_few_and_exist() -> None:
     assert len(conevo.__all__) <= 20
     for name in conevo.__all__:
         assert getattr(conevo, name) is not None
@@ -345,7 +345,7 @@ def test_public_names_are_few_and_there() -> None:
         _ = conevo.evolv  # type: ignore[attr-defined]
 
 
-def test_a_run_begins_with_what_another_one_ended_with(say) -> None:
+def test_a_run_starts_with_the_results_of_another_one(say) -> None:
     assert say(*tiny("--out", "first", "--quiet")).code == 0
     same = ("--config", "first/config.toml", "--threads", "1", "--quiet")
     for option, words in (

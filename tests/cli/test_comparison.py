@@ -36,7 +36,7 @@ def test_methods_are_compared_with_every_seed_and_more_seeds_extend_it(say, tmp_
     assert len(Campaign(done.out.strip()).planned) == 4
 
 
-def test_seeds_count_from_the_one_that_is_named(say, tmp_path: Path) -> None:
+def test_seeds_count_from_the_given_one(say, tmp_path: Path) -> None:
     said = say(*TINY, "--seeds", "2", "--seed", "7", "--dry-run", "--json")
     assert [json.loads(line)["run"] for line in said.out.splitlines()] == [
         "rover-v2-complex-1-cone-s7",
@@ -64,7 +64,7 @@ def test_a_setting_may_be_given_without_its_section(say) -> None:
         (["--seeds", "2", "--config", "x.toml"], "cannot read x.toml"),
     ],
 )
-def test_a_comparison_that_cannot_be_is_one_line(more, words, say, tmp_path: Path) -> None:
+def test_an_impossible_comparison_is_one_line(more, words, say, tmp_path: Path) -> None:
     said = say(*TINY, *more)
     assert said.code in (2, 3)
     assert words in said.err

@@ -1,4 +1,4 @@
-"""Runs in an earlier version of a world are looked at, but not played any more."""
+"""Runs in an earlier version of a world can be shown, but no longer played."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from runs.tiny import evolve_tiny
 
 @pytest.fixture
 def earlier(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, say: Any) -> Path:
-    """Make a finished run, ``old``, and a recorded epoch of it, as rover-v1 had made them."""
+    """Make a finished run, ``old``, and a recorded epoch of it, as made by rover-v1."""
     order = list(WORLDS.items())
     with monkeypatch.context() as then:
         newest = WORLDS["rover-v2"]
@@ -31,7 +31,7 @@ def earlier(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, say: Any) -> Path:
         made = say("replay", "old", "--no-browser", "--out", "old.html", "--keep", "old.npz")
         assert made.code == 0, made.err
     WORLDS.clear()
-    WORLDS.update(order)  # the world that was away is not the last one now
+    WORLDS.update(order)  # the world that was removed and restored is no longer the last one
     return run.path
 
 
@@ -67,7 +67,7 @@ def test_a_run_of_an_earlier_version_is_shown_but_not_played(earlier: Path, say:
     assert names == {"old", "again", "old.html", "old.npz"}
 
 
-def test_no_run_is_begun_in_an_earlier_version(say: Any, tmp_path: Path) -> None:
+def test_no_run_starts_in_an_earlier_version(say: Any, tmp_path: Path) -> None:
     assert refused(say("run", "rover-v1/complex-1", "--preset", "smoke")) == WHY
     assert "prey-v2, no longer prey-v1" in refused(say("list", "settings", "prey-v1/shaping-1"))
     Path("old.toml").write_text('[run]\nworld = "rover-v1/complex-1"\n')
@@ -76,7 +76,7 @@ def test_no_run_is_begun_in_an_earlier_version(say: Any, tmp_path: Path) -> None
     assert [path.name for path in tmp_path.iterdir()] == ["old.toml"]
 
 
-def test_what_was_recorded_in_an_earlier_version_is_drawn(earlier: Path, say: Any) -> None:
+def test_an_epoch_recorded_in_an_earlier_version_is_drawn(earlier: Path, say: Any) -> None:
     made = say("replay", "old.npz", "--no-browser", "--out", "kept.html")
     assert made.code == 0, made.err
     old, kept = (Path(f"{name}.html").read_text() for name in ("old", "kept"))
@@ -84,7 +84,7 @@ def test_what_was_recorded_in_an_earlier_version_is_drawn(earlier: Path, say: An
     assert earlier.is_dir()
 
 
-def test_versions_of_a_world_have_colours_in_common() -> None:
+def test_versions_of_a_world_share_colours() -> None:
     for name in registry.EARLIER:
         newest = entry_of(name)
         assert newest is not None

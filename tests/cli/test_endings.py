@@ -1,4 +1,4 @@
-"""How commands end: what they print can be copied, and whatever ends them has its message."""
+"""Endings of commands: printed commands can be copied, and every interruption has a message."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from runs.tiny import TASK, command, spawn, tiny_settings, wait_for
 SPACED = "my runs/it's one"
 
 
-def test_commands_that_are_printed_can_be_copied(say, tmp_path: Path) -> None:
+def test_printed_commands_can_be_copied(say, tmp_path: Path) -> None:
     sets = [w for key, value in tiny_settings("cone").items() for w in ("--set", f"{key}={value}")]
     run = ("run", TASK, "--preset", "smoke", *sets, "--out", SPACED)
     said = say(*run, "--time-limit", "0.001s")
@@ -45,7 +45,7 @@ def test_a_quiet_campaign_prints_its_directory_when_its_time_is_over(say, tmp_pa
     assert (said.code, said.out) == (0, "campaigns/tiny\n")
 
 
-def test_who_begins_a_run_that_another_has_just_begun_is_told_so(
+def test_a_run_that_another_process_has_just_started_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     config, path = resolve(TASK, "cone", "smoke", overrides=tiny_settings("cone")), tmp_path / "run"
@@ -53,7 +53,7 @@ def test_who_begins_a_run_that_another_has_just_begun_is_told_so(
 
     def slowly(*arguments: Any) -> Lab:
         monkeypatch.setattr(Lab, "equip", equip)
-        start(config, path, threads=1)  # as another process does meanwhile
+        start(config, path, threads=1)  # meanwhile another process does this
         return equip(*arguments)
 
     monkeypatch.setattr(Lab, "equip", slowly)

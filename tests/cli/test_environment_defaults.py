@@ -1,4 +1,4 @@
-"""An environment with defaults of its own has them wherever it is named, and anything else wins."""
+"""An environment's own defaults apply wherever it is named, and anything else overrides them."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def test_types_and_rovers_are_in_their_regions_of_the_same_canals() -> None:
                 assert places.region(np.array(xy, np.float32)) == k
 
 
-def test_a_setting_wins_and_so_does_a_file_and_only_these_are_changed(tmp_path: Path) -> None:
+def test_settings_and_files_override_them_and_only_these_count_as_changed(tmp_path: Path) -> None:
     config = resolve("rover/apart-5", overrides={"world.segregation": 0.0})
     assert config.world_params == RoverParams(**APART | {"segregation": 0.0}, iterations=DESK)
     assert config.changed == ("world.segregation",)
@@ -102,7 +102,7 @@ def test_an_environment_s_own_defaults_win_over_a_preset_s(monkeypatch: pytest.M
     assert desk.changed == ()
 
 
-def test_a_resolved_configuration_comes_back_from_its_own_file(tmp_path: Path) -> None:
+def test_a_resolved_configuration_is_restored_from_its_own_file(tmp_path: Path) -> None:
     config = resolve("rover/apart-2", overrides={"world.segregation": 0.5})
     (tmp_path / "config.toml").write_text(config.to_toml())
     again = resolve(file=tmp_path / "config.toml")
@@ -212,7 +212,7 @@ def test_a_world_in_a_file_may_have_them(tmp_path: Path) -> None:
         ("None", "its defaults must be a dict of dicts"),
     ],
 )
-def test_a_mistake_in_them_is_one_line(defaults: str, words: str, tmp_path: Path) -> None:
+def test_a_mistake_in_these_defaults_is_one_line(defaults: str, words: str, tmp_path: Path) -> None:
     path = light(tmp_path, defaults)
     for name in (resolve, conevo.world):
         with pytest.raises(UsageError) as caught:

@@ -30,11 +30,13 @@ from runs.tiny import TASK, evolve_tiny, tiny_settings
         ((0, 1000, 0, 50_000), "0 of 1,000 generations"),
     ],
 )
-def test_progress_is_of_what_ends_the_run(counts: tuple[int, int, int, int], text: str) -> None:
+def test_progress_is_towards_the_end_of_the_run(
+    counts: tuple[int, int, int, int], text: str
+) -> None:
     assert progress(*counts) == text
 
 
-def test_units_directions_and_exchange_are_shown_where_a_run_is(tmp_path: Path) -> None:
+def test_units_directions_and_exchange_are_shown_with_a_run(tmp_path: Path) -> None:
     shown = run_text(evolve_tiny(tmp_path / "run"), 5)
     assert (
         "measures: value (points, larger is better), area (share of the square, larger is better); "
@@ -58,10 +60,10 @@ def test_units_directions_and_exchange_are_shown_where_a_run_is(tmp_path: Path) 
         ({"mean": 2.0, "sd": 0.0, "values": [2.0]}, "2 (1 of 3)"),  # conevo 0.1.0
     ],
 )
-def test_a_spread_says_how_many_scenarios_it_is_of(found: dict[str, Any], text: str) -> None:
+def test_a_spread_states_its_number_of_scenarios(found: dict[str, Any], text: str) -> None:
     assert spread(found, 3) == text
     rows = table(["", "value"], [["a", text], ["b", "-"]]).splitlines()
-    assert rows[2].endswith(" -")  # numbers to the right
+    assert rows[2].endswith(" -")  # numbers are aligned on the right
 
 
 def test_a_run_of_an_older_conevo_is_shown_without_validation() -> None:
@@ -82,7 +84,7 @@ def test_a_run_of_an_older_conevo_is_shown_without_validation() -> None:
     assert lines[2].split() == ["fittest", "team", "3", "2", "(1", "of", "2)", "0.5"]
     assert sum(line.startswith("warning: value is not finite") for line in lines) == 1
     assert not any("finalists" in line for line in lines)
-    assert not any("favourite" in line for line in lines)  # of a run that has none
+    assert not any("favourite" in line for line in lines)  # for a run without any
     likes = {"favourites": ["hi", None, "low", "hi"], "favourite_shares": [1.0, None, 0.5, 0.75]}
     lines = text_of_test({"champion": tested | likes, "generation_0": tested}).splitlines()
     told = (
@@ -106,7 +108,7 @@ def test_castes_and_neurons_are_short() -> None:
     assert (neurons([10, 10]), neurons([8, 12, 9])) == ("10", "8-12")
 
 
-def test_numbers_stand_to_the_right_and_words_to_the_left() -> None:
+def test_numbers_are_aligned_on_the_right_and_words_on_the_left() -> None:
     text = table(["name", "n"], [["a", "1,000"], ["long", "7"], ["20 rovers", "-"]])
     assert text.splitlines() == [
         "name           n",
@@ -131,7 +133,7 @@ def test_pace_counts_down_to_the_last_generation_or_the_end_of_the_budget(tmp_pa
     assert pace.seconds_left == 16  # the ninth generation cannot be paid
 
 
-def test_the_live_view_names_all_that_is_asked_of_it(tmp_path: Path) -> None:
+def test_the_live_view_shows_everything_required(tmp_path: Path) -> None:
     run = evolve_tiny(tmp_path / "run")
     display = Display(run)
     for record in run.generations():
@@ -148,10 +150,10 @@ def test_the_live_view_names_all_that_is_asked_of_it(tmp_path: Path) -> None:
         "degree of specialization S (0 = always the same action, 1 = switches all the time)",
     ):  # fmt: skip
         assert words in shown
-    assert shown.splitlines()[3].startswith("generation 5/5")  # the bar has a line of its own
+    assert shown.splitlines()[3].startswith("generation 5/5")  # the bar has its own line
 
 
-def test_one_of_a_thing_is_not_many() -> None:
+def test_one_of_a_thing_is_singular() -> None:
     assert [counted(n, "fresh scenario") for n in (0, 1, 2, 1200)] == [
         "0 fresh scenarios",
         "1 fresh scenario",
@@ -160,7 +162,7 @@ def test_one_of_a_thing_is_not_many() -> None:
     ]
 
 
-def test_a_run_of_one_of_everything_is_told_in_the_singular(say) -> None:
+def test_a_run_with_one_of_everything_is_described_in_the_singular(say) -> None:
     ones = ("generations", "n_finalists", "n_validations", "n_tests")
     settings = tiny_settings("cone") | {f"run.{name}": 1 for name in ones}
     sets = [word for key, value in settings.items() for word in ("--set", f"{key}={value}")]

@@ -1,4 +1,4 @@
-"""Names that are wrong, and whatever is in the place of a file: one line says what is wrong."""
+"""Wrong names, and pipes, devices or links in place of a file: one line states the problem."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ KINDS = {
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_whatever_is_in_the_place_of_a_file_is_named(say, tmp_path: Path, kind: str) -> None:
+def test_anything_in_place_of_a_file_is_named(say, tmp_path: Path, kind: str) -> None:
     make, reason = KINDS[kind]
     for folder, name, verbs in (
         ("campaigns/c", "plan.toml", ("campaign status c", "campaign start c", "query c X")),
@@ -42,13 +42,15 @@ def test_whatever_is_in_the_place_of_a_file_is_named(say, tmp_path: Path, kind: 
 
 @pytest.mark.parametrize("verb", ["check", "run"])
 @pytest.mark.parametrize("path", ["/dev/zero", "./light", "../light/dark-1"])
-def test_a_path_that_is_no_world_is_told_how_to_name_one(say, verb: str, path: str) -> None:
+def test_a_path_that_is_not_a_world_is_refused_with_the_right_form(
+    say, verb: str, path: str
+) -> None:
     said = say(verb, path)
     assert said.code == 2
     assert f"world {path!r}: a world in a file is named FILE.py:ENVIRONMENT" in said.err
 
 
-def test_a_shaping_that_lost_its_teams_is_not_said_to_have_no_generation(
+def test_a_shaping_that_lost_its_teams_is_not_reported_as_without_generations(
     say, tmp_path: Path
 ) -> None:
     settings = tiny_settings("cone", run__generations=1)
@@ -77,7 +79,7 @@ def test_the_nearest_name_is_that_with_the_nearest_number() -> None:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_whatever_is_in_the_place_of_a_seal_is_named(say, tmp_path: Path, kind: str) -> None:
+def test_anything_in_place_of_a_seal_is_named(say, tmp_path: Path, kind: str) -> None:
     """It is neither taken for a run that goes on, nor replaced by a seal."""
     make, reason = KINDS[kind]
     run = evolve_tiny(tmp_path / "run")

@@ -1,4 +1,4 @@
-"""Looking at results is fast, runs nobody's world and changes nothing."""
+"""Showing results is fast, runs no world file and changes nothing."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from conevo.runs.start import start
 from runs.tiny import TASK, evolve_tiny, tiny_settings
 
 LIGHT = Path(__file__).parents[2] / "examples" / "light.py"
-# What a run is made with, and takes longer to load than everything that is looked at.
+# Modules that runs need. Loading them takes longer than any command that shows results.
 HEAVY = {"numpy", "warp", "scipy", "duckdb", "matplotlib", "conevo.runs.config"}
 LOOK = """
 import sys
@@ -37,7 +37,7 @@ TINY: dict[str, Any] = {
 
 
 def look(*arguments: str) -> tuple[str, set[str]]:
-    """Return what a command prints, and the modules that it loads."""
+    """Return the output of a command, and the modules that it loads."""
     done = subprocess.run(
         [sys.executable, "-c", LOOK, *arguments], text=True, capture_output=True, check=True
     )
@@ -46,7 +46,7 @@ def look(*arguments: str) -> tuple[str, set[str]]:
 
 @pytest.fixture(scope="module")
 def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with a run in each state; the one in an own world has a file that cannot be run."""
+    """A folder with a run in each state; the file of the run in an own world cannot be run."""
     folder = tmp_path_factory.mktemp("runs")
     own = folder / "own"
     conevo.evolve(f"{LIGHT}:dark-1", "cone", "smoke", out=own, overrides=TINY, threads=1)
@@ -65,7 +65,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_runs_are_listed_without_what_makes_them(runs: Path) -> None:
+def test_runs_are_listed_without_loading_the_modules_of_runs(runs: Path) -> None:
     out, modules = look("list", "runs", str(runs), "--json")
     assert HEAVY & modules == set()
     rows = {Path(row["run"]).name: row for row in json.loads(out)}
@@ -97,15 +97,15 @@ def test_a_run_is_shown_without_its_world(runs: Path) -> None:
     assert json.loads(out)["config"]["run"]["world"] == "rover-v2/complex-1"
 
 
-def test_a_campaign_is_looked_at_without_simulating(tmp_path: Path) -> None:
+def test_a_campaign_is_shown_without_simulating(tmp_path: Path) -> None:
     made = tiny_campaign(tmp_path)
     out, modules = look("campaign", "status", str(made.path))
     assert "4 pending" in out
     assert {"warp", "scipy", "duckdb", "conevo.runs.lab"} & modules == set()
 
 
-def test_a_run_by_the_first_release_is_looked_at(runs: Path, tmp_path: Path) -> None:
-    """That one kept neither the world's header nor copies, and named files by whole paths."""
+def test_a_run_by_the_first_release_is_shown(runs: Path, tmp_path: Path) -> None:
+    """It stored neither the world's header nor copies, and named files by absolute paths."""
     run = evolve_tiny(tmp_path / "run")
     file = run.path / "provenance.json"
     about = run.provenance
@@ -128,7 +128,7 @@ def test_a_run_by_the_first_release_is_looked_at(runs: Path, tmp_path: Path) -> 
         conevo.Run(run.path)
 
 
-def test_looking_and_testing_leave_a_runs_directory_alone(runs: Path, say: Any) -> None:
+def test_showing_and_testing_leave_a_runs_directory_alone(runs: Path, say: Any) -> None:
     def state() -> dict[str, tuple[int, int]]:
         files = [runs, *runs.rglob("*")]
         return {str(p): (p.stat().st_mtime_ns, p.stat().st_size) for p in files}

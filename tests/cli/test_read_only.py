@@ -1,4 +1,4 @@
-"""What may only be read is read: archives, other people's folders, full disks."""
+"""Commands read what cannot be written: archives, other people's folders, full disks."""
 
 import os
 import shutil
@@ -39,7 +39,7 @@ def archive(finished, tmp_path):
 
 @pytest.fixture
 def refusing(monkeypatch):
-    """Let no lock be written, as a read-only file system does."""
+    """Refuse to write any lock, as a read-only file system does."""
 
     def refuse(path, flags, *more, **others):
         if flags & os.O_CREAT and os.path.basename(path) == "lock":
@@ -55,7 +55,7 @@ def content(folder):
 
 
 @pytest.mark.parametrize("lost", [(), ("tables", "lock", "ledger.sqlite")])
-def test_a_campaign_answers_and_reports_where_nothing_can_be_written(
+def test_a_campaign_is_queried_and_reported_where_nothing_can_be_written(
     say, archive, tmp_path, refusing, lost
 ):
     for name in lost:
@@ -122,7 +122,7 @@ def test_a_mounted_archive_is_read(archive, tmp_path):
 
 
 def test_a_report_is_silent_about_folders_for_fonts(finished, tmp_path):
-    """Matplotlib keeps fonts in the home directory, which may not be there to be written."""
+    """Matplotlib keeps fonts in the home directory, which may be missing or read-only."""
     code = "from conevo.cli.main import main; main(['report', {!r}, '--out', {!r}])"
     said = subprocess.run(
         [sys.executable, "-c", code.format(str(finished), str(tmp_path / "report"))],
@@ -133,7 +133,7 @@ def test_a_report_is_silent_about_folders_for_fonts(finished, tmp_path):
     assert (said.returncode, said.stderr) == (0, "")
 
 
-def test_no_place_for_compiled_kernels_is_not_the_working_directory(tmp_path):
+def test_a_missing_place_for_compiled_kernels_is_never_the_working_directory(tmp_path):
     said = subprocess.run(
         [sys.executable, "-c", "from conevo.kernels import engine; engine.start()"],
         env=os.environ | {"WARP_CACHE_PATH": "", "XDG_CACHE_HOME": str(tmp_path / "cache")},

@@ -34,7 +34,9 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     evolve_tiny(folder / "cone", **LONG)
     evolve_tiny(folder / "homcne", "homcne")
     more = {"world__iterations": 100, "world__n_robots": 10, "run__seed": 2}
-    evolve_tiny(folder / "later", "homcne", **more)  # its champion is not of generation 0
+    evolve_tiny(
+        folder / "later", "homcne", **more
+    )  # its champion is from a later generation than 0
     evolve_tiny(folder / "pursuit", task="pursuit/team-10")
     evolve_tiny(folder / "gacc", task="gacc/complex-9")
     return folder
@@ -48,14 +50,14 @@ def here(made: Path, tmp_path: Path) -> Path:
 
 
 def opened(monkeypatch: pytest.MonkeyPatch, answer: bool = True) -> list[str]:
-    """Return the addresses that a browser is asked to open from now on."""
+    """Return a list of the addresses that a browser is asked to open from now on."""
     asked: list[str] = []
     monkeypatch.setattr("webbrowser.open", lambda at: asked.append(at) or answer)
     return asked
 
 
 def data_of(page: str) -> dict:
-    """Return what a page says about its teams."""
+    """Return the data of a page about its teams."""
     text = page.partition('<script type="application/json" id="about">')[2]
     return json.loads(text.partition("</script>")[0])
 
@@ -68,7 +70,7 @@ def test_replay_prints_the_page_it_has_made(say, here, monkeypatch, name) -> Non
     path = Path(said.out.strip())
     assert path.parent == Path("replays")
     assert [team["iterations"] for team in data_of(path.read_text())["teams"]] == [12]
-    assert say("replay", name, "--no-browser").out == said.out  # the same bytes are no conflict
+    assert say("replay", name, "--no-browser").out == said.out  # the same bytes are not a conflict
     assert len(list(Path("replays").iterdir())) == 1
 
 
@@ -91,10 +93,10 @@ def test_a_page_is_never_written_over_something_else(say, here) -> None:
         "conevo: error: page.html exists already; choose another place with --out, or remove it\n"
     )
     assert (here / "page.html").read_text() == "mine"
-    assert not (here / "epoch.npz").exists()  # not half of what was asked for
+    assert not (here / "epoch.npz").exists()  # not half of the request
 
 
-def test_a_kept_epoch_shows_what_the_run_shows(say, here) -> None:
+def test_a_kept_epoch_shows_the_same_as_the_run(say, here) -> None:
     say("replay", "cone", "--no-browser", "--out", "a.html", "--keep", "epoch.npz")
     say("replay", "epoch.npz", "--no-browser", "--out", "b.html")
     assert (here / "a.html").read_bytes() == (here / "b.html").read_bytes()
@@ -119,7 +121,7 @@ def test_two_teams_side_by_side(say, here) -> None:
     assert "generation 0" not in one["subtitle"] or one["subtitle"] == two["subtitle"]
 
 
-def test_a_generation_that_was_not_kept_is_evolved_again(say, here) -> None:
+def test_a_generation_that_was_not_stored_is_evolved_again(say, here) -> None:
     lost = next(g for g in range(1, 22, 2) if g != champion(here / "runs" / "cone"))
     words = ("--generation", str(lost), "--no-browser", "--out", "a.html", "--keep", "a.npz")
     assert say("replay", "cone", *words).code == 0
@@ -134,7 +136,7 @@ def champion(path: Path) -> int:
     return team.generation
 
 
-def test_a_film_a_poster_and_what_their_options_do(say, here) -> None:
+def test_a_film_a_poster_and_their_options(say, here) -> None:
     small = ("--size", "200", "--threads", "1")
     said = say("film", "gacc", "--gif", "--every", "3", "--fps", "10", *small)
     assert (said.code, said.err) == (0, "")
@@ -266,7 +268,7 @@ def test_wrong_words_are_one_line_and_leave_nothing(say, here, words, reason) ->
     assert sorted(here.rglob("*")) == before
 
 
-def test_watch_shows_the_champion_of_the_moment(say, here, monkeypatch) -> None:
+def test_watch_shows_the_current_champion(say, here, monkeypatch) -> None:
     """Its replay is made again when another team has become the fittest."""
     path = here / "runs" / "later"
     assert champion(path) != 0

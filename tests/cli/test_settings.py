@@ -1,4 +1,4 @@
-"""What can be set, and what a run would be: lists of presets and settings, dry runs."""
+"""Lists of presets and settings, and dry runs, which show a run without executing it."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def test_every_setting_of_a_run_and_of_a_method_is_explained(method: str) -> Non
     assert [one.name for part in parts for one in declared(part) if not one.meaning] == []
 
 
-def test_a_setting_is_listed_as_it_is_declared(say) -> None:
+def test_a_setting_is_listed_with_its_declaration(say) -> None:
     rows = {row["setting"]: row for row in json.loads(
         say("list", "settings", "pursuit/team-3", "--method", "mesp", "--json").out)}  # fmt: skip
     config = resolve("pursuit/team-3", "mesp", "desk")
@@ -68,7 +68,7 @@ def test_a_world_of_ones_own_has_its_settings_listed(say) -> None:
     assert (step["unit"], step["meaning"]) == ("side", "the largest step")
 
 
-def test_presets_are_listed_with_what_they_are_for(say) -> None:
+def test_presets_are_listed_with_their_purposes(say) -> None:
     rows = json.loads(say("list", "presets", "pursuit/team-3", "--method", "homcne", "--json").out)
     assert [row["preset"] for row in rows] == list(PRESETS)
     desk = resolve("pursuit/team-3", "homcne", "desk")
@@ -113,13 +113,13 @@ def test_a_dry_run_of_a_shaping_names_every_stage(say, tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_dry_run_refuses_the_place_that_the_run_would_be_refused(say, tmp_path: Path) -> None:
+def test_a_dry_run_refuses_the_places_that_the_run_would_refuse(say, tmp_path: Path) -> None:
     (tmp_path / "taken").mkdir()
     (tmp_path / "taken" / "file").write_text("")
     for more in ((), ("--dry-run",)):
-        said = say(*tiny("--out", "taken", *more))
-        assert (said.code, said.out) == (2, "")
-        assert "taken exists" in said.err or "taken already exists" in said.err
+        message = say(*tiny("--out", "taken", *more))
+        assert (message.code, message.out) == (2, "")
+        assert "taken exists" in message.err or "taken already exists" in message.err
 
 
 def test_settings_of_another_controller_are_listed(say) -> None:
@@ -138,10 +138,10 @@ def test_settings_of_another_controller_are_listed(say) -> None:
 
 def test_a_controller_is_named_and_kept_in_the_advice(say, tmp_path: Path) -> None:
     chosen = ("--set", "controller.name=ctrnn", "--set", "controller.slowest=5")
-    said = say(*tiny(*chosen, "--out", "ct"))
-    assert (said.code, said.err) == (0, "")
-    assert said.out.splitlines()[0].endswith(", controller ctrnn")
-    advice = next(line for line in said.out.splitlines() if " --method mesp " in line)
+    message = say(*tiny(*chosen, "--out", "ct"))
+    assert (message.code, message.err) == (0, "")
+    assert message.out.splitlines()[0].endswith(", controller ctrnn")
+    advice = next(line for line in message.out.splitlines() if " --method mesp " in line)
     assert " --set controller.name=ctrnn " in advice
     assert " --set controller.slowest=5.0" in advice
     again = say(*shlex.split(advice)[1:], "--dry-run").out
@@ -153,26 +153,26 @@ def test_a_controller_is_named_and_kept_in_the_advice(say, tmp_path: Path) -> No
     assert {"controller.name", "controller.slowest"} <= set(changed.split(": ")[1].split(", "))
 
 
-def test_advice_keeps_the_length_that_was_asked_for(say, monkeypatch) -> None:
+def test_advice_keeps_the_requested_length(say, monkeypatch) -> None:
     say(*tiny("--quiet", "--out", "here"))
     monkeypatch.setattr("conevo.kernels.devices.cards_here", lambda: ())
-    said = say("resume", "here", "--generations", "9", "--device", "cuda")
-    assert said.code == 3
-    assert said.err.endswith("; once fixed: conevo resume here --generations 9\n")
+    message = say("resume", "here", "--generations", "9", "--device", "cuda")
+    assert message.code == 3
+    assert message.err.endswith("; once fixed: conevo resume here --generations 9\n")
 
 
-def test_watch_refuses_a_device_that_is_not_here(say, monkeypatch) -> None:
+def test_watch_refuses_a_missing_device(say, monkeypatch) -> None:
     say(*tiny("--quiet", "--out", "here"))
     monkeypatch.setattr("conevo.kernels.devices.cards_here", lambda: ())
     monkeypatch.setattr("conevo.watch.server.serve", lambda *_: None)
-    said = say("watch", "here", "--device", "cuda:7", "--no-browser")
-    assert said.code == 3
-    assert said.err.startswith("conevo: error: device 'cuda:7': no CUDA device on this machine")
+    message = say("watch", "here", "--device", "cuda:7", "--no-browser")
+    assert message.code == 3
+    assert message.err.startswith("conevo: error: device 'cuda:7': no CUDA device on this machine")
     assert say("watch", "here", "--device", "cpu", "--no-browser").code == 0
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "message"),
     [
         ("rover/complex-1 --method cone-2 --set sd=label", "method.sd = 'label' on the command"),
         ("rover/complex-1 --method cone-3 --set exchange_share=0.5", "method.exchange_share = 0.5"),
@@ -180,10 +180,10 @@ def test_watch_refuses_a_device_that_is_not_here(say, monkeypatch) -> None:
     ],
 )  # fmt: skip
 def test_a_setting_without_effect_is_one_line_and_nothing_is_written(
-    words: str, said: str, say, tmp_path: Path
+    words: str, message: str, say, tmp_path: Path
 ) -> None:
     for dry in ((), ("--dry-run",)):
-        told = say("run", *words.split(), "--preset", "smoke", *dry)
-        assert (told.code, told.out, told.err.count("\n")) == (2, "", 1)
-        assert said in told.err
+        output = say("run", *words.split(), "--preset", "smoke", *dry)
+        assert (output.code, output.out, output.err.count("\n")) == (2, "", 1)
+        assert message in output.err
     assert list(tmp_path.iterdir()) == []

@@ -1,4 +1,4 @@
-"""Staged runs on the command line: made, shown, listed, tested and continued as runs are."""
+"""Staged runs on the command line: made, shown, listed, tested and continued like other runs."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def test_a_shaping_from_run_to_the_commands_it_recommends(say, tmp_path: Path) -
     assert [row["world"] for row in stages] == [f"rover-v2/complex-{k}" for k in (1, 2, 3)]
 
 
-def test_show_prints_the_stages_with_what_their_champions_achieved(say, tmp_path: Path) -> None:
+def test_show_prints_the_stages_with_the_results_of_their_champions(say, tmp_path: Path) -> None:
     say(*shape("--out", "here", "--quiet"))
     shown = say("show", "here").out
     assert "rover-v2/complex-1 to complex-3, CONE, preset smoke, seed 1" in shown
@@ -117,7 +117,7 @@ def test_json_names_the_stage_of_every_generation(say) -> None:
     assert lines[-1]["product"] is None
 
 
-def test_json_of_a_resumed_shaping_goes_on_with_its_numbers(say, tmp_path: Path) -> None:
+def test_json_of_a_resumed_shaping_continues_its_numbers(say, tmp_path: Path) -> None:
     def stop(run: conevo.Run, record: dict[str, Any]) -> None:
         if (run.path.name, record["generation"]) == ("stage-2", 1):
             raise KeyboardInterrupt
@@ -162,7 +162,7 @@ def test_an_interrupted_shaping_is_shown_tested_and_resumed(say, tmp_path: Path)
     )  # fmt: skip
 
 
-def test_a_shaping_that_has_not_begun_is_shown_and_has_no_team(say, tmp_path: Path) -> None:
+def test_a_shaping_that_has_not_started_is_shown_and_has_no_team(say, tmp_path: Path) -> None:
     start_shaping(["rover/complex-1", "rover/complex-2"], preset="smoke", out=tmp_path / "here")
     assert "0 of 2 stages begun" in say("show", "here").out
     said = say("test", "here")
@@ -191,7 +191,7 @@ def test_shape_prey_leaves_prey_for_the_pursuit_world(say) -> None:
     ]
 
 
-def test_a_prey_file_counts_by_its_content(say, tmp_path: Path) -> None:
+def test_a_prey_file_is_identified_by_its_content(say, tmp_path: Path) -> None:
     say("shape-prey", *sets(PURSUIT), "--out", "prey", "--quiet")
     (tmp_path / "copy.npz").write_bytes((tmp_path / "prey" / "prey.npz").read_bytes())
     ids = set()
@@ -242,7 +242,7 @@ def test_bad_input_is_one_line_with_code_2_and_nothing_written(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_places_that_are_taken_are_refused_with_what_can_be_done(say, tmp_path: Path) -> None:
+def test_existing_places_are_refused_with_advice(say, tmp_path: Path) -> None:
     evolve_tiny(tmp_path / "run")
     said = say(*shape("--out", "run"))
     assert said.code == 2
@@ -285,7 +285,7 @@ def test_clones_first_is_one_command(say, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("words", "says"),
+    ("words", "message"),
     [
         (["--first", "homcnee"], "first on the command line: unknown method 'homcnee'; did you"),
         (["--first", "ccga"], "first = 'ccga' on the command line: ccga evolves the second"),
@@ -298,9 +298,9 @@ def test_clones_first_is_one_command(say, tmp_path: Path) -> None:
          "stage 1 (homcne): run.budget_evaluations = 30 does not pay for one generation"),
     ],
 )  # fmt: skip
-def test_what_cannot_come_first_is_one_line(say, words: list[str], says: str) -> None:
+def test_a_wrong_first_stage_is_one_line(say, words: list[str], message: str) -> None:
     said = say(*first(*words))
     assert (said.code, said.out) == (2, "")
-    assert said.err.startswith(f"conevo: error: {says}")
+    assert said.err.startswith(f"conevo: error: {message}")
     assert said.err.count("\n") == 1
     assert not Path("runs").exists()

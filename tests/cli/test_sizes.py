@@ -1,4 +1,4 @@
-"""What no memory and no lifetime holds is refused at once; the setting that asks is named."""
+"""Sizes beyond any memory or lifetime are refused at once, and the setting is named."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ HUGE = (
 
 
 @pytest.mark.parametrize("words", HUGE)
-def test_a_number_beyond_all_measure_is_one_line(words: str, say, tmp_path: Path) -> None:
+def test_an_extreme_number_is_one_line(words: str, say, tmp_path: Path) -> None:
     said = say("run", "rover/complex-1", "--preset", "smoke", *words.split())
     name = words.removeprefix("--set ").replace(" ", "=").partition("=")[0]
     assert (said.code, said.out, said.err.count("\n")) == (2, "", 1)
@@ -73,7 +73,7 @@ PLAN = '[campaign]\nseeds = {seeds}\n[factors]\nworld = ["rover/complex-{n}"]\nm
     ],
 )
 @pytest.mark.parametrize("dry", [(), ("--dry-run",)])
-def test_plans_of_more_runs_than_anybody_waits_for_are_refused(
+def test_plans_of_far_too_many_runs_are_refused(
     seeds: str, n: str, more: str, words: str, dry: tuple[str, ...], say, tmp_path: Path
 ) -> None:
     (tmp_path / "plan.toml").write_text(PLAN.format(seeds=seeds, n=n) + more)
@@ -83,7 +83,7 @@ def test_plans_of_more_runs_than_anybody_waits_for_are_refused(
     assert [path.name for path in tmp_path.iterdir()] == ["plan.toml"]
 
 
-def test_memory_that_runs_out_all_the_same_is_one_line(say, monkeypatch) -> None:
+def test_running_out_of_memory_nevertheless_is_one_line(say, monkeypatch) -> None:
     def run_out(*_: object, **__: object) -> None:
         raise MemoryError
 

@@ -1,4 +1,4 @@
-"""What a shell does to a command's streams: closed, cut off, or lacking a letter."""
+"""Streams of a command that a shell closes, cuts off, or cannot encode."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def shell(line: str, folder: Path, **environment: str) -> subprocess.CompletedPr
     )
 
 
-def test_a_reader_that_leaves_is_not_an_error(tmp_path: Path) -> None:
+def test_a_reader_that_stops_is_not_an_error(tmp_path: Path) -> None:
     done = shell('$CONEVO list worlds | true; exit "${PIPESTATUS[0]}"', tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
 
@@ -38,7 +38,7 @@ def test_closed_streams_do_not_end_a_run(tmp_path: Path, closed: str) -> None:
     assert (tmp_path / "run" / "DONE").is_file()
 
 
-def test_letters_that_the_terminal_lacks_are_escaped(tmp_path: Path) -> None:
+def test_letters_missing_from_the_terminals_encoding_are_escaped(tmp_path: Path) -> None:
     words = " ".join(command(Path("日本"), "cone", run__generations=1))
     for line in (f"$CONEVO {words} --threads 1", "$CONEVO show 日本", "$CONEVO list runs ."):
         done = shell(line, tmp_path, PYTHONIOENCODING="latin-1")
@@ -49,7 +49,7 @@ def test_letters_that_the_terminal_lacks_are_escaped(tmp_path: Path) -> None:
     assert refused.stderr.startswith(r"conevo: error: unknown run '\u65e5'")
 
 
-def test_an_accented_path_is_as_good_as_any_in_the_locale_c(tmp_path: Path) -> None:
+def test_an_accented_path_works_in_the_locale_c(tmp_path: Path) -> None:
     bare = {"LC_ALL": "C", "LANG": "", "PYTHONIOENCODING": ""}
     words = " ".join(command(Path("café"), "cone", run__generations=1))
     for line, code in ((f"$CONEVO {words} --threads 1", 0), ("$CONEVO show café", 0),
@@ -79,7 +79,7 @@ def test_a_command_alone_prints_its_help(say) -> None:
         assert said.out.startswith("Usage: conevo")
 
 
-def test_a_run_whose_reader_leaves_is_interrupted_and_says_so(tmp_path: Path) -> None:
+def test_a_run_whose_reader_stops_is_interrupted_with_a_message(tmp_path: Path) -> None:
     words = " ".join(command(Path("run"), "cone", run__generations=4000))
     done = shell(f'$CONEVO {words} --verbose | head -3; exit "${{PIPESTATUS[0]}}"', tmp_path)
     assert done.returncode == 130

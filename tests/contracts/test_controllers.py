@@ -1,4 +1,4 @@
-"""What every controller promises, for each of the registry, in several worlds."""
+"""The contract of controllers, for every entry of the registry, in several worlds."""
 
 from math import prod
 from pathlib import Path
@@ -19,7 +19,7 @@ from contracts.test_worlds import assert_same_bits, keys
 LIGHT = Path(__file__).resolve().parents[2] / "examples" / "light.py"
 WORLDS = ("rover/complex-5", "pursuit/team-3", "gacc/complex-9", f"{LIGHT}:dark-1")
 ITERATIONS = 30
-# Of each controller, besides what the world suggests: other settings to try.
+# Further settings of each controller to try, in addition to those that the world suggests.
 SETTINGS = {
     "srn": (
         {"n_hidden": 3, "max_hidden": 3, "recurrent": False},
@@ -53,7 +53,7 @@ def teams_of(rollout, n, seed=3):
     """Return a pool and teams with holes; the first robot of each is empty, the last one full."""
     rng, genome, r = stream(seed, "teams"), rollout.genome, rollout.world.n_robots
     pool = rng.uniform(-1, 1, (50, genome.n_genes)).astype(np.float32)
-    pool[:5] *= 0.01  # of which no unit saturates
+    pool[:5] *= 0.01  # small, so that no unit saturates
     teams = rng.integers(len(pool), size=(n, r, genome.max_parts)).astype(np.int32)
     holes = rng.random(teams.shape) < rng.random((n, r, 1))
     holes[:, 0], holes[:, -1] = True, False
@@ -62,18 +62,18 @@ def teams_of(rollout, n, seed=3):
 
 
 def batched(rollout, n_worlds):
-    """Return a rollout that plays so few worlds at once that it needs several launches."""
+    """Return a rollout that plays few worlds at once, so that it needs several launches."""
     rollout._chunk = n_worlds
     return rollout
 
 
-def test_forward_gives_the_bits_of_the_kernel_in_every_iteration(rollout):
+def test_forward_equals_the_kernel_bit_for_bit_in_every_iteration(rollout):
     mind, a_world, genome = rollout.controller, rollout.world, rollout.genome
     pool, teams = teams_of(rollout, 2)
     for team in teams:
         seen = rollout.record(pool, team, a_world.scenarios(keys(1)))
         active = team >= 0
-        genes = pool[team]  # an empty slot has any genes, which must not matter
+        genes = pool[team]  # an empty slot may have any genes: they must have no effect
         memory = np.zeros((*team.shape, mind.n_memory), np.float32)
         for t in range(ITERATIONS):
             outputs, memory = mind.forward(
@@ -131,7 +131,7 @@ def test_scenarios_share_a_teams_weights_but_not_memory(case, rollout):
         assert both.counts[:, j].tobytes() == one.counts[:, 0].tobytes()
 
 
-def test_batches_threads_and_lanes_give_the_same_bits(case, rollout, cpu_blocks):
+def test_batches_threads_and_lanes_do_not_change_a_bit(case, rollout, cpu_blocks):
     pool, teams = teams_of(rollout, 7)
     heuristic = np.full(teams.shape[:2], -1, np.int32)
     heuristic[2, ::2] = 0
@@ -140,7 +140,7 @@ def test_batches_threads_and_lanes_give_the_same_bits(case, rollout, cpu_blocks)
     assert len({row.tobytes() for row in whole.counts}) > 4
     for other in (
         Rollout(*case, n_threads=3),
-        batched(Rollout(*case, n_threads=1), 4),  # two teams at once, at last one
+        batched(Rollout(*case, n_threads=1), 4),  # two teams at once, in the end one
         batched(Rollout(*case, n_threads=2), 1),
     ):
         assert_same_bits(whole, other.evaluate(pool, teams, scenarios, heuristic))
@@ -161,13 +161,13 @@ def assert_same_records(a, b):
 
 
 def test_a_robot_remembers_nothing_at_the_start_of_an_epoch(case, rollout):
-    """What another team has left in the same workspace, weights and memory, changes nothing."""
+    """Weights and memory left in the same workspace by another team change nothing."""
     pool, teams = teams_of(rollout, 4)
     fresh = Rollout(*case, n_threads=1).record(pool, teams[0], scenarios_of(rollout))
     rollout.evaluate(pool, teams[::-1], rollout.world.scenarios(keys(2)))
     for struct in (rollout._workspace.weights, rollout._workspace.memory):
         for name in struct._cls.vars:
-            getattr(struct, name).numpy()[:] = 3  # as if all had been in use
+            getattr(struct, name).numpy()[:] = 3  # as if all slots had been in use
     for _ in range(2):
         assert_same_records(fresh, rollout.record(pool, teams[0], scenarios_of(rollout)))
     out = Rollout(*case, n_threads=1).evaluate(pool, teams, scenarios_of(rollout))
@@ -194,12 +194,12 @@ def test_rounds_at_once_equal_a_call_for_each_bit_for_bit(case, rollout, n_world
         assert at_once.switches[some].tobytes() == outcomes[k].switches.tobytes()
         for name, values in outcomes[k].performance.items():
             assert at_once.performance[name][some].tobytes() == values.tobytes(), name
-    # The rounds differ: the first one's scenarios give the other teams something else.
+    # The rounds differ: the other teams get other results in the scenarios of the first one.
     again = alone.evaluate(pool, teams[3:6], rollout.world.scenarios(met[:2]), heuristic[3:6])
     assert again.counts.tobytes() != outcomes[1].counts.tobytes()
 
 
-def test_rounds_that_do_not_come_out_even_are_refused(rollout):
+def test_unequal_rounds_are_refused(rollout):
     pool, teams = teams_of(rollout, 4)
     for n_scenarios, n_teams in ((3, 4), (4, 3)):
         scenarios = rollout.world.scenarios(keys(n_scenarios))
@@ -243,7 +243,7 @@ def test_an_unknown_controller_names_the_nearest():
         assert "\n" not in str(caught.value)
 
 
-def test_a_setting_of_a_run_wins_over_the_worlds_and_that_over_the_default():
+def test_a_runs_setting_overrides_the_worlds_which_overrides_the_default():
     a_world = world("gacc/complex-9")
     assert a_world.controller["bias"] is True
     assert controller().bias is False

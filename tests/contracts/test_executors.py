@@ -1,8 +1,8 @@
-"""What every executor promises, with the coordinator over it; a registry entry enrols it.
+"""The contract of executors under a coordinator; a registry entry enrols an executor.
 
-Nothing is lost and nothing is run twice, whoever is killed; failures are listed with their reason;
-no more threads are at work than there are cores. The tests share one Ray, but for two: a killed or
-interrupted coordinator takes along the Ray that it has begun.
+Whichever process is killed, nothing is lost and nothing is run twice. Failures are listed with
+their reason. Never do more threads run than there are cores. The tests share one Ray, except two: a
+killed or interrupted coordinator stops the Ray that it has started.
 """
 
 import importlib.util
@@ -34,7 +34,7 @@ NAMES = [pytest.param(name, marks=SLOW.get(name, [])) for name in EXECUTORS]
 every_executor = pytest.mark.parametrize("name", NAMES)
 every_with_workers = pytest.mark.parametrize(
     "name", [one for one in NAMES if one.values != ("serial",)]
-)  # "serial" has none: who kills its run kills the coordinator
+)  # "serial" has none: killing its run kills the coordinator
 QUICK = {"run.generations": 2, "method.genotypes": 10, "world.iterations": 100}
 LONG = {"run.generations": 10, "method.genotypes": 20, "world.iterations": 1000}
 ENDLESS = LONG | {"run.generations": 100_000}
@@ -97,7 +97,7 @@ def executor_of():
 
 @pytest.fixture(scope="module")
 def undisturbed(tmp_path_factory):
-    """Return a function that returns what a planned run comes to if nobody disturbs it."""
+    """Return a function that returns the outcome of a planned run if it is not disturbed."""
     known = {}
 
     def make(planned):
@@ -114,7 +114,7 @@ def undisturbed(tmp_path_factory):
 
 
 def outcome(run):
-    """Return all that a run found, without times and sessions."""
+    """Return all results of a run, without times and sessions."""
     rows = [{k: v for k, v in row.items() if k != "seconds"} for row in run.generations()]
     return rows, run.champion.genes.tobytes(), run.test_result
 
@@ -124,7 +124,7 @@ def run_of(campaign, label):
 
 
 def coordinate(campaign, name):
-    """Begin a process that carries a campaign on, one core for all."""
+    """Start a process that carries out a campaign, with one core for all its runs."""
     code = (
         "from conevo.campaigns.campaign import Campaign\n"
         "from conevo.campaigns.executors.registry import make_executor\n"
@@ -143,7 +143,7 @@ def coordinate(campaign, name):
 
 @pytest.fixture(autouse=True)
 def none_left_behind():
-    """Kill the coordinators of a test that failed: their runs never end."""
+    """Kill the coordinators of a failed test: their runs never end."""
     yield
     for process in COORDINATORS:
         if process.poll() is None:
@@ -152,7 +152,7 @@ def none_left_behind():
 
 
 def assert_finished(campaign, undisturbed):
-    """All runs are finished and to the bit what they are when nobody disturbs them."""
+    """Assert that all runs are finished, bit for bit as if they had not been disturbed."""
     for label, planned in campaign.planned.items():
         run = run_of(campaign, label)
         assert (run.status, run.changed_files) == ("finished", [])
@@ -211,7 +211,7 @@ def test_a_killed_worker_costs_an_attempt_and_no_result(name, executor_of, campa
 
     def kill_once(campaign, ending):
         if ending is not None and not killed:
-            pytest.fail(f"{ending} before anybody was killed")
+            pytest.fail(f"{ending} before a process was killed")
         if not killed and n_generations(campaign, label) > 2:
             (worker,) = workers(campaign.path)
             killed.append(worker)
@@ -243,7 +243,7 @@ def test_a_worker_that_is_killed_every_time_fails_with_that_reason(name, executo
 
 
 @every_with_workers
-def test_workers_that_are_stopped_write_their_checkpoint_and_are_gone(name, executor_of, campaign):
+def test_workers_that_are_stopped_write_their_checkpoint_and_end(name, executor_of, campaign):
     made = campaign(ENDLESS)
     (label,) = made.planned
     executor = executor_of(name, 1)
@@ -261,8 +261,8 @@ def test_workers_that_are_stopped_write_their_checkpoint_and_are_gone(name, exec
     assert run.provenance["sessions"][1]["from_generation"] in (done - 1, done)  # records go first
 
 
-def test_workers_leave_also_where_interrupts_are_ignored(campaign):
-    """As in a job that a shell has put into the background."""
+def test_workers_stop_even_where_interrupts_are_ignored(campaign):
+    """As in a job that a shell runs in the background."""
     made = campaign(ENDLESS)
     (label,) = made.planned
     executor = make_executor("processes", 1)
@@ -294,7 +294,7 @@ def test_a_killed_coordinator_loses_nothing_and_nothing_is_run_twice(name, campa
     until(lambda: not workers(made.path) and run_of(made, second).status != "running")
     assert not made.is_running
     states = [one.state for one in made.standings().values()]
-    # Ray takes its time to notice, so that a run may come to its end meanwhile.
+    # Ray notices after a while, so a run may end meanwhile.
     assert states in [["finished", "pending"], *([["finished"] * 2] if name == "ray" else [])]
     made.carry_on(make_executor(name, 1))
     sessions = [run_of(made, label).provenance["sessions"] for label in (first, second)]
@@ -304,7 +304,7 @@ def test_a_killed_coordinator_loses_nothing_and_nothing_is_run_twice(name, campa
 
 
 @every_executor
-def test_ctrl_c_lets_all_write_their_checkpoints_and_leave(name, campaign):
+def test_after_ctrl_c_all_write_their_checkpoints_and_end(name, campaign):
     made = campaign(ENDLESS)
     (label,) = made.planned
     coordinator = coordinate(made, name)
@@ -324,7 +324,7 @@ def test_ctrl_c_lets_all_write_their_checkpoints_and_leave(name, campaign):
 
 
 @every_executor
-def test_no_more_threads_are_at_work_than_cores(name, executor_of, campaign):
+def test_there_are_never_more_running_threads_than_cores(name, executor_of, campaign):
     made = campaign(LONG | {"run.generations": 4}, seeds=3)
     seen = []
 
@@ -338,11 +338,11 @@ def test_no_more_threads_are_at_work_than_cores(name, executor_of, campaign):
     assert max(seen) == (0 if name == "serial" else 2)
     used = [run_of(made, label).provenance["sessions"][0]["threads"] for label in made.planned]
     assert used == ([2, 2, 2] if name == "serial" else [1, 1, used[2]])
-    assert used[2] in (1, 2)  # the last has both cores if both are free by then
+    assert used[2] in (1, 2)  # the last one has both cores if both are free by then
 
 
 @every_with_workers
-def test_libraries_of_a_worker_begin_no_threads_of_their_own(name, executor_of, campaign):
+def test_libraries_in_a_worker_start_no_threads(name, executor_of, campaign):
     made = campaign(ENDLESS)
     (label,) = made.planned
     executor = executor_of(name, 1)

@@ -1,6 +1,6 @@
-"""What every method promises; a registry entry enrols it, and so does a file in examples/.
+"""The contract of methods; a registry entry enrols a method, and so does a file in examples/.
 
-Nothing in the first part knows what a genotype is: it may be a neuron, a network or a whole team.
+The first part applies to any genotype: it may be a neuron, a network or a whole team.
 The second part is for methods that have populations of neurons or networks.
 """
 
@@ -34,7 +34,7 @@ EXCHANGE = {  # every option of the exchange between populations
 
 
 def in_files():
-    """Return "FILE.py:NAME" of every method in examples/ that is not one of the package, too."""
+    """Return "FILE.py:NAME" of every method in examples/ that is not also in the package."""
     for path in sorted((Path(__file__).parents[2] / "examples").glob("*.py")):
         found = re.search(
             r'^ENTRY = MethodEntry\(\n    name="(.*)"', path.read_text(), re.MULTILINE
@@ -92,7 +92,7 @@ def judge(trials):
 
 
 def run(learner, generations, root=3, score=judge, state=None):
-    """Return all states on the way."""
+    """Return the states after every request."""
     state = learner.init(LAYOUT, root) if state is None else state
     states = [state]
     while state.progress.generation < generations:
@@ -108,7 +108,7 @@ def is_end(before, after):
 
 
 def contents(record, prefix=""):
-    """Return what a dataclass holds, by name."""
+    """Return the fields of a dataclass, by name."""
     found = {}
     for field in fields(record):
         value, name = getattr(record, field.name), prefix + field.name
@@ -151,7 +151,7 @@ def test_state_is_plain_and_keeps_its_types(name, config):
         assert found.keys() == first.keys()
         assert {k: type(v) for k, v in found.items()} == {k: type(v) for k, v in first.items()}
     for before, after in pairwise(states):
-        if is_end(before, after):  # such states are kept, and looked at when they are read
+        if is_end(before, after):  # such states are stored, and checked when they are read
             assert after.progress.problem(states[0].progress) == ""
             assert getattr(after, "problem", lambda _: "")(states[0]) == ""
 
@@ -199,7 +199,7 @@ def test_ask_and_tell_are_pure(name, config):
 
 
 @every_variant
-def test_the_seed_decides_everything(name, config):
+def test_the_seed_determines_everything(name, config):
     learner = build(name, config)
     first, second, other = (run(learner, 5, root)[-1] for root in (3, 3, 4))
     assert_same(first, second)
@@ -251,7 +251,7 @@ def test_the_fittest_team_is_kept_with_its_genes(name, config):
 
 
 @every_variant
-def test_scores_that_are_not_finite_are_counted_and_spoil_nothing(name, config):
+def test_scores_that_are_not_finite_are_counted_and_do_no_harm(name, config):
     def spoiled(trials):
         scores = judge(trials)
         fitness = scores.fitness.copy()
@@ -296,7 +296,7 @@ def test_genotypes_stay_in_range_and_empty_slots_empty(name, config):
 
 
 @populations
-def test_every_genotype_is_tried_exactly_as_often_as_promised(name, config):
+def test_every_genotype_is_tried_the_promised_number_of_times(name, config):
     learner = build(name, config)
     for state in run(learner, 5):
         trials = learner.ask(state)
@@ -310,7 +310,7 @@ def test_every_genotype_is_tried_exactly_as_often_as_promised(name, config):
             np.testing.assert_array_equal(played.reshape(own.shape), expected + 0 * own)
             assert len(trials.teams) == ROUNDS * GENOTYPES
             continue
-        # Robot r of team n scores n + r / 8: fitness tells which robot of which team was on trial.
+        # Robot r of team n scores n + r / 8: fitness identifies the robot and the team on trial.
         told = learner.tell(state, trials, Scores(n + r / 8, 0.0 * n))
         tried = told.fitness[np.isfinite(told.fitness)]
         team = np.floor(tried).astype(int)

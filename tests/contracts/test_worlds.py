@@ -1,4 +1,4 @@
-"""What every world promises, for each environment family of the registry."""
+"""The contract of worlds, for each environment family of the registry."""
 
 from dataclasses import fields, replace
 from pathlib import Path
@@ -48,14 +48,14 @@ def some_world(path):
 
 @pytest.fixture(scope="module")
 def warp_world(some_world):
-    """Return a world that the engine plays; only those have phases, lanes and rows to refuse."""
+    """Return a world that the engine plays: only such worlds have phases, lanes and rows."""
     if has_own_simulator(some_world):
         pytest.skip("has a simulator of its own")
     return some_world
 
 
 def played(a_world, n_threads=None):
-    """Return what plays a world."""
+    """Return the simulator of a world."""
     return simulator(a_world, controller(world=a_world), n_threads)
 
 
@@ -73,7 +73,7 @@ def assert_same_bits(a, b):
         assert values.tobytes() == outcome_arrays(b)[name].tobytes(), name
 
 
-def test_a_scenario_is_that_of_its_key_whatever_is_drawn_with_it(some_world):
+def test_a_scenario_depends_on_its_key_alone(some_world):
     many = keys(40)
     whole, turned = some_world.scenarios(many), some_world.scenarios(many[::-1])
     assert (len(whole), len(turned)) == (40, 40)
@@ -90,7 +90,7 @@ def test_a_scenario_is_that_of_its_key_whatever_is_drawn_with_it(some_world):
                 assert own[0].tobytes() == getattr(turned, field.name)[39 - e].tobytes()
 
 
-def test_a_world_is_what_its_entry_says(path, some_world):
+def test_a_world_agrees_with_its_entry(path, some_world):
     entry, environment = resolve(path)
     assert (some_world.name, some_world.environment) == (entry.name, environment)
     own = entry.defaults.get(environment, {})
@@ -105,7 +105,7 @@ def test_a_world_is_what_its_entry_says(path, some_world):
     assert resolve(entry.address(environment)) == (entry, environment)
 
 
-def test_outcome_has_the_shapes_and_ranges_it_promises(some_world):
+def test_outcome_has_the_promised_shapes_and_ranges(some_world):
     genes, teams = random_teams(some_world, 3)
     out = played(some_world).evaluate(genes, teams, some_world.scenarios(keys(2)))
     r, c = some_world.n_robots, len(some_world.castes)
@@ -122,13 +122,13 @@ def test_outcome_has_the_shapes_and_ranges_it_promises(some_world):
     assert (out.switches < executed).all()
 
 
-def test_threads_slices_and_company_do_not_change_a_bit(some_world):
+def test_threads_slices_and_other_teams_do_not_change_a_bit(some_world):
     genes, teams = random_teams(some_world, 5)
     scenarios = some_world.scenarios(keys(2))
     whole = played(some_world, n_threads=1).evaluate(genes, teams, scenarios)
     assert_same_bits(whole, played(some_world, n_threads=3).evaluate(genes, teams, scenarios))
     rollout = played(some_world, n_threads=2)
-    rollout.evaluate(genes, teams[::-1], scenarios)  # the workspace keeps no trace of it
+    rollout.evaluate(genes, teams[::-1], scenarios)  # no trace of it is left in the workspace
     for n in range(5):
         alone = rollout.evaluate(genes, teams[n : n + 1], scenarios)
         for name, values in outcome_arrays(whole).items():
@@ -181,7 +181,7 @@ def test_record_equals_evaluate_bit_for_bit(some_world):
                 assert np.array_equal((action == a).sum(axis=0), counts[:, a])
 
 
-def test_robots_visited_in_any_order_within_a_phase_give_the_same_bits(warp_world):
+def test_the_order_of_robots_within_a_phase_does_not_change_a_bit(warp_world):
     genes, teams, heuristic = mixed_teams(warp_world)
     scenarios = warp_world.scenarios(keys(2))
     trial = Trial(warp_world, genes, teams, heuristic, scenarios)
@@ -207,7 +207,7 @@ def test_every_heuristic_controller_plays(some_world):
     assert len(seen) == len(some_world.heuristics) + 1
 
 
-def test_cpu_blocks_run_the_cuda_form_to_the_same_bits(warp_world, cpu_blocks):
+def test_the_cuda_form_on_cpu_blocks_agrees_bit_for_bit(warp_world, cpu_blocks):
     genes, teams = random_teams(warp_world, 2)
     heuristic = np.full((2, warp_world.n_robots), -1, dtype=np.int32)
     heuristic[0, 1::2] = 0

@@ -1,4 +1,4 @@
-"""Who plays with whom."""
+"""Teams: which genotypes play together."""
 
 import numpy as np
 
@@ -126,7 +126,7 @@ def test_distinct_members_are_different_and_evenly_used():
     assert distinct(4, 0, 7, generator()).shape == (4, 0)
 
 
-def test_shared_rounds_are_told_apart_only_if_they_are_to_have_their_own_scenarios():
+def test_shared_rounds_are_distinguished_only_if_they_have_their_own_scenarios():
     for name in ("ccga", "mesp", "cone"):
         told = {}
         for fresh in (False, True):

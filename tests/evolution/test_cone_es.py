@@ -1,4 +1,4 @@
-"""CONE-ES on made-up fitness: each part of a generation against what it is by hand."""
+"""CONE-ES on made-up fitness: each part of a generation against a calculation by hand."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ Credit = Callable[[Trials], np.ndarray]  # [N, R]
 
 
 def worth(trials: Trials) -> np.ndarray:
-    """How far up each robot's genes are, [N, R]."""
+    """Fitness [N, R], linear in each robot's genes."""
     return (trials.networks() * UPHILL).sum(axis=(2, 3))
 
 
 def luck(trials: Trials) -> np.ndarray:
-    """Credits [N, R] that have nothing to do with anybody's genes."""
+    """Credits [N, R] that do not depend on genes."""
     rng = np.random.default_rng([trials.generation, len(trials.teams)])
     return rng.standard_normal(trials.teams.shape[:2])
 
@@ -40,7 +40,7 @@ def told(learner: Any, state: ConeEsState, credit: np.ndarray) -> ConeEsState:
 
 
 def evolved(learner: Any, state: ConeEsState, credit: Credit, generations: int) -> ConeEsState:
-    """Return the state that many generations later."""
+    """Return the state after a number of generations."""
     end = state.progress.generation + generations
     while state.progress.generation < end:
         state = told(learner, state, credit(learner.ask(state)))
@@ -61,7 +61,7 @@ def rms(genes: np.ndarray) -> float:
 
 
 def same(a: ConeEsState, b: ConeEsState, *but: str) -> None:
-    """Check that two states agree bit for bit, but for some fields."""
+    """Check that two states agree bit for bit, except in some fields."""
     for field in fields(ConeEsState):
         if field.name not in ("progress", *but):
             np.testing.assert_array_equal(
@@ -85,7 +85,7 @@ def test_pairs_are_mirror_images_in_the_scenarios_of_their_round() -> None:
     )
     moves = rounds[:, 0] - centre
     alike = np.ptp(moves, axis=2).max(axis=(2, 3)) < 1e-6  # [K, pairs]: in all robots of a team
-    assert alike.tolist() == [[False, False, True, True, True]] * 4  # a share of 0.4 is own
+    assert alike.tolist() == [[False, False, True, True, True]] * 4  # a share of 0.4 is individual
     assert not np.isclose(moves[:, :, 0, :3], moves[::-1, ::-1, 0, :3]).any()
     shared, both = rms(moves[:, 2:]), rms(moves[:, :2])
     assert shared == pytest.approx(0.1, rel=0.1)
@@ -101,7 +101,7 @@ def test_ranks_of_each_robot_by_hand() -> None:
 
 
 def test_teams_are_ranked_in_their_round_alone() -> None:
-    """A round with lucky scenarios says no more and no less than another."""
+    """A round with lucky scenarios counts no more and no less than another."""
     learner = method("cone-es", pairs=20, rounds=4)
     state = around(learner)
     credit = worth(learner.ask(state))
@@ -121,13 +121,13 @@ def test_a_team_that_is_not_finite_ranks_last() -> None:
     assert after.progress.n_nonfinite == 12
     assert np.isfinite(after.progress.mean_fitness)
     one = credit.copy()
-    one[3, 2] = np.inf  # of one robot: the team is last too, the others' own credit counts
+    one[3, 2] = np.inf  # of one robot: the team is last, too; the credit of the other robots counts
     least[:] = credit
     least[3, 2] = -1e9
     same(told(learner, state, one), told(learner, state, least))
 
 
-def test_nothing_moves_where_nothing_is_finite() -> None:
+def test_nothing_moves_if_nothing_is_finite() -> None:
     learner = method("cone-es", pairs=10)
     state = evolved(learner, around(learner, 0.3), lambda t: luck(t) * np.nan, 8)
     np.testing.assert_array_equal(state.mean[:3], np.float32(0.3))
@@ -163,7 +163,7 @@ def test_the_first_mean_is_the_fittest_of_random_controllers() -> None:
 
 
 @pytest.mark.parametrize("name", ["cone-es", "hom-es"])
-def test_the_mean_steps_uphill_and_as_far_as_it_should(name: str) -> None:
+def test_the_mean_steps_uphill_by_the_right_distance(name: str) -> None:
     learner = method(name, step=0.03, pairs=60)
     before = around(learner)
     after = evolved(learner, before, worth, 1)
@@ -189,7 +189,7 @@ def test_genes_stay_in_range() -> None:
 # --- the individual part --------------------------------------------------------------------------
 
 
-def test_luck_moves_nobody_apart_and_the_share_shrinks() -> None:
+def test_luck_does_not_separate_robots_and_the_share_shrinks() -> None:
     uphill = np.random.default_rng(2).standard_normal((10, 31))
 
     def credit(trials: Trials) -> np.ndarray:
@@ -221,8 +221,8 @@ def test_two_castes_emerge_where_two_kinds_of_robots_need_opposite_genes() -> No
     assert (team[0] != team[1]).any()
 
 
-def test_robots_that_have_a_direction_in_common_share_what_each_found() -> None:
-    """Of pure signal all is kept; what only one generation said is not."""
+def test_robots_with_a_common_direction_share_their_findings() -> None:
+    """A pure signal is kept entirely; the direction of a single generation is not."""
     learner = method("cone-es")
     state = evolved(learner, around(learner), luck, FIRST + 1)
     kind = np.array([1.0, -1, 1, -1, 1, -1])
@@ -238,7 +238,7 @@ def test_robots_that_have_a_direction_in_common_share_what_each_found() -> None:
 
 @pytest.mark.parametrize("seed", range(20))
 def test_the_filter_is_that_of_wiener(seed: int) -> None:
-    """P (P + noise)^-1 with P the likeness above its luck, without any eigenvectors."""
+    """P (P + noise)^-1, where P is the similarity minus its expectation by chance."""
     rng = np.random.default_rng(seed)
     n, age, memory = int(rng.integers(2, 12)), int(rng.integers(FIRST + 1, 60)), 0.9
     likeness = rng.standard_normal((n, n)) + rng.uniform(0, 2) * n**0.5 * np.eye(n)
@@ -266,7 +266,7 @@ def test_the_filter_is_that_of_wiener(seed: int) -> None:
 
 
 @pytest.mark.parametrize("n_robots", [2, 6, 20])
-def test_luck_alone_is_seldom_taken_for_a_signal(n_robots: int) -> None:
+def test_luck_alone_is_rarely_mistaken_for_a_signal(n_robots: int) -> None:
     learner: Any = method("cone-es")
     state, signals = learner.init(Layout(n_robots, 10, 10, 31), 1), []
     rng = np.random.default_rng(3)
@@ -290,7 +290,7 @@ def before_the_judgement(learner: Any) -> ConeEsState:
     return told(learner, state, luck(learner.ask(state)))
 
 
-def test_deviations_that_the_team_does_not_like_decay_and_clones_are_its_fittest() -> None:
+def test_deviations_that_do_not_pay_decay_and_clones_are_the_fittest_team() -> None:
     learner = method("cone-es", pairs=10, decay=0.1)
     state = before_the_judgement(learner)
     trials = learner.ask(state)
@@ -367,7 +367,7 @@ def test_a_pair_of_every_round_is_individual_as_long_as_anything_is() -> None:
     assert own.tolist() == [[True, False]] * 5
 
 
-def test_a_state_that_cannot_be_is_recognized() -> None:
+def test_an_impossible_state_is_recognized() -> None:
     learner: Any = method("cone-es", pairs=10)
     first = learner.init(LAYOUT, 3)
     good = evolved(learner, first, worth, 7)

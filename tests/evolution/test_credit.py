@@ -1,4 +1,4 @@
-"""From the scores of teams to the fitness of genotypes, worked by hand."""
+"""From the scores of teams to the fitness of genotypes, worked out by hand."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""How populations begin and exchange genes: each option against a small case worked by hand."""
+"""How populations start and exchange genes: each option against a small case worked by hand."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def marked(learner: Any, layout: Layout, values: Any) -> Any:
 
 
 def families(state: Any, values: Any) -> list[set[int]]:
-    """Return for each population whose genes it has, by the populations' values."""
+    """Return for each population the populations whose genes it has, by their values."""
     return [{values.index(value) for value in np.unique(genes)} for genes in state.genes]
 
 
@@ -73,7 +73,7 @@ NAMES = [1 / 8, 2 / 8, 3 / 8, 4 / 8]  # GD between populations i and j: |i - j| 
         # Without (0,1), (2,3), (0,3), whose SD is 1/2 and more, 0 and 3 have nobody left.
         ("cone", {"pairing": "all", "sst": 0.5}, [{0}, {1, 2}, {1, 2}, {3}]),
         ("cone-1", {"pairing": "all"}, [{0, 2}, {1, 3}, {0, 2}, {1, 3}]),  # SD alone
-        ("cone-2", {}, [{0, 1}, {0, 1}, {2, 3}, {2, 3}]),  # GD alone, the first of equals
+        ("cone-2", {}, [{0, 1}, {0, 1}, {2, 3}, {2, 3}]),  # GD alone, ties go to the first
     ],
 )
 def test_each_population_pairs_once_or_with_all_that_are_similar(
@@ -100,13 +100,13 @@ LIVES = [[1, 0], [0, 1], [0.75, 0.25], [0.25, 0.75]]  # 0 and 2 do the first act
         ("label", [0, 0.5, 0.5, 0.5], [{0}, {1, 3}, {2}, {1, 3}]),  # neither 1 nor 3 is
     ],
 )
-def test_what_is_similar_behaviour(sd: str, s: list[float], expected: list[set[int]]) -> None:
+def test_similar_behaviour(sd: str, s: list[float], expected: list[set[int]]) -> None:
     learner = method("cone", genotypes=4, mutation_probability=0.0, gst=1.0, sst=0.5, sd=sd)
     state = generation(learner, marked(learner, FOUR, NAMES), s=s, shares=LIVES)
     assert families(state, NAMES) == expected
 
 
-def test_what_robots_do_must_be_known_where_it_decides() -> None:
+def test_shares_of_actions_must_be_known_if_pairing_depends_on_them() -> None:
     learner = method("cone", genotypes=4, sd="shares")
     with pytest.raises(UsageError, match=r"method.sd = 'shares' needs scores.shares"):
         generation(learner, learner.init(FOUR, root=5))
@@ -143,7 +143,7 @@ def test_a_share_of_the_pairs_exchanges_others_in_each_generation() -> None:
     assert pairs(0.5, 3) not in (pairs(0.5, 4), pairs(0.5, 3, root=6))
     found = [pairs(0.2, generation) for generation in range(40)]
     assert sum(map(len, found)) / (45 * 40) == pytest.approx(0.2, abs=0.04)  # s.d. 0.0094
-    assert set.union(*found) == pairs(1.0, 0)  # nobody is left out for ever: 45 x 0.8^40 = 0.006
+    assert set.union(*found) == pairs(1.0, 0)  # no pair is left out forever: 45 x 0.8^40 = 0.006
 
 
 @pytest.mark.parametrize("name", ["cone", "cone-1", "cone-2"])
@@ -176,7 +176,7 @@ def test_an_option_without_effect_is_refused(name: str, config: dict[str, Any], 
 
 
 def test_an_option_that_a_variant_has_anyway_is_accepted() -> None:
-    """CONE-1 recombines slot by slot, CONE-2 and CONE-3 keep the defaults of what they lack."""
+    """CONE-1 recombines slot by slot; CONE-2 and CONE-3 have the defaults of options they lack."""
     assert method("cone-1", exchange_slots="same", exchange_share=0.5, pairing="all", sd="label")
     assert method("cone-2", exchange_slots="same", exchange_share=0.5, pairing="nearest")
     assert method("cone-3", exchange_slots="any", exchange_share=1.0, sd="switching")
@@ -199,7 +199,7 @@ def worth(of_robot: Any, of_elites: Any = 0.0) -> Any:
     ("name", "config"),
     [("mesp", {}), ("cone", {"exchange_share": 0.0}), ("cone-3", {})],
 )
-def test_the_fittest_population_replaces_the_least_fit_at_times(
+def test_the_fittest_population_replaces_the_least_fit_at_intervals(
     name: str, config: dict[str, Any]
 ) -> None:
     learner = method(name, genotypes=4, mutation_probability=0.0, migration_every=2, **config)
@@ -227,7 +227,7 @@ def test_the_fittest_population_replaces_the_least_fit_at_times(
 
 
 def test_populations_are_compared_by_the_mean_of_their_finite_type_a_fitness() -> None:
-    """Population 0 has the best genotype, population 1 the best mean, 2 nothing that is finite."""
+    """Population 0 has the best genotype, population 1 the best mean, 2 no finite fitness."""
     learner = method("mesp", genotypes=2, mutation_probability=0.0, migration_every=1)
     state = marked(learner, LAYOUT, THREE)
     trials = learner.ask(state)  # of each slot of each population both genotypes: 12 teams
@@ -245,7 +245,7 @@ def test_populations_are_compared_by_the_mean_of_their_finite_type_a_fitness() -
     assert learner.sources(one).tolist() == [2, 1, 2]
 
 
-def test_without_migration_nothing_is_said_of_it() -> None:
+def test_without_migration_its_other_settings_are_absent() -> None:
     learner = method("mesp", genotypes=4)
     state = generation(learner, learner.init(LAYOUT, root=5), worth([1, 5, 3]))
     assert "migrations" not in state.progress.numbers

@@ -1,4 +1,4 @@
-"""Whole generations of each method with scripted scores, worked by hand."""
+"""Whole generations of each method with scripted scores, worked out by hand."""
 
 import time
 from dataclasses import fields, replace
@@ -77,7 +77,7 @@ def test_a_clones_credit_may_be_that_of_one_robot_the_same_for_all_genotypes():
         state = learner.tell(state, final, scores(final))
     of_robots = [[[1.0, 0.0, 4.0, -1.0]], [[3.0, 10.0, 4.0, 0.0]]]
     assert [of_robots.index(one) for one in seen] == [place_on_trial(7, g, 2) for g in range(8)]
-    assert all(one in seen for one in of_robots)  # no place holds for all generations
+    assert all(one in seen for one in of_robots)  # the place is drawn again in every generation
 
 
 def test_hetcne_partners_are_others_first_then_last_generations_elite():
@@ -129,7 +129,7 @@ def test_elite_partners_need_a_team_for_each_genotype(name):
     np.testing.assert_array_equal(a.genes, b.genes)
 
 
-def test_neurons_play_with_the_elite_of_the_generation_before():
+def test_neurons_play_with_the_elite_of_the_previous_generation():
     """Two robots with one neuron each, which one has in slot 0 and the other adds to."""
     learner = method("mesp", genotypes=4, elite_portion=0.5)
     state = learner.init(replace(SMALL, n_hidden=1), root=3)
@@ -201,7 +201,7 @@ def test_cone_type_c_reorders_the_elite_and_only_the_elite():
     assert trials.teams[:2, 0, 0].tolist() == [1, 3]
     assert trials.teams[2:, 1, 0].tolist() == [4, 6]
     assert set(trials.teams[:2, 1, 0]) <= {4, 6}
-    # Type C turns P0's ranks round and leaves P1's, although 0.5 is less than others' type A.
+    # Type C reverses P0's ranks and leaves P1's, although 0.5 is less than the type A of others.
     type_c = np.array([[0.25, 0], [0.5, 0], [0, 0.5], [0, 0.25]])
     state = learner.tell(state, trials, Scores(type_c, np.zeros((4, 2))))
     assert state.elite[:, 0].tolist() == [[3, 1], [0, 2]]
@@ -225,7 +225,7 @@ TWO_ROUNDS = [[2, 0], [1, 5], [0, 3], [1, 2], [2, 1], [4, 0], [0, 3], [6, 6]]
 @pytest.mark.parametrize(
     "scheme",
     [
-        {"evaluation": "shared", "rounds": 2},  # as many as type A has
+        {"evaluation": "shared", "rounds": 2},  # the same number as of type A
         {"evaluation": "shared", "rounds": 2, "type_c_rounds": 2},
         {"evaluation": "systematic", "type_c_rounds": 2},
     ],
@@ -281,7 +281,7 @@ def test_without_type_c_the_elite_keeps_the_order_of_type_a_and_nothing_is_spent
 def marked_generation(name, specialization, n_robots=3, **config):
     """Return a method's state after a generation whose genes name their populations.
 
-    Every gene of population p is (p + 1) / 8, so children show whom they come from.
+    Every gene of population p is (p + 1) / 8, so children show their parents' populations.
     """
     learner = method(name, genotypes=4, mutation_probability=0.0, **config)
     layout = Layout(n_robots=n_robots, n_hidden=2, max_hidden=2, n_genes=4)
@@ -292,7 +292,7 @@ def marked_generation(name, specialization, n_robots=3, **config):
 
 
 def parents_of(state, population):
-    """Return which populations the genes of a marked population's children come from."""
+    """Return the populations from which the children of a marked population have their genes."""
     return set((np.unique(state.genes[population]) * 8 - 1).astype(int).tolist())
 
 
@@ -301,10 +301,15 @@ def parents_of(state, population):
     [
         # S: 0 and 1 alike (0.05), 2 far (0.75). GD between P0 and P1: 1/16; P0 and P2: 1/8.
         ("cone", {"gst": 0.1}, [{0, 1}, {0, 1}, {2}], 2),
-        ("cone", {"gst": 0.05}, [{0}, {1}, {2}], 0),  # behave alike, look different
-        ("cone", {"gst": 0.1, "sst": 0.01}, [{0}, {1}, {2}], 0),  # look alike, behave differently
+        ("cone", {"gst": 0.05}, [{0}, {1}, {2}], 0),  # similar behaviour, different genotypes
+        (
+            "cone",
+            {"gst": 0.1, "sst": 0.01},
+            [{0}, {1}, {2}],
+            0,
+        ),  # similar genotypes, different behaviour
         ("cone", {"gst": 0.1, "gd_aggregate": "sum"}, [{0}, {1}, {2}], 0),  # 2 x 1/16
-        ("cone-1", {"gst": 0.0}, [{0, 1}, {0, 1}, {2}], 2),  # looks do not matter
+        ("cone-1", {"gst": 0.0}, [{0, 1}, {0, 1}, {2}], 2),  # genotypes do not matter
         ("cone-2", {"sst": 0.0, "gst": 0.1}, [{0, 1}, {0, 1}, {2}], 2),  # behaviour does not
         ("cone-3", {"sst": 1.0, "gst": 1.0}, [{0}, {1}, {2}], 0),
         ("mesp", {}, [{0}, {1}, {2}], 0),
@@ -359,7 +364,7 @@ def test_variants_have_no_threshold_they_do_not_use():
     }
 
 
-def test_a_method_remembers_only_what_it_needs():
+def test_a_method_remembers_only_necessary_values():
     common = {"progress", "phase", "genes", "active", "fitness", "elite"}
     windows = {"past_fitness", "watched_since", "population_fitness"}
     thresholds = {"past_specialization", "past_recombinations", "distance", "sst", "gst"}
@@ -418,7 +423,7 @@ def test_stagnating_controllers_grow_when_every_neuron_is_needed(name, config, p
     assert cost[grown - 1] - cost[grown - 2] == 3
 
 
-def test_a_neuron_that_nobody_misses_goes_and_its_slot_is_emptied():
+def test_an_unnecessary_neuron_is_removed_and_its_slot_is_emptied():
     learner = method("mesp", genotypes=2, stagnation_y=1)
     layout = Layout(n_robots=2, n_hidden=3, max_hidden=4, n_genes=4)
     state = play(learner, learner.init(layout, root=1), 1)[0]
@@ -440,7 +445,7 @@ def test_a_neuron_that_nobody_misses_goes_and_its_slot_is_emptied():
     assert len(teams) == 2 * (2 + 4)
 
 
-def test_scores_must_answer_the_question():
+def test_scores_must_match_the_request():
     learner = method("mesp", genotypes=2)
     state = learner.init(SMALL, root=1)
     trials = learner.ask(state)
@@ -460,7 +465,7 @@ def test_layout_refuses_impossible_sizes():
 
 @pytest.mark.timing
 @pytest.mark.parametrize("name", ["homcne", "hetcne", "ccga", "mesp", "cone"])
-def test_a_desk_generation_costs_little_beside_its_simulation(name):
+def test_a_desk_generation_costs_little_compared_with_its_simulation(name):
     # 200 teams of 20 robots take about 1.5 s to simulate; 5 % of that is 75 ms.
     config = {"genotypes": 200} if name.endswith("cne") else {"genotypes": 20}
     if not name.endswith("cne"):

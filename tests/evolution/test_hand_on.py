@@ -1,4 +1,4 @@
-"""Populations taken into the next task: genes and sizes go with them, all else begins anew."""
+"""Populations taken into the next task: genes and sizes are kept, everything else starts again."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def build(name: str):
 
 
 def evolve(learner, state: State, generations: int) -> State:
-    """Return the state after so many generations of falling scores."""
+    """Return the state after a number of generations of falling scores."""
     end = state.progress.generation + generations
     while state.progress.generation < end:
         trials = learner.ask(state)
@@ -42,7 +42,7 @@ def evolve(learner, state: State, generations: int) -> State:
 
 
 def contents(record: object, prefix: str = "") -> dict[str, object]:
-    """Return what a state holds, by name, its header's fields as "progress.root"."""
+    """Return the fields of a state, by name, those of its header as "progress.root"."""
     found: dict[str, object] = {}
     for one in fields(record):
         value, name = getattr(record, one.name), prefix + one.name
@@ -51,7 +51,7 @@ def contents(record: object, prefix: str = "") -> dict[str, object]:
 
 
 def same(a: State, b: State, names: set[str]) -> None:
-    """Check that two states agree in some fields, to the bit and the type."""
+    """Check that two states agree in some fields bit for bit, and in their types."""
     left, right = contents(a), contents(b)
     for name in names:
         assert np.asarray(left[name]).dtype == np.asarray(right[name]).dtype, name
@@ -59,11 +59,11 @@ def same(a: State, b: State, names: set[str]) -> None:
 
 
 @with_populations
-def test_genes_and_slots_are_taken_over_and_all_else_begins_anew(name: str) -> None:
+def test_genes_and_slots_are_taken_over_and_all_else_starts_again(name: str) -> None:
     learner = build(name)
     old = evolve(learner, learner.init(LAYOUT, 3), 8)
     if "stagnation_y" in METHODS[name].config_class.__dataclass_fields__:
-        while (old.progress.n_hidden == LAYOUT.n_hidden).all():  # until a changed size is at stake
+        while (old.progress.n_hidden == LAYOUT.n_hidden).all():  # until a size is about to change
             old = evolve(learner, old, 1)
     new, fresh = hand_on(learner, LAYOUT, 7, old), learner.init(LAYOUT, 7)
     same(new, old, TAKEN)
@@ -74,7 +74,7 @@ def test_genes_and_slots_are_taken_over_and_all_else_begins_anew(name: str) -> N
     ("old", "new", "taken"),
     [("cone", "cone", {"sst", "gst"}), ("cone", "cone-1", {"sst"}), ("cone-2", "cone-2", {"gst"})],
 )
-def test_thresholds_may_go_on_where_they_were(old: str, new: str, taken: set[str]) -> None:
+def test_thresholds_may_be_taken_over(old: str, new: str, taken: set[str]) -> None:
     before: Any = evolve(build(old), build(old).init(LAYOUT, 3), 2)
     before = replace(before, **dict.fromkeys(sorted(taken), 0.375))
     learner = method(new, genotypes=6, elite_portion=0.5, thresholds_from="ancestor")
@@ -144,14 +144,14 @@ def test_populations_that_do_not_fit_are_refused(name: str) -> None:
         hand_on(method(name, genotypes=8), LAYOUT, 3, old)
 
 
-def test_neurons_are_no_networks() -> None:
+def test_neurons_are_not_networks() -> None:
     mesp, ccga = build("mesp"), build("ccga")
     with pytest.raises(UsageError, match="neurons do not mix with whole networks"):
         hand_on(ccga, LAYOUT, 3, mesp.init(LAYOUT, 3))
 
 
 @with_populations
-def test_populations_bred_from_a_team_have_it_whole_and_vary_around_it(name: str) -> None:
+def test_populations_bred_from_a_team_contain_it_and_vary_around_it(name: str) -> None:
     learner = build(name)
     fresh = learner.init(LAYOUT, 3)
     active = np.zeros((2, 5), dtype=bool)
@@ -211,7 +211,7 @@ def test_a_team_of_other_sizes_is_refused() -> None:
         breed_from(build("ccga"), LAYOUT, 3, genes, active)
 
 
-# --- methods that begin around a team -------------------------------------------------------------
+# --- methods that start around a team -------------------------------------------------------------
 
 AROUND = {"mean", "deviations", "active", "phase", "progress.n_hidden"}
 ONE_BIT = 2.0**-23  # of a gene of 1
@@ -227,7 +227,7 @@ def team_of(n_robots: int) -> tuple[np.ndarray, np.ndarray]:
 
 @around_a_team
 @pytest.mark.parametrize("ancestor", ["own", "cone", "homcne"])
-def test_a_method_without_populations_begins_around_the_fittest_team(
+def test_a_method_without_populations_starts_around_the_fittest_team(
     name: str, ancestor: str
 ) -> None:
     learner = build(name)
@@ -243,7 +243,7 @@ def test_a_method_without_populations_begins_around_the_fittest_team(
 
 @around_a_team
 @pytest.mark.parametrize("n_robots", [1, 2, 5])
-def test_it_begins_with_each_robot_of_the_team_in_turn(name: str, n_robots: int) -> None:
+def test_it_starts_with_each_robot_of_the_team_in_turn(name: str, n_robots: int) -> None:
     learner: Any = build(name)
     genes, active = team_of(3)
     layout = replace(LAYOUT, n_robots=n_robots)
@@ -265,7 +265,7 @@ def test_it_begins_with_each_robot_of_the_team_in_turn(name: str, n_robots: int)
 
 @around_a_team
 @pytest.mark.parametrize("n_robots", [1, 3, 7, 20])
-def test_of_a_team_of_clones_it_is_the_clone_bit_for_bit(name: str, n_robots: int) -> None:
+def test_for_a_team_of_clones_it_is_the_clone_bit_for_bit(name: str, n_robots: int) -> None:
     learner: Any = build(name)
     genes, active = team_of(1)
     clones = genes.repeat(n_robots, axis=0), active.repeat(n_robots, axis=0)
@@ -275,7 +275,7 @@ def test_of_a_team_of_clones_it_is_the_clone_bit_for_bit(name: str, n_robots: in
 
 
 @around_a_team
-def test_a_slot_that_some_robot_uses_begins_with_zeros_in_the_others(name: str) -> None:
+def test_a_slot_that_some_robot_uses_starts_with_zeros_in_the_others(name: str) -> None:
     genes, active = team_of(2)
     genes[1, 3], active[1, 3] = 0, False
     state: Any = breed_from(build(name), LAYOUT, 3, genes, active)
@@ -295,7 +295,7 @@ def test_teams_that_do_not_fit_are_refused(name: str) -> None:
             hand_on(learner, layout, 3, old)
         with pytest.raises(UsageError, match=words):
             breed_from(learner, layout, 3, *team_of(2))
-    for learner_of in (learner, build("cone")):  # before its first team there is nothing to fit
+    for learner_of in (learner, build("cone")):  # before its first team, sizes need not fit
         anew = hand_on(learner, LAYOUT, 3, learner_of.init(LAYOUT, 3))
         same(anew, learner.init(LAYOUT, 3), set(contents(anew)))
     with pytest.raises(UsageError, match="the method it is from has none"):
@@ -336,7 +336,7 @@ class Hermit:
         return Alone(Progress.first(layout, root))
 
 
-def test_a_method_without_populations_begins_with_nobody_elses() -> None:
+def test_a_method_without_populations_takes_over_none() -> None:
     hermit, mesp = Hermit(), build("mesp")
     for learner, old, words in (
         (hermit, mesp.init(LAYOUT, 3), "Hermit has none from which another run could start"),

@@ -1,4 +1,4 @@
-"""Every method learns a separable function by ask and tell, without any world."""
+"""Every method learns a separable function through ask and tell, without a world."""
 
 import numpy as np
 import pytest
@@ -33,7 +33,7 @@ def test_error_halves(name, config, generations):
         trials = learner.ask(state)
         distance = np.abs(trials.networks() - target).mean(axis=(2, 3))
         before = state.progress.generation
-        # Robots differ in S by more than any threshold: nobody is taken for another.
+        # Robots differ in S by more than any threshold: no two are similar.
         specialization = np.broadcast_to([0.0, 0.5, 1.0], distance.shape)
         state = learner.tell(state, trials, Scores(1 - distance, specialization))
         if state.progress.generation > before:

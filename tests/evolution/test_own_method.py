@@ -52,7 +52,7 @@ def test_the_first_step_by_hand() -> None:
 
 
 def far(target: float, generations: int, step_size: float) -> tuple[float, Any]:
-    """Return the distance of the mean from a target in every gene, and the state, in the end."""
+    """Return the final distance of the mean from a target in every gene, and the final state."""
     learner = conevo.method(ADDRESS, genotypes=12, step_size=step_size)
     state = learner.init(replace(ONE, n_robots=2, n_hidden=3, max_hidden=5), root=1)
     while state.progress.generation < generations:
@@ -71,7 +71,7 @@ def test_the_step_size_grows_far_from_the_optimum_and_shrinks_on_it() -> None:
     assert distance < 1e-3
 
 
-def test_what_is_not_a_state_of_the_same_run_is_told_by_its_field() -> None:
+def test_a_state_of_another_run_is_refused_with_the_name_of_a_field() -> None:
     learner = conevo.method(ADDRESS, genotypes=4)
     first = learner.init(ONE, root=3)
     assert first.problem(first) == ""

@@ -1,4 +1,4 @@
-"""Genotypes at random, ranked, and their distance."""
+"""Random genotypes, their ranking, and their distance."""
 
 import numpy as np
 import pytest
@@ -33,7 +33,7 @@ def test_random_genes_fill_the_range_evenly():
     assert genotype_distance(genes[:200], genes[200:]).mean() == pytest.approx(1 / 3, abs=0.01)
 
 
-def test_ranking_puts_what_is_not_finite_last_and_keeps_the_order_of_equals():
+def test_ranking_puts_non_finite_values_last_and_keeps_the_order_of_ties():
     fitness = np.array([3.0, np.nan, 5.0, 3.0, np.inf, -1.0, -np.inf])
     assert ranking(fitness).tolist() == [2, 0, 3, 5, 1, 4, 6]
     assert ranking(np.stack([fitness, -fitness]))[1].tolist() == [5, 0, 3, 2, 1, 4, 6]
@@ -50,7 +50,7 @@ def test_elite_count(portion, n_genotypes, expected):
 def test_a_network_is_the_concatenation_of_its_neurons():
     genes = np.arange(2 * 3 * 2 * 2, dtype=np.float32).reshape(2, 3, 2, 2)  # P, U, M, G
     networks = join(genes, n_hidden=2)
-    # Population 0, genotype 1: slot 0 holds genes 2, 3 and slot 1 holds 6, 7.
+    # Population 0, genotype 1: slot 0 has genes 2, 3 and slot 1 has 6, 7.
     assert networks[0, 1].tolist() == [2, 3, 6, 7]
     back = split(networks, n_slots=3, n_genes=2)
     np.testing.assert_array_equal(back[:, :2], genes[:, :2])

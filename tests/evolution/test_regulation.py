@@ -1,4 +1,4 @@
-"""Thresholds and controller sizes adapt as sections 3.5 and 3.6 say."""
+"""Thresholds and controller sizes adapt as in sections 3.5 and 3.6."""
 
 import numpy as np
 import pytest
@@ -40,7 +40,7 @@ def test_sst_follows_specialization_while_fitness_stagnates(fitness, specializat
     [
         (FLAT, RISING, 0.19),  # more recombinations: decrement
         (FLAT, FALLING, 0.21),  # fewer: increment
-        (FALLING, FLAT, 0.21),  # as many: increment
+        (FALLING, FLAT, 0.21),  # the same number: increment
         (RISING, RISING, 0.2),
         (RISING, FLAT, 0.2),
     ],
@@ -76,9 +76,9 @@ def test_controllers_stagnate_when_their_window_is_full_and_shows_no_progress():
         ([1, 1, 1, 0], [8.0, 9.0, 2.0, NAN], [1, 0, 1, 0]),
         # Better without it: removed.
         ([1, 1, 0, 1], [12.0, 9.0, NAN, 14.0], [1, 1, 0, 0]),
-        # All worthy: the lowest empty slot is filled.
+        # All are needed: the lowest empty slot is filled.
         ([1, 0, 1, 0], [8.9, NAN, 2.0, NAN], [1, 1, 1, 0]),
-        # All worthy and no room.
+        # All are needed and no slot is empty.
         ([1, 1, 1, 1], [1.0, 2.0, 3.0, 4.0], [1, 1, 1, 1]),
         # Never below two.
         ([1, 1, 0, 0], [9.9, 1.0, NAN, NAN], [1, 1, 0, 0]),
@@ -94,7 +94,7 @@ def test_controller_size_after_lesions(active, without, expected):
     assert before.astype(int).tolist() == [active, active]
 
 
-def test_controller_size_with_fitness_below_zero_unknown_or_nothing():
+def test_controller_size_with_fitness_below_zero_unknown_or_zero():
     before = np.array([[1, 1, 1, 0]] * 4, dtype=bool)
     nine = [9.0] * 3 + [NAN]
     without = np.array([[-11.0, -20.0, -30.0, NAN], [-11.1, -20.0, -30.0, NAN], nine, nine])

@@ -1,4 +1,4 @@
-"""Elite selection: who may recombine with whom, worked by hand."""
+"""Elite selection: which populations may recombine, worked out by hand."""
 
 import numpy as np
 import pytest
@@ -31,7 +31,7 @@ def test_populations_pair_from_the_most_similar_on():
 
 
 def test_a_population_is_taken_once_and_the_rest_stays_alone():
-    # SD: (1,2) 1/16 first; then (0,1) 1/8 and (0,2) 3/16 are similar too, but 1 and 2 are gone.
+    # SD: (1,2) 1/16 first; then (0,1) 1/8 and (0,2) 3/16 are similar too, but 1 and 2 are taken.
     s = np.array([0.0, 0.125, 0.1875])
     assert pair_populations(specialization_distance(s), 0.25).tolist() == [[1, 2]]
 
@@ -45,7 +45,7 @@ def test_all_pairs_below_the_threshold_come_from_the_most_similar_on():
     assert pair_populations(distance, 1.0, "all").tolist() == [[1, 2]]
 
 
-def test_lives_are_as_different_as_what_would_have_to_be_spent_otherwise():
+def test_distance_of_lives_is_the_share_that_would_have_to_be_spent_differently():
     # Both actions alike; one more of the second; nothing at all; half of the epochs nothing.
     lives = np.array([[0.5, 0.5], [0.25, 0.75], [0.0, 0.0], [0.5, 0.0]])
     assert shares_distance(lives).tolist() == [
@@ -54,12 +54,12 @@ def test_lives_are_as_different_as_what_would_have_to_be_spent_otherwise():
         [1, 1, 0, 0.5],
         [0.5, 0.75, 0.5, 0],
     ]
-    # Two perfect specialists in different actions: alike by eq. 3.5, not by what they do.
+    # Two perfect specialists in different actions: similar by eq. 3.5, not by their actions.
     assert specialization_distance(np.zeros(2))[0, 1] == 0
     assert shares_distance(np.eye(2))[0, 1] == 1
 
 
-def test_lives_differ_as_the_measure_of_a_teams_diversity_says():
+def test_distance_of_lives_agrees_with_the_measure_of_a_teams_diversity():
     counts = np.random.default_rng(1).integers(0, 9, (6, 4))
     counts[2] = 0
     np.testing.assert_allclose(shares_distance(shares(counts)), differences(counts), atol=1e-15)
@@ -68,7 +68,7 @@ def test_lives_differ_as_the_measure_of_a_teams_diversity_says():
 def test_labels_are_the_action_done_most_and_whether_a_robot_is_specialized():
     does = np.array([[0.6, 0.4], [0.9, 0.1], [0.5, 0.5], [0.4, 0.6], [0.0, 0.0], [0.6, 0.4]])
     s = np.array([0.25, 0.0, 0.5, 0.25, 0.0, np.nan])
-    # 0 and 1: the first action, specialized. 2: the first of equals, S = 0.5 is not specialized.
+    # 0 and 1: the first action, specialized. 2: ties go to the first, S = 0.5 is not specialized.
     # 3: the second action. 4: nothing. 5: S is not known.
     alike = {(0, 1)} | {(k, k) for k in range(5)}
     for i, row in enumerate(label_distance(s, does)):
@@ -118,7 +118,7 @@ def test_sub_populations_pair_greedily_by_genotype_distance():
 def test_empty_slots_never_pair():
     elites = elites_of([[0.0, 0.5, 0.0], [0.0, 0.5, 0.0]])
     active = np.array([[True, True, False], [False, True, False]])
-    # Left: (0,1)-(1,1) at 0, units 1 and 4; (0,0) finds nobody.
+    # Left: (0,1)-(1,1) at 0, units 1 and 4; (0,0) has no partner.
     assert pair_similar(elites, active, np.array([[0, 1]]), 1.0).tolist() == [[1, 4]]
 
 

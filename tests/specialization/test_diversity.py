@@ -1,4 +1,4 @@
-"""Diversity on teams whose value is known in closed form, and against scipy's clusters."""
+"""Diversity of teams with values known in closed form, and against scipy's clusters."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ def test_social_entropy_of_castes() -> None:
     assert caste_entropy("abcdefgh") == 3.0
 
 
-def test_differences_are_the_portion_of_life_spent_otherwise() -> None:
+def test_differences_are_the_share_of_life_spent_differently() -> None:
     counts = [[10, 0, 0], [0, 3, 0], [5, 5, 0], [1, 0, 3], [0, 0, 0]]
     expected = [
         [0, 1, 0.5, 0.75, 1],
         [1, 0, 0.5, 1, 1],
         [0.5, 0.5, 0, 0.75, 1],
         [0.75, 1, 0.75, 0, 1],
-        [1, 1, 1, 1, 0],  # whoever does nothing has that in common with nobody
+        [1, 1, 1, 1, 0],  # a robot that does nothing shares this with no other
     ]
     assert differences(counts) == pytest.approx(np.array(expected))
     assert differences([[0, 0], [0, 0]]).tolist() == [[0, 0], [0, 0]]
@@ -52,7 +52,7 @@ def test_hierarchic_social_entropy_in_closed_form() -> None:
     assert hierarchic_social_entropy(apart(5, 0.0)) == 0.0
     assert hierarchic_social_entropy(apart(8, 1.0)) == 3.0
     assert hierarchic_social_entropy(apart(8, 0.25)) == pytest.approx(0.75)
-    # Two castes of two and six, a distance of one apart: their entropy, as long as they are two.
+    # Two castes of two and six, one apart: their entropy, up to the level at which they merge.
     castes = differences([[9, 0]] * 2 + [[0, 9]] * 6)
     assert hierarchic_social_entropy(castes) == pytest.approx(caste_entropy("aabbbbbb"))
     assert hierarchic_social_entropy(apart(1, 0.0)) is None
@@ -95,7 +95,7 @@ def test_hierarchic_social_entropy_against_scipy(seed, n_robots, n_actions) -> N
 
 def test_system_neural_diversity_in_closed_form() -> None:
     assert system_neural_diversity(apart(6, 0.0)) == 0.0
-    # Bettini et al.: equally distant robots are as diverse however many there are.
+    # Bettini et al.: equally distant robots are equally diverse in any number.
     assert [system_neural_diversity(apart(n, 0.4)) for n in (2, 5, 30)] == pytest.approx([0.4] * 3)
     assert system_neural_diversity([[0.0]]) is None
     # Two castes of k: k * k of the k (2 k - 1) pairs are apart.
@@ -105,7 +105,7 @@ def test_system_neural_diversity_in_closed_form() -> None:
 
 
 def test_a_robot_like_another_makes_a_team_less_diverse_to_one_and_not_to_the_other() -> None:
-    """What Bettini et al. hold against entropy: it does not see how redundant a team is."""
+    """The criticism of entropy by Bettini et al.: it is blind to how redundant a team is."""
     lone, double = [[9, 0], [0, 9]], [[9, 0], [0, 9], [9, 0], [0, 9]]
     assert hierarchic_social_entropy(differences(double)) == 1.0
     assert hierarchic_social_entropy(differences(lone)) == 1.0

@@ -1,4 +1,4 @@
-"""Entropies on cases whose value is known, and against their definitions."""
+"""Entropies of cases with known values, and against their definitions."""
 
 from __future__ import annotations
 
@@ -45,15 +45,15 @@ def test_entropy_of_many_rows_at_once() -> None:
     assert entropy([[1, 1, 0], [2, 0, 0]]).tolist() == [1.0, 0.0]
 
 
-def test_activity_entropy_is_the_mean_of_those_who_did_something() -> None:
+def test_activity_entropy_is_the_mean_over_active_robots() -> None:
     assert activity_entropy([[9, 0, 0, 0], [0, 4, 0, 0]]) == 0.0
     assert activity_entropy([[5, 5, 5, 5], [1, 1, 1, 1]]) == 2.0
     assert activity_entropy([[8, 8, 0, 0], [3, 0, 0, 0], [0, 0, 0, 0]]) == 0.5
     assert activity_entropy([[0, 0], [0, 0]]) is None
 
 
-def test_half_a_life_each_is_the_same_to_entropy_however_often_one_switches() -> None:
-    """What S was made for: entropy does not see the order (Nitschke 2009, section 2.3)."""
+def test_entropy_does_not_depend_on_how_often_a_robot_switches() -> None:
+    """The purpose of S: entropy is blind to the order (Nitschke 2009, section 2.3)."""
     assert activity_entropy([[50, 50]]) == activity_entropy([[2, 2]]) == 1.0
 
 
@@ -65,7 +65,7 @@ def test_division_of_labour_at_its_extremes() -> None:
     assert division_of_labour(alike) == pytest.approx((0, 0), abs=1e-12)
 
 
-def test_the_two_normalizations_tell_shared_actions_from_shared_robots() -> None:
+def test_the_two_normalizations_distinguish_shared_actions_from_shared_robots() -> None:
     # Four robots, two actions: each robot does one, two robots do the same.
     assert division_of_labour([[5, 0], [5, 0], [0, 5], [0, 5]]) == (1.0, 0.5)
     # Two robots, four actions: each action has one robot, a robot has two.
@@ -73,7 +73,7 @@ def test_the_two_normalizations_tell_shared_actions_from_shared_robots() -> None
 
 
 def test_division_of_labour_of_a_worked_case() -> None:
-    # H(action) = H(robot) = 1, H(both) = 1.8112781: a robot does its own thing three times of four.
+    # H(action) = H(robot) = 1, H(both) = 1.8112781: a robot does its own action 3 times of 4.
     mutual = 2 - (2 * 0.375 * math.log2(1 / 0.375) + 2 * 0.125 * math.log2(8))
     assert mutual_information([[3, 1], [1, 3]]) == pytest.approx(mutual)
     assert division_of_labour([[3, 1], [1, 3]]) == pytest.approx((mutual, mutual))

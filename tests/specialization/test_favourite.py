@@ -1,4 +1,4 @@
-"""Favourites and the null of S, on lives whose values are worked out by hand."""
+"""Favourites and the null of S, for lives with values worked out by hand."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def test_who_moves_and_detects_in_turn_has_a_caste_that_s_cannot_see() -> None:
     ("counts", "name", "share", "liking"),
     [
         ([6, 3, 1], "low", 0.6, 0.3),
-        ([2, 2, 2], "low", 1 / 3, 0),  # the first of equals
+        ([2, 2, 2], "low", 1 / 3, 0),  # a tie goes to the first
         ([0, 0, 7], "hi", 1, 1),
         ([1, 5, 4], "med", 0.5, 0.1),
         ([0, 0, 0], None, NAN, NAN),
@@ -52,18 +52,18 @@ def test_favourites(counts, name, share, liking) -> None:
     assert affinity(counts) == pytest.approx(liking, nan_ok=True)
 
 
-def test_of_one_setting_everything_is_done_with_it() -> None:
+def test_with_a_single_setting_its_share_is_one() -> None:
     assert favourite_share([[4], [0]]) == pytest.approx([1, NAN], nan_ok=True)
     assert affinity([[4], [0]]) == pytest.approx([1, NAN], nan_ok=True)
 
 
-def test_devoted_robots_do_more_than_half_of_their_work_in_one_way() -> None:
-    """Of four robots 51 of 100 are enough, 50 are not, and nothing is none."""
+def test_devoted_robots_do_more_than_half_of_their_work_with_one_setting() -> None:
+    """For one robot each: 51 of 100 are enough, 50 are not, and an idle one does not count."""
     assert portion_devoted([[51, 49], [50, 50], [0, 0], [1, 9]]) == 0.5
     assert portion_devoted([[0, 0]]) == 0
 
 
-def test_a_mean_leaves_out_who_has_no_value() -> None:
+def test_a_mean_leaves_out_robots_without_a_value() -> None:
     assert mean_where_defined([0.5, NAN, 1.0]) == 0.75
     assert mean_where_defined([NAN, NAN]) is None
 
@@ -81,7 +81,7 @@ def test_s_of_independent_draws(counts, expected) -> None:
     assert independent_degree(counts) == pytest.approx(expected, abs=1e-12)
 
 
-def test_s_of_independent_draws_is_the_mean_over_all_that_can_be_drawn() -> None:
+def test_s_of_independent_draws_is_the_mean_over_all_possible_draws() -> None:
     """Every life of four draws, each with its probability: shares 1/2, 1/4, 1/4."""
     shares = (0.5, 0.25, 0.25)
     expected = sum(
@@ -91,7 +91,7 @@ def test_s_of_independent_draws_is_the_mean_over_all_that_can_be_drawn() -> None
     assert independent_degree([2, 1, 1]) == pytest.approx(expected)
 
 
-def test_relative_s_goes_from_nought_to_nine_quarters() -> None:
+def test_relative_s_goes_from_zero_to_nine_quarters() -> None:
     found = {
         life: float(relative_degree(degree(switches(life), counts), independent_degree(counts)))
         for n in range(1, 7)

@@ -1,4 +1,4 @@
-"""Degree of specialization, labels and castes, on the thesis' own cases (section 3.2)."""
+"""Degree of specialization, labels and castes, for the cases of the thesis (section 3.2)."""
 
 from itertools import pairwise
 
@@ -43,7 +43,7 @@ def test_degree_of_many_robots_at_once_and_of_the_idle():
         (0.49, [3, 2, 4, 1], "hi"),
         (0.5, [3, 2, 4, 1], "non-specialized"),
         (0.9, [9, 0, 0, 0], "non-specialized"),
-        (0.2, [4, 1, 4, 0], "low"),  # the first of equals
+        (0.2, [4, 1, 4, 0], "low"),  # a tie goes to the first
         (0.0, [0, 0, 0, 0], "non-specialized"),  # executed nothing
         (float("nan"), [1, 0, 0, 0], "non-specialized"),
     ],

@@ -18,7 +18,7 @@ NAMES = ("a", "b", "c", "d", "e", "f")
 
 
 def lived(lives: list[list[int]], n_actions: int) -> Activity:
-    """Return what comes of sequences of actions, from the definitions."""
+    """Return the activity of robots with given sequences of actions, from the definitions."""
     counts = np.array([np.bincount(life, minlength=n_actions) for life in lives])
     switches = [sum(a != b for a, b in pairwise(life)) for life in lives]
     s = degree(switches, counts)
@@ -36,7 +36,7 @@ def test_switching_index_with_two_tasks_is_that_of_gautrais() -> None:
 
 
 @pytest.mark.parametrize("n_actions", [2, 4, 10])
-def test_switching_index_of_who_draws_actions_at_random_is_nought(n_actions: int) -> None:
+def test_switching_index_of_random_actions_is_zero(n_actions: int) -> None:
     life = np.random.default_rng(1).integers(0, n_actions, 40_000).tolist()
     team = lived([life], n_actions)
     # Standard error: sqrt(p (1 - p) / n) A / (A - 1), p = 1 / A, at most 0.005.
@@ -44,7 +44,7 @@ def test_switching_index_of_who_draws_actions_at_random_is_nought(n_actions: int
 
 
 def test_a_team_of_perfect_specialists() -> None:
-    """Four robots, each with an action of its own."""
+    """Four robots, each with its own action."""
     assert measure(lived([[k] * 20 for k in range(4)], 4)) == {
         "specialization": 0.0,
         "specialized": 1.0,
@@ -66,7 +66,7 @@ def test_a_team_of_perfect_specialists() -> None:
 
 
 def test_a_team_of_generalists() -> None:
-    """All do everything in turn."""
+    """All robots do everything in turn."""
     found = measure(lived([[0, 1, 2, 3] * 5] * 4, 4))
     assert found == pytest.approx(
         {
@@ -108,7 +108,7 @@ def test_robots_that_did_nothing() -> None:
     assert found["hierarchic_social_entropy"] == found["system_neural_diversity"] == 0.0
 
 
-def test_settings_are_counted_without_what_is_done_in_between() -> None:
+def test_settings_are_counted_without_the_actions_in_between() -> None:
     """Two robots move (2) in turn with one setting each, a third with both; a fourth only moves."""
     counts = np.array([[5, 0, 5], [0, 5, 5], [3, 2, 5], [0, 0, 9]])
     s = np.array([1.0, 1.0, 1.0, 0.0])
@@ -123,7 +123,7 @@ def test_settings_are_counted_without_what_is_done_in_between() -> None:
 
 
 def limit(text: str, n_robots: int, n_actions: int) -> float:
-    """Return the number that an end of a metric's span says."""
+    """Return the number at an end of a metric's stated range."""
     known = {"log2": math.log2, "min": min, "R": n_robots, "A": n_actions, "K": n_actions}
     text = text.removesuffix(" bits")
     if text.startswith("log2 "):
@@ -133,7 +133,7 @@ def limit(text: str, n_robots: int, n_actions: int) -> float:
 
 @settings(max_examples=80, deadline=None)
 @given(st.integers(0, 2**32), st.integers(2, 7), st.integers(2, 6))
-def test_every_metric_stays_in_the_span_it_states(seed, n_robots, n_actions) -> None:
+def test_every_metric_stays_in_its_stated_range(seed, n_robots, n_actions) -> None:
     rng = np.random.default_rng(seed)
     lives = [
         rng.choice(n_actions, rng.integers(0, 30), p=rng.dirichlet([0.3] * n_actions)).tolist()

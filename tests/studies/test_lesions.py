@@ -45,7 +45,7 @@ def of(found, name: str):
     return {measure: values[k].tolist() for measure, values in found.performance.items()}
 
 
-def test_a_lesion_replaces_all_robots_of_a_caste_and_nobody_else(rollout, team) -> None:
+def test_a_lesion_replaces_all_robots_of_a_caste_and_no_others(rollout, team) -> None:
     scenarios = rollout.world.scenarios(range(3))
     castes = ["low", "hi", "move", "non-specialized"]
     found = Original(rollout, team, LABELS, NOTHING).lesion(castes, scenarios)
@@ -110,7 +110,7 @@ def test_without_castes_only_the_whole_team_plays(rollout, team) -> None:
         (f"{EXAMPLE}:dark-1", {"move": "idler", "rest": "idler"}),
     ],
 )
-def test_the_heuristic_controller_that_stands_in_for_a_caste(task, stands_in) -> None:
+def test_the_heuristic_controller_that_replaces_a_caste(task, stands_in) -> None:
     world = conevo.world(task)
     for caste, heuristic in stands_in.items():
         assert world.heuristics[replacement(world, caste)] == heuristic
@@ -138,7 +138,7 @@ def test_controllers_change_places_with_all_others_in_turn(rollout, team) -> Non
     assert of(found, "moved")["area"] != of(found, "whole")["area"]
 
 
-def test_clones_lose_nothing_by_it(rollout, team) -> None:
+def test_clones_lose_nothing_by_changing_places(rollout, team) -> None:
     first = [0] * 6
     clones = replace(team, genes=team.genes[first], active=team.active[first])
     found = Original(rollout, clones, LABELS, NOTHING).rotate(rollout.world.scenarios(range(3)))

@@ -1,4 +1,4 @@
-"""From a run on disk to behaviours, their reproduction, and tables 4.4 and 4.5; whose these are."""
+"""From a run on disk to behaviours, their reproduction, and tables 4.4 and 4.5."""
 
 from __future__ import annotations
 
@@ -50,8 +50,8 @@ TINY = {
     "world.arena_cm": 60.0,
     "world.prey": "random",
 }
-# Chosen so that the runs show what is looked for here: specialized predators in CONE's, captures by
-# several in the last of HomCNE's.
+# Chosen so that the runs have specialized predators (CONE's) and captures by several predators (the
+# last one of HomCNE's).
 SEEDS = {"cone": (4, 15), "homcne": (1, 69)}
 SIZES = {
     "cone": {"method.genotypes": 4, "method.rounds": 2},
@@ -79,18 +79,18 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> list[conevo.Run]:
 
 @pytest.fixture(scope="module")
 def watched(runs: list[conevo.Run]) -> Observed:
-    """The team of the last run, which captures now and then."""
+    """The team of the last run, which captures the prey occasionally."""
     return observe(runs[3], 4, threads=1)
 
 
 @pytest.fixture(scope="module")
 def seen(watched: Observed) -> Observation:
-    """What it was seen to do."""
+    """Its observed behaviours."""
     return observation(watched)
 
 
 def observation(watched: Observed) -> Observation:
-    """Return what the world's study holds of a team."""
+    """Return the observation of a team by the world's study."""
     assert isinstance(watched.seen, Predators)
     return watched.seen.seen
 
@@ -160,7 +160,7 @@ def test_a_run_of_another_world_is_refused(tmp_path: Path) -> None:
         composition_table([run])
 
 
-# --- worlds of one's own --------------------------------------------------------------------------
+# --- your own worlds ------------------------------------------------------------------------------
 
 SUBCLASS = """
 from dataclasses import dataclass
@@ -202,13 +202,13 @@ def test_a_subclass_is_studied_like_the_world_it_inherits(tmp_path: Path, capsys
         ("json", "world mine-v1: its study 'json' has no BEHAVIOURS, no COLLECTIVES, no WORDS"),
     ],
 )
-def test_an_entry_whose_study_is_none_is_one_line(studied: str, words: str) -> None:
+def test_an_entry_with_an_invalid_study_is_one_line(studied: str, words: str) -> None:
     entry = WorldEntry("mine-v1", "Mine", "", "", ("a-1",), "Params", "World", studied=studied)
     with pytest.raises(UsageError, match=f"^{re.escape(words)}"):
         study_of(entry)
 
 
-def test_only_what_is_studied_is_found_and_its_names_are_distinct() -> None:
+def test_only_studied_worlds_are_found_and_names_are_distinct() -> None:
     of = {name: study_of(entry) for name, entry in WORLDS.items()}
     assert {name for name, one in of.items() if one is not None} == set(studies())
     for one in studies().values():
@@ -237,7 +237,7 @@ def by_hand(outputs: list[tuple[float, float]], **params: Any) -> Observation:
     return record_team(rollout, pool, rows, range(12), seed=5)
 
 
-def test_a_predator_that_always_stands_is_idle_and_reproduces_it() -> None:
+def test_a_predator_that_never_moves_is_idle_and_reproduces_it() -> None:
     seen = by_hand([(0.0, 0.0), (0.0, 0.0), (0.5, 0.5)])
     lives = lifetimes(Predators(seen).executed, BEHAVIOURS)
     assert [life.label for life in lives[:2]] == ["idle", "idle"]
@@ -259,8 +259,8 @@ def test_a_predator_that_drives_straight_on_never_idles() -> None:
         assert row["is_reproduced"] == (row["result"] == row["behaviour"])
 
 
-def test_clamped_sensors_decide_what_is_reproduced(seen: Observation) -> None:
-    """With averages of another behaviour's row the same controller drives its wheels otherwise."""
+def test_clamped_sensors_determine_the_reproduced_behaviour(seen: Observation) -> None:
+    """With the averages of another behaviour's row, the same controller drives differently."""
     rows = reproduce_individuals(seen)
     assert rows == reproduce_individuals(seen)
     assert all(len(row["sensors"]) == 16 and row["trials"] >= 1 for row in rows)
@@ -270,7 +270,7 @@ def test_clamped_sensors_decide_what_is_reproduced(seen: Observation) -> None:
 
 
 @pytest.mark.parametrize("at_wall", [False, True])
-def test_predators_are_put_where_their_roles_belong(at_wall: bool) -> None:
+def test_predators_are_placed_according_to_their_roles(at_wall: bool) -> None:
     seen = by_hand([(0.0, 0.0)] * 4)
     roles = ["pursuer", "blocker", "flanker", ""]
     for k in range(50):
@@ -292,9 +292,9 @@ def test_predators_are_put_where_their_roles_belong(at_wall: bool) -> None:
             assert min(*prey[:2], *(60 - prey[:2])) - 2.75 <= 22.001
 
 
-def test_collective_behaviours_that_were_seen_are_tried_again(seen: Observation) -> None:
+def test_observed_collective_behaviours_are_tried_again(seen: Observation) -> None:
     named = {one.collective for one in seen.all_captures} - {"none"}
-    assert named  # this team was chosen because it has some
+    assert named  # the team was chosen because it has some
     for is_clamped in (False, True):
         rows = reproduce_collectives(seen, trials=3, clamped=is_clamped)
         assert {row["collective"] for row in rows} == named
@@ -306,7 +306,7 @@ def test_collective_behaviours_that_were_seen_are_tried_again(seen: Observation)
             assert row["is_reproduced"] == (row["seen"][row["collective"]] > 0)
 
 
-def test_predators_that_only_stand_form_no_collective_behaviour() -> None:
+def test_predators_that_never_move_form_no_collective_behaviour() -> None:
     assert reproduce_collectives(by_hand([(0.0, 0.0)] * 3)) == []
 
 
@@ -325,7 +325,7 @@ def played(monkeypatch: pytest.MonkeyPatch) -> list[tuple[Any, dict[str, Any]]]:
     return plays
 
 
-def test_trials_begin_where_instances_did_with_one_predator_clamped(seen, played) -> None:
+def test_trials_start_where_instances_did_with_one_predator_clamped(seen, played) -> None:
     (first, *_) = rows = reproduce_individuals(seen)
     assert len(played) == sum(row["trials"] for row in rows)
     places = [(one["x"], one["y"], one["heading"]) for one in seen.records]
@@ -415,7 +415,7 @@ def test_table_4_5_replaces_the_specialized_by_the_heuristic(runs) -> None:
                 checked += 1
             else:
                 assert row[behaviour] is None
-                assert time.mean() == pytest.approx(row["capture_time"])  # nobody was replaced
+                assert time.mean() == pytest.approx(row["capture_time"])  # no predator was replaced
     assert checked >= 2
 
 
@@ -428,7 +428,7 @@ def say(capsys: pytest.CaptureFixture[str], *words: str) -> tuple[int, str, str]
     return int(caught.value.code or 0), *capsys.readouterr()
 
 
-def test_the_command_prints_what_the_report_holds(runs, capsys) -> None:
+def test_the_command_prints_the_contents_of_the_report(runs, capsys) -> None:
     words = ("behaviours", str(runs[3].path), "--scenarios", "3", "--threads", "1")
     code, out, err = say(capsys, *words)
     assert (code, err) == (0, "")

@@ -1,4 +1,4 @@
-"""Intra-class correlation: by hand, against tables added up cell by cell, and of known truth."""
+"""Intra-class correlation: by hand, against tables added up cell by cell, and for known truth."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def test_an_example_by_hand() -> None:
 
 
 @pytest.mark.parametrize("shape", [(4, 12, 3, 5), (3, 2, 2, 6), (7, 1, 1, 8)])
-def test_it_is_what_tables_added_up_cell_by_cell_give(shape) -> None:
+def test_it_equals_tables_added_up_cell_by_cell(shape) -> None:
     x = drawn(1, shape, 0.3)
     n_populations, n_genotypes = shape[1], shape[3]
     found = repeatability(x)
@@ -90,7 +90,7 @@ def test_neither_scale_nor_order_nor_how_hard_a_trial_is_matters() -> None:
 
 @pytest.mark.parametrize("icc", [0.0, 0.05, 0.6])
 @pytest.mark.parametrize("shape", [(20, 12, 2, 10), (20, 1, 1, 60)])
-def test_the_truth_is_found_and_the_interval_holds_it_as_often_as_it_should(icc, shape) -> None:
+def test_the_truth_is_found_and_the_interval_covers_it_at_the_right_rate(icc, shape) -> None:
     found = [repeatability(drawn(seed, shape, icc)) for seed in range(150)]
     values = np.array([one.icc for one in found])
     assert abs(values.mean() - icc) < 4 * values.std() / np.sqrt(len(values)) + 0.003
@@ -116,7 +116,7 @@ def test_slots_that_are_not_in_use_change_nothing() -> None:
 
 
 @pytest.mark.parametrize("value", [0.0, 0.1, 1e6 / 3])
-def test_where_all_fitness_is_the_same_there_is_no_correlation(value) -> None:
+def test_equal_fitness_has_no_correlation(value) -> None:
     rng = np.random.default_rng(0)
     same = np.full((4, 2, 1, 5), value) + rng.normal(size=(4, 2, 1, 1)) * (value > 1)
     found = repeatability(same)
@@ -134,7 +134,7 @@ def test_too_few_genotypes_have_no_error() -> None:
 def test_spearman_brown_is_the_reliability_of_a_mean() -> None:
     assert spearman_brown(0.5, 2) == pytest.approx(2 / 3)
     assert spearman_brown(0.2, 1) == 0.2
-    assert spearman_brown(-0.1, 50) == 0  # an estimate below 0 means nothing
+    assert spearman_brown(-0.1, 50) == 0  # an estimate below 0 has no meaning
     x = drawn(5, (60, 400, 1, 20), 0.1, hardness=0)
     means = x.reshape(2, 30, 400, 1, 20).mean(axis=1)
     assert repeatability(means).icc == pytest.approx(spearman_brown(0.1, 30), abs=0.02)
@@ -147,7 +147,7 @@ def test_the_trials_for_half_give_half() -> None:
     assert trials_for(0.0) is trials_for(-0.2) is trials_for(None) is None
 
 
-def test_signal_begins_at_the_bound() -> None:
+def test_signal_starts_at_the_bound() -> None:
     assert has_signal(LEAST_RELIABILITY)
     assert has_signal(0.9)
     assert not has_signal(LEAST_RELIABILITY - 1e-9)

@@ -1,4 +1,4 @@
-"""The signal of a method: its trials, against teams played one by one, and what cannot have one."""
+"""The signal of a method: its trials, against teams played one by one, and methods without one."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def alone(config: RunConfig) -> np.ndarray:
 
 
 @pytest.mark.parametrize("method", UNITS)
-def test_trials_are_teams_played_one_by_one_each_in_a_scenario_of_its_own(method) -> None:
+def test_trials_are_teams_played_one_by_one_each_in_its_own_scenario(method) -> None:
     config = tiny(method)
     (row,) = measure_signal(config, trials=TRIALS, threads=1)["signal"]
     fitness = alone(config)
@@ -99,7 +99,7 @@ def test_trials_are_teams_played_one_by_one_each_in_a_scenario_of_its_own(method
     assert (row["genotypes"], row["of"], row["trials"], row["left_out"]) == (6, 6, TRIALS, 0)
 
 
-def test_a_difference_is_measured_as_it_is_selected_by(monkeypatch) -> None:
+def test_a_difference_is_measured_as_in_selection(monkeypatch) -> None:
     """Each team once more for each of four robots, in batches of trials or alone."""
     config = tiny("ccga", run__credit="difference")
     prices: list[str] = []
@@ -150,7 +150,7 @@ def test_a_sample_of_genotypes_keeps_their_genes_whatever_the_method() -> None:
 @pytest.mark.parametrize(
     ("method", "teams"),
     [("hetcne", 3 * 6 + 3 * 6), ("cone", 3 * 6 + 3 * 6),
-     ("ccga", 3 * 6 + 3 * 4 * 5)],  # its partners are an elite at last: a team tries one genotype
+     ("ccga", 3 * 6 + 3 * 4 * 5)],  # in the end partners are an elite: a team tries one genotype
 )  # fmt: skip
 def test_a_run_has_the_signal_of_its_first_and_last_populations(method, teams, tmp_path) -> None:
     sizes = {"method__genotypes": 6, **NEAR}
@@ -168,7 +168,7 @@ def test_a_run_has_the_signal_of_its_first_and_last_populations(method, teams, t
     assert said[0].endswith(f" {teams} team evaluations of 100 iterations")
 
 
-def test_a_run_that_begins_with_others_populations_is_measured_with_these(tmp_path) -> None:
+def test_a_run_started_with_other_populations_is_measured_with_them(tmp_path) -> None:
     first = evolve_tiny(tmp_path / "first", "ccga", method__genotypes=6, **NEAR)
     settings = tiny_settings("ccga", method__genotypes=6, **NEAR)
     second = conevo.evolve(
@@ -186,7 +186,7 @@ def test_a_fitness_that_is_always_the_same_has_no_signal(capsys) -> None:
     assert "No signal" in out
 
 
-def test_the_command_says_its_price_first_and_prints_what_was_found(capsys, tmp_path) -> None:
+def test_the_command_prints_its_cost_first_and_then_the_results(capsys, tmp_path) -> None:
     words = [*words_of("cone"), "--trials", "3", "--threads", "1"]
     code, out, err = say(capsys, *words)
     assert (code, err) == (0, "")
@@ -217,7 +217,7 @@ def test_the_command_says_its_price_first_and_prints_what_was_found(capsys, tmp_
          "Team ES has no populations whose genotypes could be tried one by one"),
     ],
 )  # fmt: skip
-def test_what_cannot_be_measured_is_one_line(words, line, capsys, tmp_path, monkeypatch) -> None:
+def test_a_wrong_request_is_one_line(words, line, capsys, tmp_path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
     code, out, err = say(capsys, "signal", *words)
     assert (code, out, err.count("\n")) == (2, "", 1)

@@ -1,4 +1,4 @@
-"""A study of a run: what it says, against the run's own records and teams played one by one."""
+"""The study of a run, against the run's own records and teams played one by one."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from conevo.worlds.rollout import Rollout
 from runs.tiny import evolve_tiny, tiny_settings
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "light.py"
-N = 3  # scenarios, as many as a tiny run's testing phase has
+N = 3  # scenarios, as in a tiny run's testing phase
 CHANGES: dict[str, dict[str, Any]] = {
     "rover/complex-5": {"world__n_robots": 6, "world__iterations": 60},
     "pursuit/team-4": {"world__iterations": 200, "world__arena_cm": 60.0},
@@ -134,8 +134,8 @@ def test_favourites_are_those_of_the_counted_actions(task, runs, found) -> None:
             assert row["relative"] == 0
 
 
-def test_rovers_choose_among_their_settings_and_others_among_all_they_do(found) -> None:
-    """Or the tests above would not have tested much."""
+def test_favourites_of_rovers_are_settings_and_those_of_others_are_actions(found) -> None:
+    """Otherwise the tests above would not have tested much."""
     assert {row["favourite_setting"] for row in found["rover/complex-5"]["robots"]} > {"low", "hi"}
     assert "move" in {row["favourite_action"] for row in found["rover/complex-5"]["robots"]}
 
@@ -180,8 +180,8 @@ def test_clones_are_of_the_fittest_and_not_of_movers(task, runs, found) -> None:
             assert rows[team, name] == result[0].tolist()
 
 
-def test_some_of_these_teams_have_castes_to_lose_and_to_clone(found) -> None:
-    """Or the tests above would not have tested much."""
+def test_some_of_these_teams_have_castes_to_replace_and_to_clone(found) -> None:
+    """Otherwise the tests above would not have tested much."""
     teams = {
         kind: Counter(len({row["team"] for row in one["scores"] if row["study"] == kind})
                       for one in found.values())
@@ -202,7 +202,7 @@ def test_a_study_is_plain_data_that_nothing_changes(task, runs, found) -> None:
     assert {row["study"] for row in again["scores"]} == {"lesion", "clones", "rotated"}
 
 
-def test_more_scenarios_begin_with_the_same(runs, found) -> None:
+def test_more_scenarios_start_with_the_same(runs, found) -> None:
     task = "rover/complex-5"
     rows = values(study(runs[task], N + 1, threads=1)["scores"], "lesion")
     for measured, few in values(found[task]["scores"], "lesion").items():
@@ -211,7 +211,7 @@ def test_more_scenarios_begin_with_the_same(runs, found) -> None:
             assert len(rows[measured]) == N + 1
 
 
-def test_twenty_scenarios_unless_told_otherwise(runs) -> None:
+def test_twenty_scenarios_by_default(runs) -> None:
     rows = values(study(runs["prey/shaping-6"], threads=1)["scores"], "clones")
     assert {len(some) for some in rows.values()} == {20}
 
@@ -294,7 +294,7 @@ def test_metrics_of_predators_are_of_behaviours_not_of_motor_primitives(runs, fo
 
 @pytest.fixture
 def staged(monkeypatch: pytest.MonkeyPatch) -> list[tuple[Any, ...]]:
-    """Let predators be labelled by hand, and keep what is played."""
+    """Label predators by hand, and keep the played teams."""
     labels = ["knocker", "idle", "pursuer", "non-specialized", "pursuer"]
     told, played = observed.lifetimes, []
     evaluate = Rollout.evaluate
@@ -334,7 +334,7 @@ def test_only_specialized_predators_are_replaced_and_the_idle_not_cloned(runs, s
     assert (cloned[2] == whole[0]).all()
 
 
-def test_clones_begin_together_in_sight_of_the_prey(runs, staged) -> None:
+def test_clones_start_together_in_sight_of_the_prey(runs, staged) -> None:
     study(runs[PURSUIT], 12, threads=1)
     scenarios = staged[-1][1]
     place = np.stack([scenarios.x, scenarios.y], axis=-1).astype(float)  # [E, 5 and the prey, 2]
@@ -347,11 +347,11 @@ def test_clones_begin_together_in_sight_of_the_prey(runs, staged) -> None:
     assert len(np.unique(scenarios.heading)) == scenarios.heading.size
     lesioned = staged[-2][1]
     far = np.hypot(lesioned.x[:, :5] - lesioned.x[:, 5:], lesioned.y[:, :5] - lesioned.y[:, 5:])
-    assert (far > 27.5).any()  # elsewhere they begin anywhere
+    assert (far > 27.5).any()  # elsewhere they start anywhere
 
 
 @pytest.mark.parametrize("change", [{"world__n_obstacles": 3}, {"world__sensor_range_cm": 1.0}])
-def test_where_predators_do_not_fit_together_they_begin_anywhere(tmp_path, staged, change) -> None:
+def test_predators_that_do_not_fit_together_start_anywhere(tmp_path, staged, change) -> None:
     run = evolve_tiny(tmp_path / "run", "cone", PURSUIT, **(CHANGES[PURSUIT] | change))
     staged.clear()
     study(run, N, threads=1)
@@ -361,10 +361,10 @@ def test_where_predators_do_not_fit_together_they_begin_anywhere(tmp_path, stage
         assert (getattr(staged[-1][1], axis) == getattr(drawn, axis)).all()
 
 
-# --- what goes wrong ------------------------------------------------------------------------------
+# --- errors ---------------------------------------------------------------------------------------
 
 
-def test_what_is_not_finite_keeps_its_place(runs, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_values_that_are_not_finite_keep_their_place(runs, monkeypatch: pytest.MonkeyPatch) -> None:
     evaluate = Rollout.evaluate
 
     def spoiled(self: Rollout, *args: Any) -> Any:

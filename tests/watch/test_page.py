@@ -51,7 +51,7 @@ def runs(evolved, tmp_path):
     folder = tmp_path / "runs"
     for name, method, generations in (
         ("done", "cone", None),
-        ("in progress", "homcne", 3),
+        ("active", "homcne", 3),
         ("stopped", "cone", 2),
         ("broken", "cone", 1),
     ):
@@ -61,7 +61,7 @@ def runs(evolved, tmp_path):
             log = folder / name / "generations.jsonl"
             log.write_text("".join(lines_of(evolved / method)[:generations]))
     (folder / "broken" / "config.toml").write_text("[run\n")
-    with held(folder / "in progress"):
+    with held(folder / "active"):
         yield folder
 
 
@@ -129,10 +129,10 @@ def details(tab, field):
 
 def test_every_run_is_listed_with_its_status_and_results(live, runs):
     found = table(live)
-    assert set(found) == {"done", "in progress", "stopped", "broken"}
+    assert set(found) == {"done", "active", "stopped", "broken"}
     for label, status in (
         ("done", "finished"),
-        ("in progress", "running"),
+        ("active", "running"),
         ("stopped", "interrupted"),
     ):
         records, row = records_of(runs / label), found[label]
@@ -143,11 +143,8 @@ def test_every_run_is_listed_with_its_status_and_results(live, runs):
         assert number(row["performance"]) == pytest.approx(value, rel=5e-4)
         assert number(row["fitness"]) == pytest.approx(last["team_fitness"], rel=5e-4)
         assert number(row["S"]) == pytest.approx(last["specialization"], rel=5e-4, abs=1e-6)
-    assert [found[name]["method"] for name in ("done", "in progress")] == ["CONE", "HomCNE"]
-    assert (
-        "left" in found["in progress"]["time left"]
-        or "any moment" in found["in progress"]["time left"]
-    )
+    assert [found[name]["method"] for name in ("done", "active")] == ["CONE", "HomCNE"]
+    assert "left" in found["active"]["time left"] or "any moment" in found["active"]["time left"]
     assert found["done"]["time left"] == ""
     assert found["broken"]["status"] == "damaged"
     assert "damaged" in found["broken"]["run"] or "config" in found["broken"]["run"]
@@ -168,21 +165,21 @@ def test_numbers_look_as_in_every_command(tab, tmp_path):
 
 def test_a_new_generation_appears_without_reloading(live, runs, evolved):
     live.evaluate("window.marker = 1")
-    live.click("#runs tr[data-label='in progress'] td")
+    live.click("#runs tr[data-label='active'] td")
     live.wait_for_selector("#details:not([hidden])")
     line = lines_of(evolved / "homcne")[3]
-    with (runs / "in progress" / "generations.jsonl").open("a") as log:
+    with (runs / "active" / "generations.jsonl").open("a") as log:
         log.write(line[:40])
         log.flush()
         log.write(line[40:])
     until(
         live,
-        "() => document.querySelector(\"tr[data-label='in progress']\").innerText.includes('4/5')",
+        "() => document.querySelector(\"tr[data-label='active']\").innerText.includes('4/5')",
     )
     until(live, "() => document.querySelector('[data-field=generation]').innerText.includes('4')")
     record = json.loads(line)
     value = next(iter(record["performance"].values()))
-    assert number(table(live)["in progress"]["performance"]) == pytest.approx(value, rel=5e-4)
+    assert number(table(live)["active"]["performance"]) == pytest.approx(value, rel=5e-4)
     assert live.evaluate("window.marker") == 1
 
 
@@ -247,16 +244,16 @@ def test_castes_over_generations_are_drawn_in_their_colours(live, runs):
     live.screenshot(path=runs / "details.png")
 
 
-def test_a_run_leads_to_the_replay_of_its_champion(live, runs):
-    live.click("#runs tr[data-label='in progress'] td")
-    fitness = [record["team_fitness"] for record in records_of(runs / "in progress")]
+def test_a_run_links_to_the_replay_of_its_champion(live, runs):
+    live.click("#runs tr[data-label='active'] td")
+    fitness = [record["team_fitness"] for record in records_of(runs / "active")]
     link = live.locator("#details a.replay")
     assert f"generation {int(np.argmax(fitness))}" in link.inner_text()
     with live.context.expect_page() as opened:
         link.click()
     replay = opened.value
     replay.wait_for_selector("body[data-ready=yes]")
-    assert "in progress" in replay.inner_text("body")
+    assert "active" in replay.inner_text("body")
     replay.evaluate("conevo.play()")
     until(replay, "() => conevo.state().t > 2")
 
@@ -281,7 +278,7 @@ def test_runs_can_be_filtered_and_sorted(live):
     order = live.eval_on_selector_all(
         "#runs tbody tr", "rows => rows.map((row) => row.dataset.label)"
     )
-    assert order.index("stopped") < order.index("in progress") < order.index("done")
+    assert order.index("stopped") < order.index("active") < order.index("done")
 
 
 def test_names_never_become_markup(tab, tmp_path, evolved):
