@@ -13,17 +13,17 @@ if os.environ.get("CONEVO_TEST_WARP_MODE"):  # "debug": array accesses out of bo
 
 
 def pytest_configure():
-    """Let the disk write when it likes: no test turns the machine off, and a run syncs 50 files.
+    """Leave writing to the system: no test turns the machine off, and a run syncs 50 files.
 
-    Processes that tests begin, and kill, do sync.
+    Processes that tests start, and kill, do sync.
     """
     os.fsync = os.fstat  # refuses a handle that is not open, as the real one does
 
 
 def pytest_collection_modifyitems(config, items):
-    """Leave out tests that take minutes, and in parallel those that need cores of their own.
+    """Leave out tests that take minutes, and in parallel those that need their own cores.
 
-    Unless ``-m`` asks for them by name.
+    Unless ``-m`` selects them by name.
     """
     asked = config.option.markexpr
     left_out = {"exhaustive"} | ({"timing"} if hasattr(config, "workerinput") else set())
@@ -36,7 +36,7 @@ def pytest_collection_modifyitems(config, items):
 
 @pytest.fixture
 def two_cards(monkeypatch):
-    """Pretend that this machine has two CUDA devices; the CPU plays what they are given."""
+    """Simulate two CUDA devices on this machine; the CPU does their work."""
     from conevo.worlds import rollout
 
     known = [SimpleNamespace(alias=f"cuda:{k}") for k in range(2)]

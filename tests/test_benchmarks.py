@@ -1,4 +1,4 @@
-"""Benchmarks that nobody runs for months still run, and read compiled kernels correctly."""
+"""Rarely used benchmarks still run, and read compiled kernels correctly."""
 
 import importlib
 import re
@@ -15,7 +15,7 @@ BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
 
 @pytest.fixture
 def benchmark(monkeypatch):
-    """Return a function that imports a script; nothing of it stays imported."""
+    """Return a function that imports a script; it does not stay imported."""
     monkeypatch.syspath_prepend(str(BENCHMARKS))
     for path in BENCHMARKS.glob("*.py"):
         monkeypatch.delitem(sys.modules, path.stem, raising=False)
@@ -31,10 +31,10 @@ def test_the_benchmark_of_devices_runs_on_the_cpu(benchmark, monkeypatch, capsys
         sys, "argv", ["gpu.py", "--device", "cpu", "--world", "rover/complex-1", *parts]
     )
     gpu.main()
-    said = capsys.readouterr().out
-    assert re.search(r"\n\| 1 \| \d+\.\d\d \| \d+\.\d\d \| \d+\.\d\d \| \d+\.\d\d \|\n", said)
-    assert "| rover/complex-1 | same bits | same bits |" in said
-    assert re.search(r"\n\| 2 iterations \| \d+ \| \d+\.\d{3} \|", said)
+    output = capsys.readouterr().out
+    assert re.search(r"\n\| 1 \| \d+\.\d\d \| \d+\.\d\d \| \d+\.\d\d \| \d+\.\d\d \|\n", output)
+    assert "| rover/complex-1 | same bits | same bits |" in output
+    assert re.search(r"\n\| 2 iterations \| \d+ \| \d+\.\d{3} \|", output)
 
 
 SHARED = """
@@ -65,7 +65,7 @@ def turned(values: wp.array[float]):
     values[lane] = reversed_lane(values[lane], lane)
 
 
-def test_what_a_compiled_kernel_takes_is_read_from_its_file(benchmark):
+def test_the_resources_of_a_compiled_kernel_are_read_from_its_file(benchmark):
     engine.start()
     cubin = benchmark("cubin")
     found, other = cubin.compiled(turned, 256), cubin.compiled(plain, 256)

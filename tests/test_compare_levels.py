@@ -1,4 +1,4 @@
-"""The tables that compare the levels of a factor: what is next to what, by hand."""
+"""The tables that compare the levels of a factor, by hand."""
 
 import math
 import sys
@@ -39,7 +39,7 @@ def lines(text):
     return [[cell.strip() for cell in line.split("|")[1:-1]] for line in rows]
 
 
-def test_a_level_is_compared_with_the_baseline_where_all_else_agrees():
+def test_a_level_is_compared_with_the_baseline_if_all_else_agrees():
     ccga, mesp = lines(comparison_table(CREDIT, "credit", "equation"))
     assert ccga[:6] == ["CCGA", "value", "2, 2", "102 (1)", "122 (1)", "+20"]
     assert mesp[:6] == ["Multi-Agent ESP", "value", "2, 2", "52 (1)", "42 (1)", "−10"]
@@ -65,7 +65,7 @@ def test_cells_are_pooled_as_shares_of_their_baselines():
     assert whole[4] == f"−{-low:.1f} % to {high:+.1f} %"
 
 
-def test_levels_that_the_baseline_lacks_name_what_is_compared():
+def test_levels_missing_in_the_baseline_are_named():
     rows = [row("mesp", 1, 10.0, places="mixed"), row("mesp", 1, 20.0, places="apart")]
     rows += [row("cone", 1, 30.0, places="apart", exchange=one) for one in ("some", "all")]
     found = list(groups(rows, "method", "mesp"))
@@ -76,7 +76,7 @@ def test_levels_that_the_baseline_lacks_name_what_is_compared():
     assert all([one["value"] for one in same] == [20.0] for _, _, _, same in found)
 
 
-def test_a_level_that_is_not_there_is_one_line():
+def test_a_missing_level_is_one_line():
     with pytest.raises(UsageError, match=r"no run has credit=vaule; levels: equation, value"):
         list(groups(CREDIT, "credit", "vaule"))
 
@@ -86,7 +86,7 @@ def test_signal_is_a_mean_over_runs():
     assert lines(signal_table(rows))[0] == ["CCGA", "equation", "2", "0.1500", "0.500"]
 
 
-def test_places_of_the_same_region_and_of_others_are_told_apart():
+def test_places_of_the_same_region_and_of_others_are_distinguished():
     assert (SAME, OTHER) == ((4, 8, 12), (1, 2, 3))
     rows = [
         {"method": "cone-es", "seed": 1, "own": 100.0, "same region": 90.0, "other region": 20.0},
@@ -97,7 +97,7 @@ def test_places_of_the_same_region_and_of_others_are_told_apart():
 
 
 def test_two_regions_are_swapped_and_the_others_left_alone():
-    """Robots 0 to 7 begin in A, B, C, D, A, B, C, D."""
+    """Robots 0 to 7 start in A, B, C, D, A, B, C, D."""
     changed = orders(8)
     assert changed["A and C"][0].tolist() == [2, 1, 0, 3, 6, 5, 4, 7]
     assert changed["B and D"][0].tolist() == [0, 3, 2, 1, 4, 7, 6, 5]

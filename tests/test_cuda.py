@@ -1,7 +1,7 @@
-"""On a CUDA device everything has the bits of the CPU: ``pytest -m cuda`` on a machine with one.
+"""A CUDA device agrees with the CPU bit for bit: ``pytest -m cuda`` on a machine with one.
 
 Without one, the same blocks are compared on the CPU (``tests/worlds/test_*_lanes.py``), and the
-functions below are tried with the CPU in the place of the device.
+functions below are tried with the CPU in place of the device.
 """
 
 import numpy as np
@@ -49,7 +49,7 @@ def has_the_bits_of_the_cpu(path, name="srn", iterations=200, **options):
         assert values.tobytes() == there[array].tobytes(), array
 
 
-def goes_on_elsewhere(task, folder):
+def continues_elsewhere(task, folder):
     """Compare runs that change between devices with one that does not."""
     whole = content(evolve_tiny(folder / "whole", task=task).path)
     for first, then in (("cpu", "cuda"), ("cuda", "cpu")):
@@ -64,21 +64,21 @@ def marked(values):
 
 
 @pytest.mark.parametrize("path", marked(WORLDS))
-def test_a_device_has_the_bits_of_the_cpu(path):
+def test_a_device_agrees_with_the_cpu_bit_for_bit(path):
     has_the_bits_of_the_cpu(path)
     has_the_bits_of_the_cpu(path, **OPTIONS)
 
 
 @pytest.mark.parametrize("name", marked(CONTROLLERS))
-def test_a_device_has_the_bits_of_every_controller(name):
+def test_a_device_agrees_for_every_controller_bit_for_bit(name):
     has_the_bits_of_the_cpu("rover/complex-5", name)
 
 
 @pytest.mark.parametrize("task", marked(TASKS))
-def test_a_run_goes_on_on_another_device(task, tmp_path):
-    goes_on_elsewhere(task, tmp_path)
+def test_a_run_continues_on_another_device(task, tmp_path):
+    continues_elsewhere(task, tmp_path)
 
 
-def test_all_of_this_works_where_the_cpu_takes_the_place_of_a_device(two_cards, tmp_path):
+def test_all_of_this_works_with_the_cpu_in_place_of_a_device(two_cards, tmp_path):
     has_the_bits_of_the_cpu("rover/complex-1", iterations=5)
-    goes_on_elsewhere("rover/complex-1", tmp_path)
+    continues_elsewhere("rover/complex-1", tmp_path)

@@ -1,4 +1,4 @@
-"""The pages are true: tables are the package's own, examples run, links lead somewhere."""
+"""The pages are correct: tables agree with the package, examples run, links lead somewhere."""
 
 import importlib.util
 import os
@@ -57,7 +57,7 @@ def test_tables_are_those_of_the_package(page):
     assert make_tables.updated(text) == text, "run: python docs/make_tables.py"
 
 
-def test_every_results_page_says_which_versions_it_was_made_with():
+def test_every_results_page_states_its_versions():
     pages = sorted((ROOT / "docs" / "results").rglob("*.md"))
     assert len(pages) >= 10
     for page in pages:
@@ -71,7 +71,7 @@ def test_every_table_that_can_be_made_has_its_page():
     assert sorted(m[2] for m in make_tables.MARKED.finditer(pages)) == sorted(make_tables.TABLES)
 
 
-def test_a_stale_table_is_noticed_and_mended():
+def test_a_stale_table_is_noticed_and_repaired():
     text = (ROOT / "README.md").read_text()
     stale = text.replace("| `cone-3` |", "| `cone-4` |")
     assert stale != text
@@ -87,17 +87,17 @@ SLOW = {f"docs/{name}.md": pytest.mark.slow for name in ("quickstart", "python",
 
 
 @pytest.mark.parametrize("page", [pytest.param(one, marks=SLOW.get(one, ())) for one in EXECUTED])
-def test_examples_run_and_print_what_the_page_says(page):
+def test_examples_run_and_print_the_output_on_the_page(page):
     executed = [block for block in run_page.blocks((ROOT / page).read_text()) if block.is_run]
     assert executed
     assert run_page.differences(ROOT / page) == []
 
 
 def test_a_changed_word_is_noticed_and_a_changed_number_is_not():
-    said = "value 41.4  move 5, low 4, hi 1  2 s left"
-    assert run_page.shape("value 9  non-specialized 20  1 min 02 s left") == run_page.shape(said)
-    assert run_page.shape("value 41.4  move 5, low 4, hi 1  2 s more") != run_page.shape(said)
-    assert run_page.shape("area 41.4  move 5, low 4, hi 1  2 s left") != run_page.shape(said)
+    line = "value 41.4  move 5, low 4, hi 1  2 s left"
+    assert run_page.shape("value 9  non-specialized 20  1 min 02 s left") == run_page.shape(line)
+    assert run_page.shape("value 41.4  move 5, low 4, hi 1  2 s more") != run_page.shape(line)
+    assert run_page.shape("area 41.4  move 5, low 4, hi 1  2 s left") != run_page.shape(line)
 
 
 def test_an_example_that_fails_is_noticed(tmp_path):
@@ -165,7 +165,7 @@ def test_the_recipes_quote_their_examples():
 
 
 def test_a_parameter_is_one_field_and_one_of_the_kernels(tmp_path):
-    """Do what the recipe says to a copy of an example: a wind that blows along x."""
+    """Follow the recipe in a copy of an example: a wind that blows along x."""
     text = (ROOT / "examples" / "light.py").read_text()
     for after, added in (
         ('    """(side) the largest step."""\n',
@@ -198,13 +198,13 @@ def test_a_metric_is_one_entry(monkeypatch):
     nothing = Activity(np.zeros((2, 3)), np.zeros(2), labels, np.zeros(2), range(3))
     assert measure(nothing)["largest_share"] == 0.25
     (table,) = definitions().exhibits
-    said = {"span": share.span, "what": share.what, "source": share.source}
-    assert {"name": "largest share"} | said in table.rows
+    row = {"span": share.span, "what": share.what, "source": share.source}
+    assert {"name": "largest share"} | row in table.rows
 
 
 @pytest.mark.slow
 def test_following_the_recipes_adds_worlds_a_method_and_a_controller(tmp_path):
-    """Do what CONTRIBUTING says in a copy; the contract tests enrol all by their entries."""
+    """Follow CONTRIBUTING in a copy; the contract tests enrol all new parts by their entries."""
     for name in ("src", "tests", "examples"):
         shutil.copytree(ROOT / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))
     shutil.copy(ROOT / "pyproject.toml", tmp_path)
@@ -259,7 +259,7 @@ def test_following_the_recipes_adds_worlds_a_method_and_a_controller(tmp_path):
         ("tests/contracts", "light-v1 or spread-v1 or random or complex-5 and linear", 32),
         ("tests/runs", "kills and (light and homcne or random and rover)", 2),
     ):
-        said = run("pytest", "-q", "-p", "no:cacheprovider", folder, "-k", words)
-        found = re.search(r"(\d+) passed", said)
-        assert found, said
+        output = run("pytest", "-q", "-p", "no:cacheprovider", folder, "-k", words)
+        found = re.search(r"(\d+) passed", output)
+        assert found, output
         assert int(found[1]) >= least

@@ -1,4 +1,4 @@
-"""The scripts of experiments/: the rule by hand, blind rovers, and tables of what was measured."""
+"""The scripts of experiments/: the rule by hand, blind rovers, and tables of measurements."""
 
 import math
 import sys
@@ -51,7 +51,7 @@ def test_two_castes_by_hand():
     assert found == pytest.approx(expected, rel=0.2)
 
 
-def test_with_all_the_time_in_the_world_everything_is_found():
+def test_with_unlimited_time_everything_is_found():
     endless = regime(iterations=10**9, ranges=(0.2, 0.15, 0.1))
     assert value(endless, "switchers") == pytest.approx(5000)
     assert incentive(endless) == pytest.approx(1)
@@ -88,7 +88,7 @@ def test_the_constant_is_found_without_the_cells_for_testing():
     assert fitted([*known, (regime(0.25), 99.0), (regime(0.75), 0.01)]) == 3.3
 
 
-def test_blind_rovers_spend_their_time_as_their_shares_say():
+def test_blind_rovers_divide_their_time_by_their_shares():
     world = conevo.world("rover/complex-5", iterations=400)
     genes = np.stack([kind((1, 2, 1, 4), 1), kind((0, 0, 0, 1), 40, draw=3), kind((0, 1, 0, 0), 1)])
     who = np.arange(20) % 3
@@ -102,7 +102,7 @@ def test_blind_rovers_spend_their_time_as_their_shares_say():
     seen = rollout.record(genes, who[:, None].astype(np.int32), scenarios)
     steps = np.diff(np.stack([seen["x"], seen["y"]], axis=2), axis=0)
     has_turned = (np.abs(np.diff(steps[:, who == 1], axis=0)) > 1e-5).any(axis=2)
-    assert 0.005 < has_turned.mean() < 0.12  # every 40 moves, and where it is refused
+    assert 0.005 < has_turned.mean() < 0.12  # every 40 moves, and when it is refused
 
 
 def test_each_robot_of_a_caste_uses_a_setting_of_its_region():
@@ -116,7 +116,7 @@ def test_a_ratio_and_its_error_by_hand():
     assert found["blind log ratio se"] == pytest.approx(1 / 3)  # of -1 and 1, over the mean of 3
 
 
-def test_what_a_reading_must_be_like():
+def test_requirements_of_a_reading():
     row = {"random": 50.0, "blind switchers": 4100.0, "blind castes": 3900.0}
     row |= {f"complex-{e}": 3000.0 + e for e in range(1, 11)}
     row |= {f"simple-{e}": 2900.0 + e for e in range(1, 11)}

@@ -1,4 +1,4 @@
-"""The pages "method" and "fidelity" say what the code does: places, defaults, choices, examples.
+"""The pages "method" and "fidelity" agree with the code: places, defaults, choices, examples.
 
 The code is read, not run (ast), so that neither Warp nor a wrong import can hide a difference.
 """
@@ -69,7 +69,7 @@ def inherited(owner: ast.ClassDef, name: str) -> ast.stmt | None:
 
 
 def lookup(file: str, name: str | None) -> Any:
-    """Return the statement or value at a place, UNKNOWN if there is none."""
+    """Return the statement or value at a place, UNKNOWN if it has none."""
     path = find(file)
     if not path.is_file():
         return UNKNOWN

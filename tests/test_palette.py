@@ -1,4 +1,4 @@
-"""A method has one colour, whatever is drawn with it; a caste that of its replay."""
+"""A method has one colour in all figures; a caste has that of its replay."""
 
 from itertools import combinations
 from pathlib import Path
@@ -9,7 +9,7 @@ from conevo.worlds.outside import load
 from conevo.worlds.registry import WORLDS, colours_of
 
 
-def test_every_method_of_the_registry_has_a_look_of_its_own() -> None:
+def test_every_method_of_the_registry_has_its_own_look() -> None:
     assert set(palette.METHODS) == set(METHODS)
     for parts in zip(*palette.METHODS.values(), strict=True):
         assert len(set(parts)) == len(METHODS)
@@ -28,7 +28,7 @@ def test_methods_from_elsewhere_never_share_a_look() -> None:
     assert palette.method_looks(reversed(names)) == {name: looks[name] for name in names}
 
 
-def test_castes_have_the_colours_of_a_replay_and_strangers_others() -> None:
+def test_castes_have_the_colours_of_a_replay_and_unknown_ones_others() -> None:
     rover = palette.caste_colours(colours_of("rover-v2"), ["hi", "idle"])
     assert rover == palette.caste_colours(colours_of("rover"), ["idle"])
     assert list(rover) == ["low", "med", "hi", "move", "idle", "non-specialized"]
@@ -38,7 +38,7 @@ def test_castes_have_the_colours_of_a_replay_and_strangers_others() -> None:
     assert colours_of("light-v1") == {}
 
 
-def test_a_world_without_a_module_of_drawing_has_the_colours_that_it_says_are_drawn(monkeypatch):
+def test_a_world_without_a_module_of_drawing_has_its_declared_colours(monkeypatch):
     ball = load(Path(__file__).parents[1] / "examples" / "ball.py")
-    monkeypatch.setitem(WORLDS, ball.name, ball)  # as if it were of the package
+    monkeypatch.setitem(WORLDS, ball.name, ball)  # as if it belonged to the package
     assert colours_of("ball") == {"rest": "#9a9aa5", "push": "#d55e00"}

@@ -82,7 +82,7 @@ ENTRANCES = (of_python, of_class, of_command_line, of_file, of_plan)
 def refusals(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> Callable[[str, str, Any], dict[str, str]]:
-    """Return a function for what every entrance says, without the place that a value is from."""
+    """Return a function that returns the message of every entrance, without the value's origin."""
     monkeypatch.chdir(tmp_path)
 
     def ask(world: str, name: str, value: Any) -> dict[str, str]:
@@ -91,12 +91,12 @@ def refusals(
         for entrance in ENTRANCES:
             with pytest.raises((conevo.UsageError, SystemExit)) as caught:
                 entrance(world, section, key, value)
-            said = str(caught.value)
+            message = str(caught.value)
             if isinstance(caught.value, SystemExit):
                 assert caught.value.code == 2
-                said = capsys.readouterr().err.removeprefix("conevo: error: ").removesuffix("\n")
+                message = capsys.readouterr().err.removeprefix("conevo: error: ").removesuffix("\n")
             place = r" (on the command line|in [^:;(]*\.toml)(?=[:;])"
-            found[entrance.__name__] = re.sub(place, "", said)
+            found[entrance.__name__] = re.sub(place, "", message)
         assert [path for path in tmp_path.iterdir() if path.suffix not in (".toml", ".py")] == []
         return found
 
@@ -137,7 +137,7 @@ def test_a_changed_copy_is_checked_as_well(part: Any) -> None:
         dataclasses.replace(part(), **{name: -1})
 
 
-def test_what_a_field_holds_is_of_its_type() -> None:
+def test_the_value_of_a_field_is_of_its_type() -> None:
     assert isinstance(RoverParams(energy=5).energy, float)
     assert RoverParams(energy=5) == RoverParams(energy=5.0)
 
@@ -181,7 +181,7 @@ def test_checks_of_inherited_plain_and_several_fields(part: Any, given: Any, wor
     assert str(caught.value) == words
 
 
-def test_a_plain_dataclass_stays_what_it_is() -> None:
+def test_a_plain_dataclass_stays_unchanged() -> None:
     part = checked(Plain, "world")
     assert part is checked(Plain, "world")
     assert issubclass(part, Plain)
@@ -207,7 +207,7 @@ def test_a_plain_dataclass_of_a_world_is_checked_at_every_entrance(
     assert found == dict.fromkeys(found, "world.step = 0.5: must be less than or equal to 0.1")
 
 
-def test_parameters_of_a_plain_dataclass_are_checked_where_a_world_is_built(plain: str) -> None:
+def test_parameters_of_a_plain_dataclass_are_checked_when_a_world_is_built(plain: str) -> None:
     entry, environment = resolve(plain)
     params = entry.params_class.__mro__[1]
     assert entry.build(environment, params(step=0.05)).params == entry.params_class(step=0.05)

@@ -1,4 +1,4 @@
-"""Reading what others may have damaged: whole, or one line that names the file."""
+"""Reading files that may be damaged: complete, or one line that names the file."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def test_only_regular_files_are_opened_and_nothing_waits(tmp_path: Path) -> None
                 assert str(caught.value) == f"cannot read {path}: {words}"
 
 
-def test_what_the_system_refuses_is_the_machines_fault(tmp_path: Path) -> None:
+def test_refusals_of_the_system_are_faults_of_the_machine(tmp_path: Path) -> None:
     (tmp_path / "loop").symlink_to(tmp_path / "loop")
     for path, words in (
         ("loop", "Too many levels"),
@@ -84,10 +84,10 @@ def test_a_link_to_a_file_is_followed(tmp_path: Path) -> None:
     assert read_bytes(tmp_path / "link") == b"content"
 
 
-def test_a_size_is_looked_at_before_memory_is_taken(tmp_path: Path) -> None:
+def test_a_size_is_checked_before_memory_is_allocated(tmp_path: Path) -> None:
     path = tmp_path / "large"
     with path.open("wb") as file:
-        file.truncate(2**40)  # a hole: it takes no room on the disk
+        file.truncate(2**40)  # a sparse file: it takes no space on the disk
     for read in (read_bytes, read_text, read_json, read_json_lines, read_toml, read_arrays):
         with pytest.raises(DamagedFile, match="large is too large: more than"):
             read(path)
@@ -128,7 +128,7 @@ JSON = {
 
 
 @pytest.mark.parametrize("content", JSON, ids=[str(k) for k in range(len(JSON))])
-def test_json_that_is_none_is_one_line(content: bytes, tmp_path: Path) -> None:
+def test_invalid_json_is_one_line(content: bytes, tmp_path: Path) -> None:
     path = tmp_path / "a.json"
     line = refused(read_json, path, content)
     assert line.startswith("FILE is damaged: ")
@@ -137,7 +137,7 @@ def test_json_that_is_none_is_one_line(content: bytes, tmp_path: Path) -> None:
     assert line.startswith("FILE is damaged in line 2: ")
 
 
-def test_json_is_what_it_says(tmp_path: Path) -> None:
+def test_json_keeps_its_values(tmp_path: Path) -> None:
     path = tmp_path / "a.json"
     text = '{"a": [1, 18446744073709551615, -0.5, true, null, "é"], "b": {"c": {}}}'
     path.write_text("\ufeff" + text)
@@ -177,7 +177,7 @@ def test_the_last_whole_line_is_found_without_reading_the_file(n: int, tmp_path:
 
 
 @pytest.mark.parametrize("content", TOML, ids=[str(k) for k in range(len(TOML))])
-def test_toml_that_is_none_is_one_line(content: bytes, tmp_path: Path) -> None:
+def test_invalid_toml_is_one_line(content: bytes, tmp_path: Path) -> None:
     line = refused(read_toml, tmp_path / "a.toml", content)
     assert line.startswith("FILE is not valid TOML: ")
     assert TOML[content] in line
@@ -241,7 +241,7 @@ def npz(**arrays: np.ndarray) -> bytes:
 
 
 def member(shape: tuple[int, ...], descr: str = "|u1", content: bytes = b"") -> bytes:
-    """Return an npz file whose only array says what it likes."""
+    """Return an npz file whose only array has any given header."""
     head, out = io.BytesIO(), io.BytesIO()
     np.lib.format.write_array_header_1_0(
         head, {"descr": descr, "fortran_order": False, "shape": shape}
@@ -251,7 +251,7 @@ def member(shape: tuple[int, ...], descr: str = "|u1", content: bytes = b"") -> 
     return out.getvalue()
 
 
-def test_arrays_come_back_bit_for_bit(tmp_path: Path) -> None:
+def test_arrays_are_restored_bit_for_bit(tmp_path: Path) -> None:
     path = tmp_path / "a.npz"
     rng = np.random.default_rng(1)
     arrays = {
@@ -287,9 +287,9 @@ ARRAYS = {
 
 
 @pytest.mark.parametrize("content", ARRAYS, ids=[str(k) for k in range(len(ARRAYS))])
-def test_archives_that_are_none_are_one_line(content: bytes, tmp_path: Path) -> None:
+def test_invalid_archives_are_one_line(content: bytes, tmp_path: Path) -> None:
     path = tmp_path / "a.npz"
-    if ARRAYS[content] is None:  # an archive of nothing is one
+    if ARRAYS[content] is None:  # an empty archive is valid
         path.write_bytes(content)
         assert read_arrays(path) == {}
     else:
@@ -299,13 +299,13 @@ def test_archives_that_are_none_are_one_line(content: bytes, tmp_path: Path) -> 
 
 
 @pytest.mark.parametrize(
-    ("says", "words"),
+    ("declared", "words"),
     [(300 * 2**20, "unpacked it would have 314,572,800 bytes"), (100, "damaged or not an npz")],
 )
 def test_a_small_file_that_unpacks_to_a_large_one_costs_nothing(
-    says: int, words: str, tmp_path: Path
+    declared: int, words: str, tmp_path: Path
 ) -> None:
-    path, data = tmp_path / "a.npz", packed_zeros(300 * 2**20, says)
+    path, data = tmp_path / "a.npz", packed_zeros(300 * 2**20, declared)
     assert len(data) < 2**20
     tracemalloc.start()
     try:
@@ -324,7 +324,7 @@ def test_an_archive_that_is_never_compressed_unpacks_to_its_own_size(tmp_path: P
         read_arrays(path, is_packed=False)
 
 
-def test_a_member_that_is_there_twice_or_packed_otherwise_is_refused(tmp_path: Path) -> None:
+def test_a_repeated_or_differently_packed_member_is_refused(tmp_path: Path) -> None:
     path, out = tmp_path / "a.npz", io.BytesIO()
     with zipfile.ZipFile(out, "w") as archive:
         archive.writestr("a.npy", b"")

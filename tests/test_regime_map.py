@@ -63,7 +63,7 @@ def test_a_cell_by_hand():
     ]  # fmt: skip
 
 
-def test_what_two_percent_decide():
+def test_the_verdict_of_two_percent():
     def verdict(clones, individual):
         return cells_of(runs(0, clones, individual))[0].verdict
 
@@ -73,10 +73,10 @@ def test_what_two_percent_decide():
     assert verdict([1000, 1001], [1200]) == "open"
 
 
-def test_what_cells_have_in_common_by_hand():
+def test_means_over_cells_by_hand():
     """Every mean has the variance 1, so that of the mean is 1, of the slope 4; t of 4 is 2.776."""
     cells = cells_of(runs(0, [100, 102], [150, 152]) + runs(1, [200, 202], [290, 292]))
-    alone = runs(0.5, [100, 102], [90])  # has no interval, so does not count
+    alone = runs(0.5, [100, 102], [90])  # has no interval, so it does not count
     (trend,) = trends_of([*cells, *cells_of(alone)])
     assert (trend.mean.value, trend.slope.value) == pytest.approx((70, 40))
     assert (trend.mean.low, trend.mean.high) == pytest.approx((70 - 2.7764, 70 + 2.7764), abs=1e-3)
@@ -86,7 +86,7 @@ def test_what_cells_have_in_common_by_hand():
     assert trends_of(cells[:1])[0].slope is None
 
 
-def test_how_robots_of_different_regions_differ():
+def test_differences_between_robots_of_different_regions():
     assert apart(used((9, 9, 9), (1, 1, 1), (2, 2, 2), (5, 5, 5))) == 0
     # The mean of the four is a half low: half of the shares of A, B differ, three quarters of C, D.
     assert apart(used((3, 0, 0), (8, 0, 0), (0, 1, 0), (0, 0, 5))) == pytest.approx(0.625)
@@ -228,9 +228,9 @@ def test_bad_arguments_are_one_line(arguments, line, capsys, tmp_path, monkeypat
     with pytest.raises(SystemExit) as ended:
         regime_map.main(arguments)
     assert ended.value.code == 2
-    said = capsys.readouterr().err
-    assert line in said.splitlines()[-1]
-    assert "Traceback" not in said
+    message = capsys.readouterr().err
+    assert line in message.splitlines()[-1]
+    assert "Traceback" not in message
 
 
 @pytest.mark.skipif(

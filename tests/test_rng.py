@@ -10,7 +10,7 @@ from oracles import splitmix
 KEYS = np.array([0, 1, 2, 3, 2**63, 2**64 - 1], np.uint64)
 
 
-def test_a_number_belongs_to_its_key_and_place_whatever_is_drawn_with_it():
+def test_a_number_depends_on_its_key_and_place_alone():
     t, a, b = np.arange(4)[:, None], np.arange(5)[None], 7
     whole = numbers(KEYS[:, None, None], t, a, b)
     assert whole.shape == (6, 4, 5)
@@ -21,13 +21,13 @@ def test_a_number_belongs_to_its_key_and_place_whatever_is_drawn_with_it():
         assert uniforms(KEYS, 3, 2, 7)[e] == expected == (int(whole[e, 3, 2]) >> 40) / 2**24
 
 
-def test_places_below_a_key_have_keys_of_their_own():
+def test_places_below_a_key_have_their_own_keys():
     keys = np.arange(1000, dtype=np.uint64)
     paths = [(), ("a",), ("b",), ("a", "b"), ("a", 1), ("a", "1")]
     found = np.stack([fold_all(keys, *path) for path in paths])
     assert len(np.unique(found)) == found.size
     assert found[0, 5] == fold_all(keys[5:6])[0]
-    assert (keys == np.arange(1000)).all()  # nothing is changed in place
+    assert (keys == np.arange(1000)).all()  # arrays are not changed in place
 
 
 def test_numbers_are_uniform_along_keys_places_and_bits():

@@ -1,6 +1,6 @@
-"""The documentation site: its pages, their links, and how soon a reader finds an answer.
+"""The documentation site: its pages, their links, and the number of clicks to an answer.
 
-``.ci/run`` builds it, which takes Zensical and npm; here are the parts that need neither.
+``.ci/run`` builds it, which needs Zensical and npm; these tests need neither.
 """
 
 import importlib
@@ -21,7 +21,7 @@ import site_pages  # noqa: E402
 
 CONFIG = ROOT / "docs" / "theme" / "zensical.toml"
 CLICKS = 3
-ANSWERS = {  # where a reader's first questions are answered
+ANSWERS = {  # pages with the answers to a reader's first questions
     "how to write a world": "CONTRIBUTING.md#recipe-add-a-world",
     "how to write a controller": "CONTRIBUTING.md#recipe-add-a-controller",
     "how to write a method": "CONTRIBUTING.md#recipe-add-a-method",
@@ -37,7 +37,7 @@ ANSWERS = {  # where a reader's first questions are answered
 
 
 def links(page):
-    """Return what a page of the repository links to, with and without the heading."""
+    """Return the targets of a page's links in the repository, with and without the heading."""
     path = ROOT / page
     found = set()
     for m in site_pages.LINK.finditer(path.read_text(encoding="utf-8")):
@@ -49,7 +49,7 @@ def links(page):
 
 
 def clicks():
-    """Return how many clicks each page and heading is from the front page."""
+    """Return the number of clicks from the front page to each page and heading."""
     distance = {"docs/index.md": 0}
     queue = deque(distance)
     while queue:
@@ -179,7 +179,7 @@ def test_versions_are_kept_and_latest_leads_to_the_newest_release(tmp_path):
     assert 'url=latest/"' in (out / "index.html").read_text()
 
 
-def test_only_what_the_script_made_is_replaced(tmp_path, monkeypatch, capsys):
+def test_only_folders_made_by_the_script_are_replaced(tmp_path, monkeypatch, capsys):
     built, out = tmp_path / "built", tmp_path / "site"
     built.mkdir()
     (built / "index.html").write_text("page")

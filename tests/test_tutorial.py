@@ -1,4 +1,4 @@
-"""The tutorial notebook: it is committed without outputs, and works from top to bottom."""
+"""The tutorial notebook: it is committed without outputs, and runs from top to bottom."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import conevo
 NOTEBOOK = Path(__file__).resolve().parent.parent / "examples" / "tutorial.ipynb"
 
 
-def test_it_is_committed_as_nobody_has_executed_it() -> None:
+def test_it_is_committed_without_outputs() -> None:
     notebook = json.loads(NOTEBOOK.read_text())
     code = [cell for cell in notebook["cells"] if cell["cell_type"] == "code"]
     assert len(code) >= 10
@@ -22,7 +22,7 @@ def test_it_is_committed_as_nobody_has_executed_it() -> None:
 
 
 @pytest.mark.slow
-def test_it_works_from_top_to_bottom(tmp_path: Path) -> None:
+def test_it_runs_from_top_to_bottom(tmp_path: Path) -> None:
     nbformat = pytest.importorskip("nbformat")
     nbclient = pytest.importorskip("nbclient")
     pytest.importorskip("ipykernel")

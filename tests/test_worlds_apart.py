@@ -1,4 +1,4 @@
-"""No file outside ``worlds/`` names a world in its code, but for those listed here."""
+"""No file outside ``worlds/`` names a world in its code, except those listed here."""
 
 import ast
 import re
@@ -9,10 +9,10 @@ import conevo
 SOURCE = Path(conevo.__file__).parent
 WORLDS = re.compile(r"rover|pursuit|gacc|prey|predator", re.IGNORECASE)
 
-# Claims are a registry of what the thesis says of its worlds.
+# Claims are a registry of the thesis' statements about its worlds.
 FOLDERS = ("worlds/", "report/claims/")
 ALLOWED = {
-    # The command line: a command, an option and examples of what to type.
+    # The command line: a command, an option and examples.
     "cli/main.py": "its table of commands has shape-prey",
     "cli/run.py": "its option --prey",
     "cli/settings_text.py": "the task whose sizes are listed unless another is named",
@@ -23,17 +23,17 @@ ALLOWED = {
 
 
 def names_a_world(path: Path) -> bool:
-    """Whether a name or a text in a file's code, docstrings and comments aside, is of a world."""
+    """Whether a name or a text in a file's code, except docstrings and comments, names a world."""
     tree = ast.parse(path.read_text(encoding="utf-8"))
     prose = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
     for node in ast.walk(tree):
         if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in prose:
-            said = [node.value]
+            texts = [node.value]
         elif isinstance(node, ast.ImportFrom):
-            said = [node.module or "", *(one.name for one in node.names)]
+            texts = [node.module or "", *(one.name for one in node.names)]
         else:
-            said = [getattr(node, key, None) for key in ("id", "attr", "arg", "name")]
-        if any(isinstance(text, str) and WORLDS.search(text) for text in said):
+            texts = [getattr(node, key, None) for key in ("id", "attr", "arg", "name")]
+        if any(isinstance(text, str) and WORLDS.search(text) for text in texts):
             return True
     return False
 
@@ -46,4 +46,4 @@ def test_only_listed_files_name_a_world() -> None:
         and names_a_world(path)
     }
     assert naming - ALLOWED.keys() == set()
-    assert ALLOWED.keys() - naming == set()  # a file that names none any more leaves the list
+    assert ALLOWED.keys() - naming == set()  # a file that no longer names a world leaves the list

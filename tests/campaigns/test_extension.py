@@ -138,7 +138,7 @@ def test_a_worker_that_is_killed_while_it_extends_a_run_continues(
     assert same_as(whole, longer)
 
 
-def test_a_changed_run_fails_and_the_others_go_on(campaign: Campaign) -> None:
+def test_a_changed_run_fails_and_the_others_continue(campaign: Campaign) -> None:
     label = next(iter(campaign.planned))
     with (campaign.paths.run(label) / "champion.npz").open("ab") as file:
         file.write(b"x")

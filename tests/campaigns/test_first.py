@@ -113,7 +113,7 @@ def test_factors_of_the_method_are_the_second_stages_and_all_others_are_of_both(
         assert config.method_config.rounds == 2
 
 
-def test_it_may_also_be_a_setting_and_of_a_method_that_has_no_runs_of_its_own(
+def test_it_may_also_be_a_setting_and_of_a_method_without_its_own_runs(
     tmp_path: Path,
 ) -> None:
     plan = plan_of(tmp_path, 'factors = { first = ["none", "homcne"] }', "")

@@ -80,7 +80,7 @@ def test_budgets_join_near_numbers_of_evaluations_and_keep_others_apart(tmp_path
     }
 
 
-def test_runs_of_one_planned_budget_are_one_group_whatever_they_spent(tmp_path) -> None:
+def test_runs_of_one_planned_budget_are_one_group(tmp_path) -> None:
     one = "rover/complex-1"
     of = [
         *cells([one], ["homcne"], budget=61, planned=100),

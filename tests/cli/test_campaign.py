@@ -249,7 +249,7 @@ def test_a_wrong_word_is_one_clear_line_and_nothing_is_written(conevo, tmp_path,
     assert out == ""
     assert message in err
     assert len(err.splitlines()) == 1
-    locks = {"lock", "ledger.sqlite"}  # created by a check, and left there
+    locks = {"lock", "ledger.sqlite"}  # created when looking, and left there
     assert [path for path in sorted(tmp_path.rglob("*")) if path.name not in locks] == before
 
 

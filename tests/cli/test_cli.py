@@ -286,7 +286,7 @@ def test_a_refusal_in_mid_run_leaves_a_run_to_resume(say, tmp_path: Path) -> Non
     assert content(path) == content(evolve_tiny(tmp_path / "whole", **changes).path)
 
 
-def test_existing_runs_are_refused_with_what_can_be_done(say) -> None:
+def test_existing_runs_are_refused_with_advice(say) -> None:
     say(*tiny("--quiet", "--out", "here"))
     said = say(*tiny("--out", "here"))
     assert said.code == 2

@@ -60,7 +60,7 @@ def test_settings_as_text_keep_to_the_width_of_the_terminal(say, monkeypatch) ->
     assert " false " in out
 
 
-def test_a_world_of_ones_own_has_its_settings_listed(say) -> None:
+def test_settings_of_your_own_world_are_listed(say) -> None:
     light = Path(__file__).parents[2] / "examples" / "light.py"
     rows = json.loads(say("list", "settings", f"{light}:dark-1", "--json").out)
     step = next(row for row in rows if row["setting"] == "world.step")

@@ -238,7 +238,7 @@ def test_robots_with_a_common_direction_share_their_findings() -> None:
 
 @pytest.mark.parametrize("seed", range(20))
 def test_the_filter_is_that_of_wiener(seed: int) -> None:
-    """P (P + noise)^-1, where P is the similarity minus its expectation by chance."""
+    """P (P + noise)^-1, where P is the likeness less its luck, computed without eigenvectors."""
     rng = np.random.default_rng(seed)
     n, age, memory = int(rng.integers(2, 12)), int(rng.integers(FIRST + 1, 60)), 0.9
     likeness = rng.standard_normal((n, n)) + rng.uniform(0, 2) * n**0.5 * np.eye(n)

@@ -16,7 +16,7 @@ FOUR = Layout(n_robots=4, n_hidden=2, max_hidden=2, n_genes=4)
 
 
 @pytest.mark.parametrize("name", ["ccga", "mesp", "cone", "cone-1", "cone-2", "cone-3"])
-def test_populations_may_begin_as_copies_of_the_first(name: str) -> None:
+def test_populations_may_start_as_copies_of_the_first(name: str) -> None:
     apart = method(name, genotypes=4).init(LAYOUT, root=5)
     alike = method(name, genotypes=4, common_start=True).init(LAYOUT, root=5)
     assert alike.genes.shape == apart.genes.shape

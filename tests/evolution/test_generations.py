@@ -77,7 +77,7 @@ def test_a_clones_credit_may_be_that_of_one_robot_the_same_for_all_genotypes():
         state = learner.tell(state, final, scores(final))
     of_robots = [[[1.0, 0.0, 4.0, -1.0]], [[3.0, 10.0, 4.0, 0.0]]]
     assert [of_robots.index(one) for one in seen] == [place_on_trial(7, g, 2) for g in range(8)]
-    assert all(one in seen for one in of_robots)  # the place is drawn again in every generation
+    assert all(one in seen for one in of_robots)  # the place changes between generations
 
 
 def test_hetcne_partners_are_others_first_then_last_generations_elite():

@@ -49,7 +49,7 @@ HEURISTICS.append("non-specialized")
 
 @dataclass
 class Decision:
-    """What a robot is to do: an action, a place to go to, an object to grip, to let go."""
+    """The decision of a robot: an action, a place to go to, an object to grip, to let go."""
 
     action: int
     x: float
@@ -57,11 +57,11 @@ class Decision:
     target: int = NONE
     lets_go: bool = False
     situation: int = 0
-    refused: str = ""  # what was in the way
+    refused: str = ""  # the obstruction
 
 
 def situation(w: World, i: int) -> tuple[int, int]:
-    """The situation of section 6.2.8 that a robot is in, and the object that it is about."""
+    """The situation (section 6.2.8) of a robot, and the object concerned."""
     me, p = w.robots[i], w.p
     if not w.at_home(me):
         return 0, NONE
@@ -108,7 +108,7 @@ def towards(w: World, i: int, x: float, y: float, number: int = 0) -> Decision:
 
 
 def use_gripper(w: World, i: int, kind: int) -> Decision:
-    """The gripper with a setting: grip what is near, keep what fits, let go what does not."""
+    """The gripper with a setting: grip a near object, keep a fitting one, let go another one."""
     me = w.robots[i]
     decision = Decision(GRIP + kind, me.x, me.y)
     if me.held != NONE:
@@ -127,7 +127,7 @@ def use_gripper(w: World, i: int, kind: int) -> Decision:
 
 
 def use_network(w: World, i: int, sums: Sequence[float]) -> Decision:
-    """The action of the highest output, the first of equals (6.2.7)."""
+    """The action of the highest output, ties go to the first (6.2.7)."""
     me = w.robots[i]
     best = max(range(8), key=lambda o: (sums[o], -o))
     if best < 3:
@@ -162,7 +162,7 @@ def use_heuristic(w: World, i: int, name: str) -> Decision:
 
 
 def decide(w: World, i: int, sums: Sequence[float] | None) -> Decision:
-    """What a robot will do.
+    """The decision of a robot.
 
     Args:
         sums: weighted sums of the network's 8 outputs, None for a heuristic robot.
@@ -187,7 +187,7 @@ def decide(w: World, i: int, sums: Sequence[float] | None) -> Decision:
 
 
 def why_refused(w: World, i: int, x: float, y: float) -> str:
-    """What is in the way of a robot that wants to go to a place, empty if nothing."""
+    """The obstruction of a robot that wants to go to a place, empty if none."""
     me = w.robots[i]
     if not (0.0 <= x < 1.0 and 0.0 <= y < 1.0):
         return "edge"
@@ -202,7 +202,7 @@ def why_refused(w: World, i: int, x: float, y: float) -> str:
 
 
 def too_close(w: World, ax: float, ay: float, bx: float, by: float) -> bool:
-    """Whether two places are one: only one robot can occupy any given position (6.1.2)."""
+    """Whether two places are the same: only one robot can occupy a position (6.1.2)."""
     return (ax - bx) ** 2 + (ay - by) ** 2 < w.p.separation**2
 
 
@@ -210,7 +210,7 @@ def too_close(w: World, ax: float, ay: float, bx: float, by: float) -> bool:
 
 
 def commit(w: World, decisions: Sequence[Decision]) -> None:
-    """Make all decisions true: moves, grips, what they cost."""
+    """Execute all decisions: moves, grips, their costs."""
     alive = [i for i, robot in enumerate(w.robots) if robot.energy > 0.0]
     for i, robot in enumerate(w.robots):
         if i not in alive:
@@ -242,7 +242,7 @@ def count(robot: Robot, action: int, load: int) -> None:
 
 
 def move(w: World, i: int, decisions: Sequence[Decision]) -> None:
-    """Go to the proposed place, with the object held, unless a lower number goes there."""
+    """Go to the proposed place with the carried object, unless a lower number goes there."""
     robot, place = w.robots[i], decisions[i]
     if (place.x, place.y) == (robot.x, robot.y):
         return
@@ -256,7 +256,7 @@ def move(w: World, i: int, decisions: Sequence[Decision]) -> None:
 
 
 def grip(w: World, alive: Sequence[int], decisions: Sequence[Decision]) -> None:
-    """Grip and let go: one robot an object outside, any number of them in the home area."""
+    """Grip and let go: one robot per object outside, any number of them in the home area."""
     taken = set()
     for i in alive:
         robot, k = w.robots[i], decisions[i].target
@@ -283,7 +283,7 @@ def let_go(w: World, robot: Robot, why: str) -> None:
 
 
 def referee(w: World) -> None:
-    """Judge what robots hold in the home area, then say where every object is in its life."""
+    """Judge the objects held in the home area, then update the state of every object."""
     for k, block in enumerate(w.objects):
         holders = w.holders(k)
         if block.life == DELIVERED or not holders or not w.at_home(block):
@@ -306,7 +306,7 @@ def referee(w: World) -> None:
 
 
 def deliver(w: World, k: int, c: int) -> None:
-    """Put an object in its place and reward its holders, all the same (eq. 6.8)."""
+    """Put an object in its place and reward its holders equally (eq. 6.8)."""
     block, one = w.objects[k], w.complexes[c]
     step, parts = len(one.built), len(one.plan)
     block.part, block.life = c * parts + step, DELIVERED
@@ -335,7 +335,7 @@ def next_life(w: World, k: int) -> int:
 
 
 def demand(w: World, kind: int) -> float:
-    """Demand for a type (eqs 6.4 to 6.6): priority over what is not delivered yet.
+    """Demand for a type (eqs 6.4 to 6.6): priority divided by the objects not delivered yet.
 
     A complex object broadcasts once it has two parts, until it is complete (section 6.1.2).
     """
@@ -358,7 +358,7 @@ def performance(w: World) -> dict[str, float]:
 
 
 def step(w: World) -> list[Decision]:
-    """One iteration; returns what the robots decided."""
+    """One iteration; returns the robots' decisions."""
     decisions, found = [], set()
     for i, robot in enumerate(w.robots):
         sums = None

@@ -1,4 +1,4 @@
-"""What there is in gathering and collective construction, and what its robots see of it.
+"""The objects of gathering and collective construction, and how its robots sense them.
 
 The first half of the oracle: state, geometry, sensing, in float64; ``gacc_oracle`` is the second.
 Written from Nitschke 2009, chapter 6, and the page of settled gaps, not from the kernels. Where the
@@ -25,7 +25,7 @@ LYING, GRIPPED, CARRIED, WAITING, HELPED, DELIVERED, DROPPED = range(7)
 class Params:
     """Nitschke 2009, table 6.4, and what is settled; lengths in sides of the square.
 
-    What these are in the world is written there; here they are small, for tests by hand.
+    The world has its own values; here they are small, for tests by hand.
     """
 
     iterations: int = 3000
@@ -100,7 +100,7 @@ class Robot:
     action: int = NONE  # executed in the previous iteration
     held: int = NONE  # object
     waited: int = 0
-    dropped: int = NONE  # object it let go in the home area, which it does not touch until it left
+    dropped: int = NONE  # object released at home, not touched again before the robot leaves
     situation: int = 0
     counts: list[int] = field(default_factory=lambda: [0] * 10)
     switches: int = 0
@@ -171,7 +171,7 @@ class World:
     events: Counter[str] = field(default_factory=Counter)
 
     def note(self, *events: str) -> None:
-        """Count what happened, so that a test can tell whether it did."""
+        """Count an event, so that a test can check whether it happened."""
         self.events.update(events)
 
     def at_home(self, thing: Robot | Block) -> bool:
@@ -200,7 +200,7 @@ def distance(a: Robot | Block, b: Robot | Block) -> float:
 def octant(dx: float, dy: float) -> int:
     """Octant 0..7 of a direction, counter-clockwise from +x (figure 6.4)."""
     if dx == dy == 0.0:
-        return 3  # Settled: where the number of no direction falls
+        return 3  # Settled: the octant without a direction
     angle = math.atan2(dy, dx)
     if angle < 0.0:
         angle += 2.0 * math.pi
@@ -209,7 +209,7 @@ def octant(dx: float, dy: float) -> int:
 
 def meets(obstacle: Obstacle, ax: float, ay: float, bx: float, by: float) -> bool:
     """Whether the segment from a to b meets a closed rectangle."""
-    # The parts of the way at which it is between left and right, and between bottom and top.
+    # The parts of the segment between left and right, and between bottom and top.
     enter, leave = 0.0, 1.0
     for a, b, low, high in (
         (ax, bx, obstacle.left, obstacle.right),
@@ -229,7 +229,7 @@ def is_inside(obstacle: Obstacle, x: float, y: float) -> bool:
 
 
 def in_view(w: World, me: Robot, other: Robot | Block) -> bool:
-    """Whether no obstacle is in between (figure 6.2)."""
+    """Whether the view is free of obstacles (figure 6.2)."""
     if any(meets(o, me.x, me.y, other.x, other.y) for o in w.obstacles):
         w.note(f"hidden {type(other).__name__.lower()}")
         return False
@@ -284,7 +284,7 @@ def sense_objects(w: World, i: int) -> tuple[list[float], set[int]]:
 
 
 def sense_robots(w: World, i: int) -> list[float]:
-    """Eight robot sensors (6.2.2): what the closest robot carries, 0 for nothing, 1..3."""
+    """Eight robot sensors (6.2.2): the type that the closest robot carries, 0 for none, 1..3."""
     me = w.robots[i]
     values, closest = [0.0] * 8, [math.inf] * 8
     for j, other in enumerate(w.robots):

@@ -36,8 +36,8 @@ class Params:
     half_angle: float = 30.0  # degrees
     speed: float = 0.8  # of a predator, per iteration
     prey_speed: float = 1.2  # of a prey, in predator speeds
-    window: int = 10  # iterations in which a prey must have got nowhere
-    share: float = 0.1  # of what its wheels commanded
+    window: int = 10  # iterations for which a prey must be stuck
+    share: float = 0.1  # of the distance that its wheels commanded
     least: float = 0.2  # cm
     hunters: int = 2  # predators in light range of a captured prey
 
@@ -73,7 +73,7 @@ class Network:
 
 
 class Chaser:
-    """The heuristic predator (section 4.3): at the prey, else where it was, else anywhere."""
+    """The heuristic predator (section 4.3): to the prey, else to its last place, else anywhere."""
 
 
 class Dodger:
@@ -244,7 +244,7 @@ def sense_body(w: World, me: int, light: bool) -> np.ndarray:
 
 
 def sense(w: World, me: int) -> np.ndarray:
-    """What a body sees: 8 infrared, and 8 light sensors if it is a predator; as they are held."""
+    """The sensors of a body: 8 infrared, and 8 light sensors of a predator; some may be clamped."""
     sensors = sense_body(w, me, light=False)
     if not w.is_prey[me]:
         sensors = np.concatenate([sensors, sense_body(w, me, light=True)])
@@ -267,7 +267,7 @@ def wrap(angle: float) -> float:
 
 
 def steer(heading: float, direction: float, speed: float) -> tuple[float, float]:
-    """Wheel commands that turn as far as one iteration can, and go ahead with the rest."""
+    """Wheel commands that turn as far as possible in one iteration, and go ahead with the rest."""
     w = wrap(direction - heading) * WHEEL_BASE / (2 * speed)
     w = min(max(w, -1.0), 1.0)
     f = 1.0 - abs(w)
@@ -348,7 +348,7 @@ def arc(
 
 @dataclass
 class Moves:
-    """What ``move`` did: whether each body was refused, and the closest call of the iteration.
+    """The result of ``move``: whether each body was refused, and the closest comparison.
 
     ``margin``: cm by which the closest of all comparisons was decided.
     """
@@ -358,7 +358,7 @@ class Moves:
 
 
 def move(w: World, left: Sequence[float], right: Sequence[float]) -> Moves:
-    """Move all bodies whose way is free; a refused one keeps its old pose."""
+    """Move all bodies whose path is free; a refused one keeps its old pose."""
     calls = [math.inf]
 
     def too_close(xa: float, ya: float, xb: float, yb: float) -> bool:
@@ -405,7 +405,7 @@ def way(left: np.ndarray, right: np.ndarray, speed: float) -> np.ndarray:
 
 
 def immobilized(p: Params, moved: Sequence[float], commanded: Sequence[float]) -> bool:
-    """Whether a prey got nowhere in the last ten iterations; both arguments end with this one."""
+    """Whether a prey was stuck in the last ten iterations; both arguments end with this one."""
     if len(moved) < p.window:
         return False
     got, wanted = sum(moved[-p.window :]), sum(commanded[-p.window :])
@@ -438,7 +438,7 @@ def hunt_result(captured: np.ndarray, refused: np.ndarray) -> dict[str, float]:
 def flight_fitness(
     left: np.ndarray, right: np.ndarray, refused: np.ndarray, speed: float
 ) -> np.ndarray:
-    """Fitness so far [T] of one prey of the prey world: far, fast, straight; 0 once it collided."""
+    """Fitness so far [T] of one prey of the prey world: far, fast, straight; 0 once collided."""
     total, dead, history = 0.0, False, []
     for l, r, stop in zip(left, right, refused, strict=True):  # noqa: E741
         dead = dead or bool(stop)

@@ -305,7 +305,7 @@ def run(
     for t in range(n_iterations):
         alive = [v for v in range(n_robots) if energy[v] > 0.0]
 
-        # Sense and think: nobody's state changes here.
+        # Sense and think: no state changes here.
         action = [NONE] * n_robots
         proposal: dict[int, np.ndarray] = {}
         for v in alive:
@@ -329,7 +329,7 @@ def run(
                 if not blocked(p, v, target, xy, mask):
                     proposal[v] = target
 
-        # Move. A proposal gives way to one of a lower index even if that gives way itself.
+        # Move. A proposal yields to one of a lower index even if that one yields itself.
         for v, target in proposal.items():
             rivals = [w for w in proposal if w < v and too_close(p, target, proposal[w])]
             if not rivals:
@@ -355,7 +355,8 @@ def run(
             }
 
         if p.rocks_per_activation == 1:
-            # Settled: each takes, of what it could detect with anybody, the first in random order.
+            # Settled: of the rocks that it could detect with any partner, each rover takes the
+            # first in random order.
             could = {k: partners_of(k, rovers) for k, rovers in hits.items()}
             hits = {}
             for v in activating:
@@ -377,7 +378,7 @@ def run(
                 detected[k] = t
                 reporting |= partners
 
-        # Pay and remember.
+        # Pay the costs, and store the actions.
         for v in alive:
             energy[v] -= p.sensing_cost
             energy[v] -= p.move_cost if action[v] == MOVE else p.costs[action[v]]
@@ -401,7 +402,7 @@ def run(
         fitness = credited * covered.mean(axis=1)
     if p.fitness == "value":
         fitness = credited
-    # The lander records a detection one iteration after it, so those of the last are lost.
+    # The lander records a detection one iteration later, so those of the last one are lost.
     recorded = (detected >= 0) & (detected <= n_iterations - 2)
     return log | {
         "detected": detected,

@@ -1,9 +1,9 @@
 """Pages in a real browser: Debian's chromium, driven by playwright.
 
-A module of tests says ``pytest_plugins = ["replay.browser"]``. Without playwright or chromium its
-tests are skipped; where CONEVO_TEST_BROWSER=required is set they fail instead. A test fails, too,
-if its pages complained on the console, threw, opened a dialog, or asked anybody else than this
-machine for anything.
+A module of tests sets ``pytest_plugins = ["replay.browser"]``. Without playwright or chromium its
+tests are skipped; if CONEVO_TEST_BROWSER=required is set, they fail instead. A test also fails if
+its pages log an error or warning, throw an exception, open a dialog, or send a request to another
+machine.
 """
 
 from __future__ import annotations
@@ -31,13 +31,13 @@ FLAGS = (
     "--disable-sync",
 )
 VIEWPORT = {"width": 1280, "height": 800}
-PATIENCE = 10_000  # ms; a page that has not done it by then never does
+PATIENCE = 10_000  # ms; a page that takes longer never finishes
 LOCAL = {"127.0.0.1", "localhost"}
 
 
-@pytest.fixture(scope="module")  # playwright's event loop would be in the way of other modules
+@pytest.fixture(scope="module")  # playwright's event loop would disturb other modules
 def chromium() -> Iterator[Browser]:
-    """Chromium, started once for a module, with a user data directory of its own."""
+    """Chromium, started once for a module, with its own user data directory."""
     path = shutil.which("chromium")
     try:
         from playwright.sync_api import sync_playwright
@@ -59,7 +59,7 @@ def _unavailable(why: str) -> None:
 
 @pytest.fixture
 def complaints() -> list[str]:
-    """What the pages of this test complained of so far; a test may clear what it provoked."""
+    """The errors of this test's pages so far; a test may clear those that it caused."""
     return []
 
 
@@ -86,9 +86,9 @@ def _watch(context: BrowserContext, complaints: list[str]) -> None:
 
     context.on(
         "console",
-        lambda said: (
-            complaints.append(f"console {said.type}: {said.text}")
-            if said.type in {"error", "warning", "assert"}
+        lambda message: (
+            complaints.append(f"console {message.type}: {message.text}")
+            if message.type in {"error", "warning", "assert"}
             else None
         ),
     )

@@ -1,4 +1,4 @@
-"""Short epochs of random and heuristic teams in every world, for tests of what shows them."""
+"""Short epochs of random and heuristic teams in every world, for tests of films and pages."""
 
 from dataclasses import replace
 from functools import cache
@@ -18,13 +18,13 @@ TASKS = ("rover/complex-5", "pursuit/team-7", "prey/shaping-3", "gacc/complex-5"
 
 
 def random_team(a_world, seed=0):
-    """Return a pool and the rows of one team of networks, of more neurons than at the start."""
+    """Return a pool and the rows of a team of networks that have grown beyond their first size."""
     genome, r = genome_of(controller(world=a_world), a_world), a_world.n_robots
     used = min(genome.n_parts + 1, genome.max_parts)
     pool = stream(seed, "pool").uniform(-1, 1, (r * used, genome.n_genes)).astype(np.float32)
     team = np.full((r, genome.max_parts), -1, dtype=np.int32)
     team[:, :used] = np.arange(len(pool)).reshape(r, used)
-    team[0, 0] = -1  # a hole among the neurons
+    team[0, 0] = -1  # an empty slot among the neurons
     return pool, team
 
 
@@ -42,5 +42,5 @@ def epoch(task, iterations=200, seed=3, *, is_heuristic=False):
 
 
 def renamed(trajectory, **changes):
-    """Return the trajectory with other words about it."""
+    """Return the trajectory with another description."""
     return replace(trajectory, about=trajectory.about | changes)

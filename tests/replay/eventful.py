@@ -1,4 +1,4 @@
-"""Short epochs in which much happens, and what the file of an epoch says with numpy alone."""
+"""Short epochs with many events, and the contents of their files, read with numpy alone."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from replay.epochs import random_team
 
 __all__ = ["WORLDS", "numbers", "played"]
 
-# Rules under which rocks are detected, prey captured, objects carried within a short epoch.
+# Parameters with which rocks are detected, prey captured and objects carried in a short epoch.
 WORLDS: dict[str, tuple[str, dict[str, float]]] = {
     "rover": ("rover/complex-5", dict.fromkeys(("low_range", "med_range", "hi_range"), 0.1)),
     "pursuit": ("pursuit/team-4", {"capture_distance_cm": 100.0, "n_obstacles": 3}),
@@ -27,7 +27,7 @@ WORLDS: dict[str, tuple[str, dict[str, float]]] = {
 
 
 def played(name: str, seed: int = 2, iterations: int = 240) -> Trajectory:
-    """Return an epoch: of every three robots two are heuristic, one has a random network.
+    """Return an epoch in which two of every three robots are heuristic, one has a random network.
 
     The scenario is the same for all seeds.
     """
@@ -44,7 +44,7 @@ def played(name: str, seed: int = 2, iterations: int = 240) -> Trajectory:
 
 
 def numbers(path: Path) -> tuple[dict[str, Any], dict[str, npt.NDArray[Any]]]:
-    """Return what a trajectory's file says, and its channels."""
+    """Return the description in a trajectory's file, and its channels."""
     with np.load(path) as file:
         about = json.loads(file["about"].tobytes())
         return about, {

@@ -1,4 +1,4 @@
-"""A made-up epoch that is small enough to be drawn often, and what its pictures must show."""
+"""A made-up epoch that is small enough to be drawn often, and the colours of its pictures."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Trajectories with changes made by hand, and what a playback of them says."""
+"""Trajectories with changes made by hand, and the contents of their playbacks."""
 
 import json
 from dataclasses import replace
@@ -31,7 +31,7 @@ def changed(trajectory, **arrays):
 
 
 def opened(trajectory):
-    """What is drawn of a file that holds a trajectory, whatever is in it."""
+    """The playback of a trajectory with any contents, as read from a file."""
     kept = {name: {"low": c.low, "step": c.step} for name, c in trajectory.channels.items()}
     about = json.dumps(trajectory.about | {"channels": kept})
     arrays = {name: channel.codes for name, channel in trajectory.channels.items()}
@@ -39,7 +39,7 @@ def opened(trajectory):
     return playback_of(Trajectory.of_arrays(arrays, Path("epoch.npz")))
 
 
-def told(playback, kind=None):
+def events_of(playback, kind=None):
     """The events of a kind, as (t, text, robots)."""
     return [
         (event.t, event.text, event.robots)

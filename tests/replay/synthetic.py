@@ -1,4 +1,4 @@
-"""Playbacks that no world made: every part of a playback once, and crowds of any size."""
+"""Playbacks without a world: every part of a playback once, and crowds of any size."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ __all__ = ["BUILT_AT", "DETECTED", "HELD", "PHASE", "T", "crowd", "made_up", "re
 
 T = 200
 R = 4
-PHASE = 20  # iterations in which a robot does the same
-HELD = range(50, 100)  # robot 0 holds object 1
+PHASE = 20  # iterations for which a robot repeats an action
+HELD = range(50, 100)  # robot 0 carries object 1
 DETECTED = (60, T, 120)  # iteration in which each rock is
 BUILT_AT = 150
 
@@ -41,7 +41,7 @@ ROCKS_X, ROCKS_Y = (1.0, 4.0, 7.0), (6.5, 6.5, 6.5)
 
 
 def made_up(title: str = "Made-up team", shift: float = 0.0, **changes: Any) -> Playback:
-    """Return a playback in which everything is known: four robots drive along parallel lines.
+    """Return a playback with known contents: four robots drive along parallel lines.
 
     shift: added to all their places and activations, so that another team has other numbers.
     """
@@ -136,7 +136,7 @@ def _wave(n: int, shift: float) -> npt.NDArray[np.float64]:
 
 
 def _objects(x: npt.NDArray[Any], y: npt.NDArray[Any], shift: float) -> Things:
-    """Two objects: one lies, the other is carried by robot 0, and built in later."""
+    """Two objects: one stays in place, the other is carried by robot 0, and built in later."""
     places_x, places_y = np.full((T, 2), 9.0), np.full((T, 2), 1.7)
     places_x[:, 1], places_y[:, 1] = x[HELD[0]], y[HELD[0]] + 0.5
     places_x[HELD, 1], places_y[HELD, 1] = x[HELD], y[HELD] + 0.5
@@ -173,7 +173,7 @@ def _rocks() -> Things:
 
 
 def crowd(robots: int = 30, rocks: int = 2000, iterations: int = 2500) -> Playback:
-    """Return a playback as full as a large rover epoch: everybody moves, half the rocks fade."""
+    """Return a playback as full as a large rover epoch: all robots move, half of the rocks fade."""
     rng = stream(6, "crowd")
     steps = rng.uniform(-0.004, 0.004, (2, iterations, robots)).cumsum(axis=1)
     x, y = 0.5 + 0.5 * np.sin(steps + rng.uniform(0, 6, (2, 1, robots)))
@@ -236,7 +236,7 @@ def crowd(robots: int = 30, rocks: int = 2000, iterations: int = 2500) -> Playba
 
 
 def renamed(playback: Playback, text: str) -> Playback:
-    """Return a playback with a text in every place in which a playback has one."""
+    """Return a playback with a given text in place of every text."""
 
     def kinds(given: tuple[Kind, ...]) -> tuple[Kind, ...]:
         return tuple(replace(kind, name=text) for kind in given)

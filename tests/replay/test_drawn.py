@@ -1,4 +1,4 @@
-"""What a world of one's own says is drawn: objects, areas, events, colours, names."""
+"""The drawing that your own world declares: objects, areas, events, colours, names."""
 
 import dataclasses
 from pathlib import Path
@@ -11,7 +11,7 @@ from conevo.playback.drawn import Area, Drawn, Objects, Signal
 from conevo.replay.playback import playback_of
 from conevo.replay.trajectory import Trajectory
 from replay.epochs import epoch, renamed
-from replay.staging import opened, told, values
+from replay.staging import events_of, opened, values
 
 BALL = f"{Path(__file__).resolve().parents[2] / 'examples' / 'ball.py'}:near-1"
 SUBCLASS = """
@@ -55,7 +55,7 @@ def test_the_ball_and_its_goal_are_drawn():
     assert sensors.names == ("ball x", "ball y", "goal x", "goal y")
     action = values(found, "action")
     pushes = np.argwhere((action[1:] == 1) & (action[:-1] == 0)).tolist()
-    assert told(playback) == [(t + 1, f"robot {i}: begins to push", (i,)) for t, i in pushes]
+    assert events_of(playback) == [(t + 1, f"robot {i}: begins to push", (i,)) for t, i in pushes]
     assert len(pushes) > 0
 
 
@@ -128,7 +128,7 @@ def test_a_subclass_is_drawn_like_the_world_it_inherits(tmp_path):
         ({"unit": 3}, "drawn.unit: "),
     ],
 )
-def test_what_cannot_be_drawn_is_one_line(drawn, words):
+def test_a_wrong_drawing_is_one_line(drawn, words):
     with pytest.raises(UsageError) as error:
         playback_of(with_drawn(drawn))
     assert words in str(error.value)

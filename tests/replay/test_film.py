@@ -1,4 +1,4 @@
-"""Films: files are whole, readable and never in the way."""
+"""Films: files are complete and readable, and never replace others."""
 
 import os
 import shutil
@@ -45,7 +45,7 @@ def test_frames():
             film.frames_of(10, **wrong)
 
 
-def test_the_format_follows_wish_name_and_machine(monkeypatch):
+def test_the_format_follows_from_option_name_and_machine(monkeypatch):
     monkeypatch.setattr(film, "find_ffmpeg", lambda: "ffmpeg")
     assert film.choose_format(None) == "mp4"
     assert film.choose_format("a.GIF") == "gif"
@@ -66,7 +66,7 @@ def test_ffmpeg_of_the_machine_comes_first(monkeypatch, tmp_path):
     monkeypatch.setenv("PATH", str(tmp_path))
     assert film.find_ffmpeg() == str(own)
     own.unlink()
-    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)  # as if it was not installed
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)  # as if it were not installed
     assert film.find_ffmpeg() is None
 
 
@@ -77,9 +77,9 @@ def test_a_gif_read_again_shows_every_frame_for_its_time(tmp_path):
     path = tmp_path / "new" / "epoch.gif"
     painter = Painter([playback()], SIZE)
     frames = [0, 1, 1, GONE, GONE + 4, 39]
-    told = []
-    film.write_film(painter, path, frames, 20, lambda done, total: told.append((done, total)))
-    assert told == [(k, 6) for k in range(1, 7)]
+    progress = []
+    film.write_film(painter, path, frames, 20, lambda done, total: progress.append((done, total)))
+    assert progress == [(k, 6) for k in range(1, 7)]
     with Image.open(path) as gif:
         assert (gif.n_frames, gif.size, gif.info["loop"]) == (5, painter.size, 0)
         for k, t in enumerate(dict.fromkeys(frames)):
@@ -113,7 +113,7 @@ def test_colours_of_a_gif_do_not_flicker(tmp_path):
     assert near(colours["robot"].pop(), rgb(palette.ORANGE), by=3)
 
 
-def test_a_gif_is_no_faster_than_gifs_can_be(tmp_path):
+def test_a_gif_is_never_faster_than_the_format_allows(tmp_path):
     film.write_film(Painter([playback()], SIZE), tmp_path / "a.gif", [0, 1], fps=100)
     with Image.open(tmp_path / "a.gif") as gif:
         assert gif.info["duration"] == 20
@@ -123,7 +123,7 @@ def test_a_gif_is_no_faster_than_gifs_can_be(tmp_path):
 
 
 def decoded(path, size):
-    """Return the frames of a film [n, height, width, 3] and what ffmpeg says of it."""
+    """Return the frames of a film [n, height, width, 3] and ffmpeg's description of it."""
     ffmpeg = film.find_ffmpeg()
     command = [ffmpeg, "-hide_banner", "-i", str(path), "-f", "rawvideo", "-pix_fmt", "rgb24", "-"]
     done = subprocess.run(command, capture_output=True, check=True)
@@ -136,14 +136,14 @@ def test_an_mp4_read_again_shows_the_frames(tmp_path):
     path = tmp_path / "epoch.mp4"
     painter = Painter([playback()], SIZE)
     frames = film.frames_of(T, every=2)
-    told = []
-    film.write_film(painter, path, frames, 25, lambda done, total: told.append((done, total)))
-    assert told[-1] == (len(frames), len(frames))
-    shown, said = decoded(path, painter.size)
+    progress = []
+    film.write_film(painter, path, frames, 25, lambda done, total: progress.append((done, total)))
+    assert progress[-1] == (len(frames), len(frames))
+    shown, description = decoded(path, painter.size)
     assert len(shown) == len(frames)
-    assert "h264" in said
-    assert "yuv420p(tv, bt709" in said
-    assert "25 fps" in said
+    assert "h264" in description
+    assert "yuv420p(tv, bt709" in description
+    assert "25 fps" in description
     panel = Panel(playback(), SIZE, "action", alone=True)
     x0, _, x1, y1 = panel.world
     scale = (x1 - x0) / 10
@@ -165,7 +165,7 @@ def test_the_same_film_has_the_same_bytes(tmp_path):
 
 
 def failing(monkeypatch, tmp_path, script):
-    """Have another program in ffmpeg's place."""
+    """Replace ffmpeg by another program."""
     program = tmp_path / "bin" / "ffmpeg"
     program.parent.mkdir()
     program.write_text(f"#!/bin/sh\n{script}\n")
@@ -201,7 +201,7 @@ def test_an_interrupt_ends_ffmpeg_and_leaves_nothing(monkeypatch, tmp_path):
         deadline = time.monotonic() + 10
         while not list(path.parent.iterdir()) and time.monotonic() < deadline:
             time.sleep(0.01)
-        assert list(path.parent.iterdir())  # there is a draft
+        assert list(path.parent.iterdir())  # a draft exists
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
@@ -211,7 +211,7 @@ def test_an_interrupt_ends_ffmpeg_and_leaves_nothing(monkeypatch, tmp_path):
         os.kill(int((tmp_path / "pid").read_text()), signal.SIG_DFL)
 
 
-def test_without_ffmpeg_it_is_said_what_helps(monkeypatch, tmp_path):
+def test_without_ffmpeg_the_message_gives_advice(monkeypatch, tmp_path):
     monkeypatch.setattr(film, "find_ffmpeg", lambda: None)
     with pytest.raises(UsageError, match=r"conevo\[video\].*--gif"):
         film.write_film(Painter([playback()], SIZE), tmp_path / "a.mp4", [0])
@@ -228,7 +228,7 @@ def test_a_poster_is_the_frame(tmp_path):
 
 
 @pytest.mark.parametrize("ending", ["gif", "mp4", "png"])
-def test_nothing_is_written_over(monkeypatch, tmp_path, ending):
+def test_no_file_is_overwritten(monkeypatch, tmp_path, ending):
     monkeypatch.setattr(film, "find_ffmpeg", lambda: shutil.which("true"))
     path = tmp_path / f"a.{ending}"
     path.write_bytes(b"mine")

@@ -1,4 +1,4 @@
-"""Frames of films: what a picture shows, and that it depends on nothing but its number."""
+"""Frames of films: their contents, which depend on the number of the frame alone."""
 
 from dataclasses import replace
 from itertools import pairwise
@@ -33,7 +33,7 @@ def pixel(made, t, x, y, colour_by="action"):
 # --- the world ------------------------------------------------------------------------------------
 
 
-def test_robots_have_the_colour_of_what_they_do_where_they_are():
+def test_robots_have_the_colour_of_their_action_at_their_place():
     made = playback()
     assert pixel(made, 0, 3, 7) == rgb(palette.ORANGE)
     assert pixel(made, 35, 3, 7) == rgb(palette.FAINT)
@@ -47,7 +47,7 @@ def test_a_trail_of_120_positions_stays_behind():
     both = {"x": Channel.of(np.stack([x, x], axis=1)), "y": Channel.of(np.tile([2.0, 5.0], (t, 1)))}
     action = Channel.of(np.ones((t, 2), int))
     made = playback(iterations=t, action=action, things=(), plan=(), **both)
-    # One of these four rows of pixels, or two of them, hold the line, which fades.
+    # The line, which fades, is in one or two of these four rows of pixels.
     shown = np.asarray(world(made, t - 1))[190:194].mean(axis=0)
     for x, opacity in ((8.0, 0.5), (6.8, 0.375), (5.0, 0.25), (3.3, 0.125)):
         line = mixed(palette.BLUE, palette.GROUND, opacity / 4)
@@ -56,7 +56,7 @@ def test_a_trail_of_120_positions_stays_behind():
     assert pixel(made, 60, 7.5, 2) == rgb(palette.GROUND)
 
 
-def test_who_leaves_on_one_side_and_enters_on_the_other_draws_no_line_across():
+def test_a_robot_that_leaves_on_one_side_and_enters_on_the_other_draws_no_line():
     for name, low, high in (("x", 0.5, 9.5), ("y", 9.5, 0.5), ("x", 3.0, 7.5)):
         still, moves = np.full((T, 1), 5.0), np.where(np.arange(T)[:, None] < 20, low, high)
         places = {"x": Channel.of(still), "y": Channel.of(still), name: Channel.of(moves)}
@@ -68,7 +68,7 @@ def test_who_leaves_on_one_side_and_enters_on_the_other_draws_no_line_across():
         assert is_crossed == (abs(high - low) <= 5)
 
 
-def test_robots_have_the_colour_of_their_caste_if_wanted():
+def test_robots_have_the_colour_of_their_caste_on_request():
     assert pixel(playback(), 0, 3, 7, "caste") == rgb(palette.FAINT)
     assert pixel(playback(), 0, 2, 2, "caste") == rgb(palette.GREEN)
 
@@ -94,7 +94,7 @@ def test_a_ring_widens_where_something_was_detected(age):
     assert np.ptp(around[:, 1]) / 2 == pytest.approx(0.4 * 24 + 14 * (age + 1) / 15, abs=1.5)
 
 
-def test_what_stands_still_is_there_below_everything():
+def test_fixed_objects_are_drawn_below_everything():
     assert pixel(playback(), 0, 5, 0.2) == rgb("#ddccbb")
     assert pixel(playback(), 0, 9, 4) == rgb(palette.GROUND)
 
@@ -124,7 +124,7 @@ def test_headings_point_counter_clockwise_from_the_right():
         assert pixel(made, 0, x, y) == rgb(palette.ORANGE)
 
 
-def test_others_are_kites_of_their_own_colour():
+def test_other_bodies_are_kites_of_their_own_colour():
     others = (BodyKind("robot", 0.3), BodyKind("prey", 1.0, "square", palette.PURPLE))
     at = {name: Channel.of(np.full((T, 3), value)) for name, value in (("x", 5.0), ("y", 5.0))}
     made = playback(body_kinds=others, body=(0, 0, 1), rings=(), **at)
@@ -133,7 +133,7 @@ def test_others_are_kites_of_their_own_colour():
     assert pixel(made, 0, 5, 5) == rgb(palette.ORANGE)  # the team lies above, its first on top
 
 
-def test_what_is_held_lies_above_its_robot_with_a_rim():
+def test_carried_objects_are_drawn_above_their_robot_with_a_rim():
     things = Things(
         "objects",
         (Kind("A", palette.YELLOW),),
@@ -180,7 +180,7 @@ def test_the_timeline_shows_every_action_robots_ordered_by_caste():
     assert page.getpixel((12 + 160, second)) == rgb(palette.FAINT)
 
 
-def test_a_robot_that_switches_all_the_time_never_looks_like_one_that_does_not():
+def test_a_robot_that_always_switches_never_looks_like_one_that_does_not():
     action = np.stack([np.arange(T) % 2, np.ones(T, int)], axis=1)
     strip = Timeline(playback(action=Channel.of(action)), 32, SIZE)  # two iterations to a column
     page = Image.new("RGB", (32, strip.height), PAGE)
@@ -192,7 +192,7 @@ def test_a_robot_that_switches_all_the_time_never_looks_like_one_that_does_not()
         assert (switching == rgb(colour)).all(axis=-1).any(axis=0).all()
 
 
-def test_the_playhead_stands_where_time_is_and_what_is_to_come_is_pale():
+def test_the_playhead_is_at_the_current_time_and_the_future_is_pale():
     strip = Timeline(playback(), 212, SIZE)
     assert [strip.head(t) for t in (9, 19, 39)] == [61, 111, 210]
     page = Image.new("RGB", (220, strip.height), PAGE)
@@ -231,14 +231,14 @@ def test_numbers_move_with_time():
 
 
 @pytest.mark.parametrize("colour_by", ["action", "caste"])
-def test_a_frame_does_not_depend_on_those_before(colour_by):
+def test_a_frame_does_not_depend_on_previous_ones(colour_by):
     painter = Painter([playback(), playback(subtitle="MESP")], SIZE, colour_by)
     for t in (0, 30, GONE, 12, GONE - 1, 39, GONE + 3, 0, 21):
         fresh = Painter([playback(), playback(subtitle="MESP")], SIZE, colour_by)
         assert painter.frame(t).tobytes() == fresh.frame(t).tobytes()
 
 
-def test_two_teams_stand_side_by_side_each_under_its_name():
+def test_two_teams_are_side_by_side_each_under_its_name():
     other = playback(x=Channel.of(np.full((T, 2), 8.0)), subtitle="MESP")
     painter = Painter([playback(), other], SIZE)
     panel = Panel(playback(), SIZE, "action", alone=False)
@@ -266,7 +266,7 @@ def test_a_shorter_epoch_stays_at_its_end():
 
 
 @pytest.mark.parametrize("radius", [5.0, 40.0])
-def test_shapes_are_where_they_are_said_to_be_and_as_large(radius):
+def test_shapes_have_the_given_places_and_sizes(radius):
     for x in (50.0, 50.25, 51.5, 53.75):
         image = Image.new("RGB", (110, 100))
         Mask(image, (x - radius, 50 - radius, x + radius, 50 + radius)).disc(x, 50, radius).paint(
@@ -312,7 +312,7 @@ def test_a_single_iteration_and_a_hostile_range_can_be_drawn():
 
 
 @pytest.mark.parametrize(
-    ("call", "said"),
+    ("call", "message"),
     [
         (lambda: Painter([]), "one or two teams"),
         (lambda: Painter([playback()] * 3), "one or two teams"),
@@ -322,6 +322,6 @@ def test_a_single_iteration_and_a_hostile_range_can_be_drawn():
         (lambda: Painter([playback()], SIZE).frame(-1), "no iteration -1"),
     ],
 )
-def test_what_cannot_be_painted_is_said(call, said):
-    with pytest.raises(UsageError, match=said):
+def test_a_wrong_picture_is_refused(call, message):
+    with pytest.raises(UsageError, match=message):
         call()

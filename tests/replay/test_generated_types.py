@@ -13,7 +13,7 @@ def made():
     return runpy.run_path(str(VIEWER / "make_playback.py"))
 
 
-def test_they_are_what_the_script_writes(made):
+def test_they_equal_the_output_of_the_script(made):
     assert (VIEWER / "replay" / "playback.ts").read_text("utf-8") == made["text"]()
 
 

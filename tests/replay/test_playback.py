@@ -1,4 +1,4 @@
-"""Playbacks: what they say of an epoch is what happened in it, in all worlds."""
+"""Playbacks show the events of an epoch as they happened, in all worlds."""
 
 import dataclasses
 import json
@@ -34,7 +34,7 @@ GACC, LIGHT = TASKS[3], TASKS[4]
 
 @pytest.mark.parametrize("task", TASKS)
 @pytest.mark.parametrize("is_heuristic", [False, True])
-def test_a_playback_shows_what_was_recorded(task, is_heuristic):
+def test_a_playback_shows_the_record(task, is_heuristic):
     trajectory = epoch(task, is_heuristic=is_heuristic)
     about, playback = trajectory.about, playback_of(trajectory)
     t, r = about["iterations"], about["n_robots"]
@@ -112,7 +112,7 @@ def test_words():
     assert "favourite settings" not in dict(old.facts)
     assert {(robot.favourite, robot.share) for robot in old.robots} == {("", 0.0)}
     assert (facts["run"], facts["method"], facts["seed"]) == ("here", "Multi-Agent ESP", "4")
-    assert facts["hidden neurons"] == "10 to 11"  # one has a hole among its neurons
+    assert facts["hidden neurons"] == "10 to 11"  # one has an empty slot among its neurons
     mean = np.mean(epoch(TASKS[0]).about["fitness"])
     assert facts["team fitness (mean)"] == number(mean)
     caste, n = Counter(epoch(TASKS[0]).about["labels"]).most_common(1)[0]
@@ -131,7 +131,7 @@ def test_words():
 
 # --- colours --------------------------------------------------------------------------------------
 
-# Machado, Oliveira and Fernandes 2009: colours as people without one kind of cones see them.
+# Machado, Oliveira and Fernandes 2009: colours as seen by people who lack one kind of cones.
 VISION = {
     "all cones": np.eye(3),
     "no long": [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216],
@@ -163,8 +163,8 @@ def closest(colours, vision):
 
 
 @pytest.mark.parametrize("vision", VISION)
-def test_colours_can_be_told_apart_by_everybody(vision):
-    """2.3 can just be told apart; a palette of ten has no room for much more than 11."""
+def test_colours_are_distinct_for_everybody(vision):
+    """A difference of 2.3 is just noticeable; much more than 11 is impossible with ten colours."""
     rovers = [*rover.ACTIONS.values(), palette.FAINT]
     assert closest(rovers, vision) > 22
     assert closest([*pursuit.ACTIONS.values(), palette.FAINT], vision) > 22
@@ -182,7 +182,7 @@ def test_colours_can_be_told_apart_by_everybody(vision):
         assert closest([kind.colour for kind in kinds], vision) > 11
 
 
-def test_lightness_tells_what_is_done_and_hue_for_which_type():
+def test_lightness_shows_the_kind_of_action_and_hue_the_type():
     colours = list(gacc.CASTES.values())
     verbs = (colours[:3], colours[3:6], colours[6:])  # to detect, gather, construct
     lightness = [[lab([c], "all cones")[0, 0] for c in verb] for verb in verbs]
@@ -199,7 +199,7 @@ def bearing(group, k):
     return group.angles[k] % (2 * math.pi)
 
 
-def test_octants_are_where_the_world_has_them():
+def test_octants_agree_with_the_world():
     for group in (
         playback_of(epoch(TASKS[0])).sensor_groups + playback_of(epoch(GACC)).sensor_groups[:3]
     ):
@@ -215,7 +215,7 @@ def test_octants_are_where_the_world_has_them():
 
 
 @pytest.mark.parametrize(("task", "group"), [(TASKS[0], 0), (GACC, 1)])
-def test_a_robot_that_is_sensed_stands_in_the_wedge(task, group):
+def test_a_sensed_robot_is_in_the_wedge(task, group):
     playback = playback_of(played(task.partition("/")[0]))
     g = playback.sensor_groups[group]
     at = np.stack([playback.x.values, playback.y.values], axis=-1)
@@ -223,17 +223,17 @@ def test_a_robot_that_is_sensed_stands_in_the_wedge(task, group):
     seen = np.argwhere(sensed > 1e-3)
     assert len(seen) > 20
     for t, i, k in seen[:200].tolist():
-        way = np.delete(at[t], i, axis=0) - at[t, i]  # where all were an iteration before
+        way = np.delete(at[t], i, axis=0) - at[t, i]  # places in the previous iteration
         off = np.angle(np.exp(1j * (np.arctan2(way[:, 1], way[:, 0]) - g.angles[k])))
         inside = (np.hypot(*way.T) < g.reach + 1e-3) & (np.abs(off) < g.half + 1e-2)
         assert inside.any()
 
 
-def test_khepera_sensors_are_the_kernels():
+def test_khepera_sensors_are_those_of_the_kernels():
     assert float(khepera.RADIUS) == pursuit.RADIUS
     infrared, light = playback_of(epoch("pursuit/team-7")).sensor_groups
     for k in range(8):
-        m, side = (k, 1) if k < 4 else (7 - k, -1)  # those on the right mirror those on the left
+        m, side = (k, 1) if k < 4 else (7 - k, -1)  # sensors on the right mirror those on the left
         way = khepera.LOOK_X[m], side * khepera.LOOK_Y[m]
         assert (math.cos(light.angles[k]), math.sin(light.angles[k])) == pytest.approx(way)
     assert infrared.angles == light.angles
@@ -293,7 +293,7 @@ def test_a_world_that_cannot_be_drawn(missing):
     assert "Simulation.recorded" in text
 
 
-def test_a_world_of_any_size_with_castes_of_its_own():
+def test_a_world_of_any_size_with_its_own_castes():
     trajectory = epoch(LIGHT)
     x = np.linspace(-3, 17, 600).reshape(200, 3)
     other = changed(trajectory, x=x, heading=x, energy=x)

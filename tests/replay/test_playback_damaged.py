@@ -1,4 +1,4 @@
-"""Playbacks of damaged and hostile trajectories: whole or refused in one clear line."""
+"""Playbacks of damaged and hostile trajectories: complete or refused in one clear line."""
 
 import json
 import math
@@ -22,7 +22,7 @@ from replay.staging import changed, opened, parts_of, values
 GACC, LIGHT = TASKS[3], TASKS[4]
 
 
-# --- what is damaged ------------------------------------------------------------------------------
+# --- damaged files --------------------------------------------------------------------------------
 
 
 def refused(trajectory, match=None):
@@ -83,13 +83,13 @@ def at(trajectory, name, index, value):
         (GACC, "scene_object_type", 0, 3, "scene/object_type is"),
     ],
 )
-def test_numbers_that_cannot_be(task, name, index, value, match):
+def test_impossible_numbers_are_refused(task, name, index, value, match):
     trajectory = epoch(task)
     refused(changed(trajectory, **at(trajectory, name, index, value)), match)
 
 
 @pytest.mark.parametrize(("low", "step"), [(1e308, 1.0), (0.0, 1e300), (math.nan, 0.0), (0, 2**60)])
-def test_values_that_nobody_can_draw(low, step):
+def test_values_that_cannot_be_drawn_are_refused(low, step):
     for name in ("x", "sensors"):
         odd = replace(epoch(TASKS[0]).channels[name], low=low, step=step)
         refused(changed(epoch(TASKS[0]), **{name: odd}), f"{name}|not a finite number")
@@ -104,7 +104,7 @@ def test_a_hostile_name_stays_in_its_line():
         assert len(text) < 500
 
 
-def test_parts_in_another_order_than_the_plan():
+def test_parts_in_another_order_than_planned_are_refused():
     """The first complex object begins with a B (BAABAABAAB); object 19 is a C."""
     part = np.full((200, 20), -1)
     part[5:, 19] = 0
@@ -112,7 +112,7 @@ def test_parts_in_another_order_than_the_plan():
     refused(wrong, "complex object 1 is not built as it was planned")
 
 
-def test_parts_that_are_not_in_the_plan():
+def test_parts_that_are_not_planned_are_refused():
     """The plan without an order has one A; here two are built in."""
     trajectory = epoch("gacc/complex-1")
     part = np.full((200, 10), -1)
@@ -150,12 +150,12 @@ def test_parts_that_are_not_in_the_plan():
         (LIGHT, {"actions": ["rest", "rest"]}, None),
     ],
 )
-def test_words_that_cannot_be(task, about, match):
+def test_impossible_texts_are_refused(task, about, match):
     refused(renamed(epoch(task), **about), match)
 
 
 @pytest.mark.parametrize("value", [None, "0.05", True, -0.1, math.nan, math.inf, []])
-def test_parameters_that_cannot_be(value):
+def test_impossible_parameters_are_refused(value):
     trajectory = epoch(TASKS[0])
     params = trajectory.about["params"] | {"hi_range": value}
     refused(renamed(trajectory, params=params), "hi_range|not a finite number")
@@ -167,7 +167,7 @@ STRANGE = st.sampled_from([0.0, 1.0, -1.0, 0.5, 1e-9, 1e18, 1e308, -1e308, math.
 
 @st.composite
 def damage(draw, channel):
-    """Another channel: reshaped, cut, turned, with other numbers, or none at all."""
+    """Return a damaged channel: reshaped, cut, turned, with other numbers, or removed."""
     codes = channel.codes
     how = draw(st.sampled_from(["none", "cut", "turn", "flat", "one", "all", "scale", "empty"]))
     if how == "none":
@@ -194,7 +194,7 @@ def damage(draw, channel):
 @pytest.mark.parametrize("task", TASKS)
 @settings(max_examples=80, deadline=None)
 @given(data=st.data())
-def test_whatever_is_damaged_a_playback_is_whole_or_refused(task, data):
+def test_with_any_damage_a_playback_is_complete_or_refused(task, data):
     trajectory = epoch(task, 40)
     name = data.draw(st.sampled_from(sorted(trajectory.channels)))
     odd = data.draw(damage(trajectory.channels[name]))
@@ -202,7 +202,7 @@ def test_whatever_is_damaged_a_playback_is_whole_or_refused(task, data):
     if odd is None:
         del channels[name]
     with np.errstate(all="ignore"):
-        assert_whole_or_refused(replace(trajectory, channels=channels))
+        assert_complete_or_refused(replace(trajectory, channels=channels))
 
 
 ABOUT = st.one_of(
@@ -215,7 +215,7 @@ ABOUT = st.one_of(
 @pytest.mark.parametrize("task", TASKS)
 @settings(max_examples=80, deadline=None)
 @given(data=st.data())
-def test_whatever_is_said_a_playback_is_whole_or_refused(task, data):
+def test_with_any_description_a_playback_is_complete_or_refused(task, data):
     trajectory = epoch(task, 40)
     key = data.draw(st.sampled_from(sorted(trajectory.about)))
     if key == "params" and data.draw(st.booleans()):
@@ -224,11 +224,11 @@ def test_whatever_is_said_a_playback_is_whole_or_refused(task, data):
     else:
         value = data.draw(ABOUT)
     assume(not (key == "world" and value == ""))
-    assert_whole_or_refused(renamed(trajectory, **{key: value}))
+    assert_complete_or_refused(renamed(trajectory, **{key: value}))
 
 
-def assert_whole_or_refused(trajectory):
-    """All numbers are finite, all indices in range: told without the code that checks it."""
+def assert_complete_or_refused(trajectory):
+    """Assert that all numbers are finite and indices in range, without the package's own checks."""
     refusal = ""
     try:
         playback = opened(trajectory)
@@ -284,7 +284,7 @@ def test_a_playback_that_does_not_fit_together_is_refused(what):
         checked(replace(playback, **WRONG[what](playback)))
 
 
-def test_too_many_events_the_rarest_stay(monkeypatch):
+def test_of_too_many_events_the_rarest_stay(monkeypatch):
     monkeypatch.setattr(check, "MOST_EVENTS", 10)
     playback = replace(playback_of(epoch(GACC)), events=())
     often = [Event(t, 0, f"often {t}") for t in range(20)]

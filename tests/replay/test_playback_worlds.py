@@ -1,4 +1,4 @@
-"""Playbacks of each world: detections, captures, objects built in, told and counted right."""
+"""Playbacks of each world: detections, captures and deliveries, described and counted correctly."""
 
 import math
 from collections import Counter
@@ -15,7 +15,7 @@ from conevo.worlds.rollout import Rollout
 from conevo.worlds.rover import rocks
 from replay.epochs import TASKS, epoch
 from replay.eventful import played
-from replay.staging import changed, told, values
+from replay.staging import changed, events_of, values
 from worlds.gathering import IDLE, gathering
 
 GACC, LIGHT = TASKS[3], TASKS[4]
@@ -81,7 +81,7 @@ def test_words_for_detections():
     value[70:, 1] += 8.0
     value[70:, [2, 9]] += 16
     playback = playback_of(changed(trajectory, detected=never, value=value))
-    assert told(playback) == [
+    assert events_of(playback) == [
         (60, "A, A, C by rovers 3 and 7", (3, 7)),
         (70, "8 B by rovers 1, 2 and 9", (1, 2, 9)),
         (199, "D", ()),
@@ -111,7 +111,7 @@ def test_rover_surroundings():
 
 
 @pytest.mark.parametrize("task", ["pursuit", "pursuit/team-7", "prey/shaping-3"])
-def test_who_is_in_the_arena(task):
+def test_bodies_in_the_arena(task):
     trajectory = played(task) if task == "pursuit" else epoch(task)
     playback = playback_of(trajectory)
     n, r = int(values(trajectory, "scene/n_bodies")), trajectory.about["n_robots"]
@@ -137,7 +137,7 @@ def test_captures():
     playback = playback_of(trajectory)
     captured = values(trajectory, "captured")[:, 0]
     performance = trajectory.about["performance"]
-    begins, ends = told(playback, "capture begins"), told(playback, "capture ends")
+    begins, ends = events_of(playback, "capture begins"), events_of(playback, "capture ends")
     assert len(begins) == performance["captures"] > 1
     assert begins[0][0] == performance["first_capture"]
     assert len(begins) - len(ends) == captured[-1]
@@ -162,11 +162,11 @@ def test_words_for_captures_and_collisions():
     trajectory = epoch("pursuit/team-7")  # three predators, two prey
     x, y = (values(trajectory, name).copy() for name in "xy")
     captured, collided = np.zeros((200, 2), int), np.zeros((200, 5), int)
-    x[:, :], y[:, :] = [10, 30, 60, 20, 80], 50  # predator 2 is off by 27.5 - 7.5 from prey 1
+    x[:, :], y[:, :] = [10, 30, 60, 20, 80], 50  # predator 2 is 27.5 - 7.5 from prey 1
     captured[3:6, 0] = captured[9:, 1] = 1
     collided[0:4, 1] = collided[7, 1] = collided[8, 2] = collided[5:, 4] = 1
     playback = playback_of(changed(trajectory, x=x, y=y, captured=captured, collided=collided))
-    assert told(playback) == [
+    assert events_of(playback) == [
         (0, "predator 1 collides", (1,)),
         (3, "prey 0 is captured by predators 0 and 1", (0, 1)),
         (6, "prey 0 is free again after 3 iterations (0.3 s)", ()),
@@ -189,7 +189,7 @@ def test_in_light_range_is_from_rim_to_rim(gap, is_near):
     x[:, 1:3] = 10 + 5.5 + gap + 12
     y[:, 2] = 60
     playback = playback_of(changed(trajectory, x=x, y=y, captured=captured))
-    (begin,) = told(playback, "capture begins")
+    (begin,) = events_of(playback, "capture begins")
     assert begin[2] == ((0, 1, 2) if is_near else (1, 2))
 
 
@@ -198,7 +198,7 @@ def test_a_capture_that_lasts_one_iteration():
     captured[0, 1] = 1
     playback = playback_of(changed(epoch("pursuit/team-7"), captured=captured))
     ends = [(1, "prey 1 is free again after 1 iteration (0.1 s)", ())]
-    assert told(playback, "capture ends") == ends
+    assert events_of(playback, "capture ends") == ends
 
 
 @pytest.mark.parametrize("seed", [3, 4, 5])
@@ -221,7 +221,7 @@ def test_the_path_and_the_end_of_prey(seed):
 
 
 class Scene:
-    """A world in which every scenario is the one that was made by hand."""
+    """A world with a single scenario, made by hand."""
 
     def __init__(self, world, scenarios):
         self._world, self._scenarios = world, scenarios
@@ -234,7 +234,7 @@ class Scene:
 
 
 def staged(*args, **how):
-    """The playback of a gathering by hand."""
+    """The playback of a gathering epoch made by hand."""
     a_world, (genes, slots, scenarios, heuristic), _ = gathering(*args, **how)
     rollout = Rollout(Scene(a_world, scenarios), n_threads=1)
     about, channels = record_epoch(rollout, genes, slots, 7, heuristic)
@@ -245,14 +245,14 @@ EAST = (0.0055, 0.0)
 
 
 def test_carried_home_and_built_in():
-    """Robot 0 grips outside and carries the object over the border; robot 1 comes and helps."""
+    """Robot 0 grips an object outside and carries it home; robot 1 comes and helps."""
     playback = staged(
         [(0.385, 0.5, ["grip A", EAST]), (0.425, 0.5, IDLE)],
         [(0.39, 0.5, "A")],
         ["AB"],
         iterations=7,
     )
-    assert told(playback) == [
+    assert events_of(playback) == [
         (0, "robot 0 grips A", (0,)),
         (3, "robot 0 is home with A and waits for help", (0,)),
         (5, "A is part 1 of complex object 1, by robots 0 and 1", (0, 1)),
@@ -267,9 +267,9 @@ def test_carried_home_and_built_in():
 AROUND = [(0.5 + 0.01 * math.cos(a), 0.5 + 0.01 * math.sin(a), IDLE) for a in range(6)]
 
 
-def test_waited_for_in_vain():
+def test_waiting_without_help():
     playback = staged(AROUND[:3], [(0.5, 0.5, "C")], ["C"], iterations=8)
-    assert told(playback) == [
+    assert events_of(playback) == [
         (0, "robots 0, 1 and 2 grip C in the home area", (0, 1, 2)),
         *((5, f"robot {i} lets go of C after waiting for 5 iterations", (i,)) for i in range(3)),
     ]
@@ -277,10 +277,10 @@ def test_waited_for_in_vain():
 
 
 def test_help_comes_one_after_the_other():
-    """Robot 1 is three iterations away; robot 0 gives up before anybody else comes."""
+    """Robot 1 is three iterations away; robot 0 gives up before any other robot comes."""
     robots = [(0.5, 0.5, IDLE), (0.508, 0.47, IDLE)]
     playback = staged(robots, [(0.5, 0.515, "B")], ["B"], iterations=14)
-    assert told(playback) == [
+    assert events_of(playback) == [
         (0, "robot 0 grips B in the home area", (0,)),
         (3, "robot 1 helps robot 0 with B", (1,)),
         (5, "robot 0 lets go of B after waiting for 5 iterations", (0,)),
@@ -294,10 +294,10 @@ def test_help_comes_one_after_the_other():
     ]
 
 
-def test_what_is_not_needed_now_is_let_go():
+def test_an_object_that_is_not_needed_is_let_go():
     robots = [(0.5, 0.5, IDLE), (0.508, 0.47, IDLE)]
     playback = staged(robots, [(0.5, 0.515, "A")], ["BA"], iterations=5)
-    assert told(playback) == [
+    assert events_of(playback) == [
         (0, "robot 0 grips A in the home area", (0,)),
         (3, "robot 0 lets go of A, which is not needed now", (0,)),
     ]
@@ -306,15 +306,15 @@ def test_what_is_not_needed_now_is_let_go():
 def test_a_grip_outside_with_another_setting_lets_go_without_a_reason():
     robots = [(0.2, 0.2, ["grip B", EAST, "grip C"]), (0.8, 0.2, IDLE)]
     playback = staged(robots, [(0.205, 0.2, "B")], ["B"], iterations=4)
-    assert told(playback) == [(0, "robot 0 grips B", (0,)), (2, "robot 0 lets go of B", (0,))]
+    assert events_of(playback) == [(0, "robot 0 grips B", (0,)), (2, "robot 0 lets go of B", (0,))]
     assert (playback.held.values[:, 0] >= 0).tolist() == [True, True, False, False]
 
 
 def test_objects_built_in_at_once_have_their_own_builders():
-    """Both pairs grip an A in the first iteration; all four are paid for it."""
+    """Both pairs grip an A in the first iteration; all four robots are rewarded."""
     robots = [(0.45, 0.49, IDLE), (0.55, 0.49, IDLE), (0.45, 0.51, IDLE), (0.55, 0.51, IDLE)]
     playback = staged(robots, [(0.45, 0.5, "A"), (0.55, 0.5, "A")], ["AA"], iterations=3)
-    assert told(playback) == [
+    assert events_of(playback) == [
         (0, "A is part 1 of complex object 1, by robots 0 and 2", (0, 2)),
         (0, "A is part 2 of complex object 1, by robots 1 and 3", (1, 3)),
     ]
@@ -324,7 +324,7 @@ def test_objects_of_two_types_built_in_at_once():
     robots = [(0.45, 0.49, IDLE), (0.45, 0.51, IDLE)]
     robots += [(0.55, 0.49, IDLE), (0.55, 0.51, IDLE), (0.56, 0.5, IDLE)]
     playback = staged(robots, [(0.45, 0.5, "A"), (0.55, 0.5, "B")], ["AB"], iterations=3)
-    assert told(playback) == [
+    assert events_of(playback) == [
         (0, "A is part 1 of complex object 1, by robots 0 and 1", (0, 1)),
         (0, "B is part 2 of complex object 1, by robots 2, 3 and 4", (2, 3, 4)),
     ]
@@ -335,19 +335,19 @@ def test_the_last_part_completes():
     objects = [(0.5, 0.5015 + 0.0015 * k, "A") for k in range(10)]
     playback = staged(robots, objects, ["A" * 10], iterations=12)
     assert playback.plan[0].built == tuple(range(10))
-    assert told(playback, "completion") == [(9, "complex object 1 is complete", (0, 1))]
+    assert events_of(playback, "completion") == [(9, "complex object 1 is complete", (0, 1))]
     demand = playback.gauges[0]
     assert (demand.name, demand.most) == ("demand A", 1.0)
     assert demand.values.values[1] == pytest.approx(1 / 8, abs=1e-4)
 
 
-def test_what_has_no_order_is_shown_as_it_came():
+def test_without_an_order_parts_are_shown_as_delivered():
     robots = [(0.5, 0.49, IDLE), (0.5, 0.51, IDLE)]
     two = [(0.505, 0.5, "A"), (0.515, 0.5, "A")]
     playback = staged(robots, two, ["CABAB"], ordered="d", iterations=4)
     (row,) = playback.plan
     assert not row.is_ordered
-    assert row.parts == (0, 0, 1, 1, *[2] * 6)  # what is left in the order of types
+    assert row.parts == (0, 0, 1, 1, *[2] * 6)  # the rest in the order of types
     assert row.built == (0, 1, *[4] * 8)
 
 
@@ -361,11 +361,11 @@ def test_gathering_adds_up(seed):
     assert measure.values.values[-1] == performance["delivered"]
     built = [when for row in playback.plan for when in row.built if when < t]
     assert len(built) == performance["delivered"]
-    assert sorted(built) == [when for when, _, _ in told(playback, "delivery")]
-    assert len(told(playback, "completion")) == performance["completed"]
+    assert sorted(built) == [when for when, _, _ in events_of(playback, "delivery")]
+    assert len(events_of(playback, "completion")) == performance["completed"]
     kinds = [kind for row in playback.plan for kind in row.parts]
     assert sorted(kinds) == sorted(plan("complex-5").parts.ravel())
-    paid = Counter(i for _, _, robots in told(playback, "delivery") for i in robots)
+    paid = Counter(i for _, _, robots in events_of(playback, "delivery") for i in robots)
     fitness = trajectory.about["fitness"]
     assert [paid[i] for i in range(len(fitness))] == fitness
     things = playback.things[0]
@@ -376,18 +376,23 @@ def test_gathering_adds_up(seed):
     assert [gauge.most for gauge in playback.gauges] == [1.0] * 3
 
 
-def test_who_grips_and_lets_go_is_told_of_every_change():
+def test_every_grip_and_release_is_an_event():
     trajectory = played("gacc", 3, 400)
     playback, held = playback_of(trajectory), values(trajectory, "held")
     before = np.vstack([np.full_like(held[:1], -1), held[:-1]])
     grips = {(t, i) for t, i in np.argwhere((held >= 0) & (held != before)).tolist()}
-    told_grips = {
-        (t, i) for kind in ("grip", "help") for t, _, robots in told(playback, kind) for i in robots
+    shown_grips = {
+        (t, i)
+        for kind in ("grip", "help")
+        for t, _, robots in events_of(playback, kind)
+        for i in robots
     }
-    assert told_grips == grips
+    assert shown_grips == grips
     gone = {(t, i) for t, i in np.argwhere((before >= 0) & (held != before)).tolist()}
-    built = {(t, i) for t, _, robots in told(playback, "delivery") for i in robots}
-    assert {(t, i) for t, _, robots in told(playback, "let go") for i in robots} == gone - built
+    built = {(t, i) for t, _, robots in events_of(playback, "delivery") for i in robots}
+    assert {
+        (t, i) for t, _, robots in events_of(playback, "let go") for i in robots
+    } == gone - built
 
 
 def test_gathering_surroundings():
@@ -411,7 +416,7 @@ def test_gathering_surroundings():
     assert playback.output_names[5] == "grip A"
 
 
-def test_home_is_sensed_where_it_is():
+def test_home_is_sensed_in_its_direction():
     playback = playback_of(epoch(GACC))
     group = playback.sensor_groups[2]
     at = np.stack([playback.x.values, playback.y.values], axis=-1)[:-1]

@@ -1,4 +1,4 @@
-"""Recording the team of a run: which team, which scenario, and what is refused."""
+"""Recording the team of a run: which team, which scenario, and refusals."""
 
 import numpy as np
 import pytest
@@ -27,7 +27,7 @@ def evolved(path, task, method, **more):
     return conevo.evolve(task, method, "smoke", seed=2, out=path, overrides=settings, threads=1)
 
 
-def test_the_champion_does_what_it_did_in_the_testing_phase(run):
+def test_the_champion_repeats_its_testing_phase(run):
     """Epoch k is the k-th scenario of the run's own test, and the numbers are the same."""
     tested = run.test_result["champion"]["performance"]
     for k in range(2):
@@ -47,25 +47,25 @@ def test_recording_changes_nothing(run):
     assert first.to_bytes() == again.to_bytes()
 
 
-def test_a_generation_that_was_kept_is_recorded(run):
+def test_a_stored_generation_is_recorded(run):
     found = record(run, generation=0, threads=1)
     assert found.about["generation"] == 0
     tested = run.test_result["generation_0"]["performance"]
     assert found.about["performance"]["value"] == tested["value"]["values"][0]
 
 
-def test_a_generation_that_was_not_kept_is_evolved_again(run, folder):
+def test_a_generation_that_was_not_stored_is_evolved_again(run, folder):
     kept = {g: run.team(g) for g in range(4)}
     for generation in (1, 3):
         (run.path / "teams" / f"generation-{generation:04d}.npz").rename(
             folder / f"kept-{generation}.npz"
         )
-    told = []
+    progress = []
     try:
         lab = Lab.equip(run.config, 1, "cpu")
         for generation in (1, 3):
             assert run.team(generation) is None
-            found = run.team_again(generation, lab, lambda *at: told.append(at))
+            found = run.team_again(generation, lab, lambda *at: progress.append(at))
             assert found.genes.tobytes() == kept[generation].genes.tobytes()
             assert np.array_equal(found.fitness, kept[generation].fitness)
     finally:
@@ -73,10 +73,10 @@ def test_a_generation_that_was_not_kept_is_evolved_again(run, folder):
             (folder / f"kept-{generation}.npz").rename(
                 run.path / "teams" / f"generation-{generation:04d}.npz"
             )
-    assert told == [(1, 2), (2, 2), (1, 4), (2, 4), (3, 4), (4, 4)]
+    assert progress == [(1, 2), (2, 2), (1, 4), (2, 4), (3, 4), (4, 4)]
 
 
-def test_a_log_that_says_otherwise_is_noticed(folder):
+def test_a_different_log_is_noticed(folder):
     changed = evolved(folder / "changed", "rover/complex-1", "hetcne")
     lost = next(g for g in range(4) if g != changed.champion.generation)
     (changed.path / "teams" / f"generation-{lost:04d}.npz").unlink()
@@ -88,7 +88,7 @@ def test_a_log_that_says_otherwise_is_noticed(folder):
         record(changed, generation=lost, threads=1)
 
 
-def test_no_such_generation_is_refused(run):
+def test_a_missing_generation_is_refused(run):
     with pytest.raises(UsageError, match=r"no generation 4 \(it has 0 to 3\)"):
         record(run, generation=4)
 

@@ -1,4 +1,4 @@
-"""A recording as a DataFrame, and as what a notebook displays of it."""
+"""A recording as a DataFrame, and its display in a notebook."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def test_a_frame_has_a_row_for_every_robot_in_every_iteration(recording: Traject
         assert row[f"performance.{name}"] == values[f"performance/{name}"][t]
 
 
-def test_an_action_that_was_not_is_missing(recording: Trajectory) -> None:
+def test_an_iteration_without_an_action_has_a_missing_value(recording: Trajectory) -> None:
     pytest.importorskip("pandas")
     actions = np.zeros((recording.about["iterations"], recording.about["n_robots"]), np.int64)
     actions[0] = -1

@@ -1,4 +1,4 @@
-"""Trajectories: what was recorded is what happened, and a file is whole or refused."""
+"""Trajectories agree with the kernels, and their files are complete or refused."""
 
 import io
 import json
@@ -29,7 +29,7 @@ def test_whole_numbers_are_kept_exactly(numbers):
 
 
 @given(st.lists(st.floats(-1e6, 1e6), min_size=1, max_size=20), st.sampled_from([8, 16]))
-def test_others_are_off_by_half_a_step_at_most(numbers, bits):
+def test_other_numbers_are_off_by_half_a_step_at_most(numbers, bits):
     kept = Channel.of(np.array(numbers), bits)
     span = max(numbers) - min(numbers)
     assert kept.codes.dtype.itemsize * 8 == bits
@@ -37,13 +37,13 @@ def test_others_are_off_by_half_a_step_at_most(numbers, bits):
     assert kept.values.min() == min(numbers)
 
 
-def test_a_constant_and_nothing_at_all_can_be_kept():
+def test_a_constant_and_an_empty_channel_can_be_stored():
     assert Channel.of(np.full(3, 2.5)).values.tolist() == [2.5] * 3
     assert Channel.of(np.zeros((4, 0))).values.shape == (4, 0)
 
 
 @pytest.mark.parametrize("numbers", [[np.nan], [0.0, np.inf]])
-def test_what_is_not_finite_cannot_be_kept(numbers):
+def test_values_that_are_not_finite_are_refused(numbers):
     with pytest.raises(ValueError, match="finite"):
         Channel.of(np.array(numbers))
 
@@ -52,7 +52,7 @@ def test_what_is_not_finite_cannot_be_kept(numbers):
 
 
 @pytest.mark.parametrize("task", TASKS)
-def test_a_trajectory_is_what_the_kernels_did(task):
+def test_a_trajectory_agrees_with_the_kernels(task):
     a_world = world(task, iterations=60)
     rollout = Rollout(a_world, n_threads=1)
     genes, team = random_team(a_world)
@@ -96,7 +96,7 @@ def test_a_trajectory_is_what_the_kernels_did(task):
 
 @pytest.mark.parametrize("task", TASKS)
 def test_hidden_activations_are_those_of_a_network(task):
-    """They follow from sensors and the activations before, and outputs from them, in float64."""
+    """They follow from sensors and previous activations, and outputs from them, in float64."""
     a_world = world(task, iterations=60)
     genes, team = random_team(a_world)
     rollout = Rollout(a_world, n_threads=1)
@@ -132,7 +132,7 @@ def test_heuristic_robots_have_no_activations():
 
 
 @pytest.mark.parametrize("task", TASKS)
-def test_a_file_comes_back_as_it_was(task, tmp_path):
+def test_a_file_is_read_as_it_was_written(task, tmp_path):
     found = epoch(task)
     path = tmp_path / "deep" / "epoch.npz"
     found.save(path)
@@ -143,7 +143,7 @@ def test_a_file_comes_back_as_it_was(task, tmp_path):
     for name, kept in found.channels.items():
         assert np.array_equal(again.channels[name].values, kept.values), name
     assert again.to_bytes() == path.read_bytes()
-    found.save(path)  # the same bytes are no other file
+    found.save(path)  # the same bytes do not count as another file
 
 
 def test_numpy_alone_reads_a_file(tmp_path):
@@ -181,8 +181,8 @@ def refused(path, data):
 
 @settings(max_examples=80, deadline=None)
 @given(st.data())
-def test_a_damaged_file_is_refused_or_the_same(tmp_path_factory, data):
-    """One flipped bit, or an end that is missing."""
+def test_a_damaged_file_is_refused_or_has_the_same_content(tmp_path_factory, data):
+    """One flipped bit, or a missing end."""
     good = epoch("pursuit/team-7", 40).to_bytes()
     path = tmp_path_factory.mktemp("torn") / "epoch.npz"
     if data.draw(st.booleans()):
@@ -196,7 +196,7 @@ def test_a_damaged_file_is_refused_or_the_same(tmp_path_factory, data):
         found = Trajectory.load(path)
     except UsageError as error:
         assert "\n" not in str(error)  # noqa: PT017 (either way is right)
-    else:  # a bit of the archive's own book-keeping, such as a date
+    else:  # a bit of the archive's own records, such as a date
         assert found.to_bytes() == good
 
 
@@ -271,7 +271,7 @@ def test_a_channel_without_sense_is_refused(kept, tmp_path):
     refused(tmp_path / "bad.npz", changed(found, about={"channels": channels | {"x": kept}}))
 
 
-def test_a_header_cannot_ask_for_more_than_the_file_has(tmp_path):
+def test_a_header_cannot_declare_more_than_the_file_has(tmp_path):
     out = io.BytesIO()
     with zipfile.ZipFile(out, "w") as archive:
         head = io.BytesIO()
@@ -288,12 +288,12 @@ def test_a_small_file_cannot_unpack_to_a_huge_one(tmp_path, monkeypatch):
     assert "more than 100,000" in refused(tmp_path / "bad.npz", data)
 
 
-def test_what_is_no_archive_is_refused(tmp_path):
+def test_files_that_are_not_archives_are_refused(tmp_path):
     for data in (b"", b"<script>alert(1)</script>", b"PK\x05\x06" + bytes(18)):
         refused(tmp_path / "bad.npz", data)
 
 
-def test_words_about_it_are_kept_as_they_are(tmp_path):
+def test_its_description_is_stored_unchanged(tmp_path):
     words = renamed(epoch("rover/complex-5"), label="</script><b>\u00e9&amp;", task="a/../b")
     words.save(tmp_path / "epoch.npz")
     assert Trajectory.load(tmp_path / "epoch.npz").about == words.about

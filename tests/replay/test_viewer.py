@@ -1,4 +1,4 @@
-"""The replay page in a real browser: it loads, plays, jumps, and listens to keys."""
+"""The replay page in a real browser: it loads, plays, jumps, and responds to keys."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def team(tab, tmp_path):
 
 
 def test_the_page_of_an_epoch_loads_and_shows_it(tab, epoch, tmp_path):
-    """No complaints and no requests: the fixture ``tab`` sees to that for every test."""
+    """Without errors and requests, which the fixture ``tab`` checks in every test."""
     open_page(tab, epoch.page, tmp_path / "replay.html")
     assert tab.get_attribute("body", "data-ready") == "yes"
     tab.evaluate("conevo.ready")
@@ -91,7 +91,7 @@ def test_play_advances_and_pause_stops(team):
     assert not state(team)["playing"]
 
 
-def test_the_end_stops_and_play_begins_anew(team):
+def test_it_stops_at_the_end_and_play_starts_again(team):
     seek(team, T - 10)
     team.click("#play")
     until(team, "() => !conevo.state().playing")
@@ -120,7 +120,7 @@ def test_speed_is_in_iterations_per_second(team):
     for speed, n in ((30, 15), (120, 50), (480, 180)):
         team.select_option("#speed", str(speed))
         assert state(team)["speed"] == speed
-        # Where a machine is too busy to draw, time is lost: one of some tries must be right.
+        # A busy machine draws too slowly, and time is lost: one of several tries must be right.
         tries = (team.evaluate(paced, n) for _ in range(4))
         assert any(rate == pytest.approx(speed, rel=0.2) for rate in tries), speed
 
@@ -267,7 +267,7 @@ def test_a_narrow_window_needs_no_scrolling_sideways(team):
 
 
 def test_pictures_are_sharp_on_fine_screens(chromium, tmp_path):
-    """Twice as many pixels are drawn where a window's pixel has two of the screen's."""
+    """Twice the number of pixels is drawn if a pixel of the window has two of the screen."""
     context = chromium.new_context(device_scale_factor=2)
     page = context.new_page()
     open_page(page, replay_page([made_up()]), tmp_path / "fine.html")

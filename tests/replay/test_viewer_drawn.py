@@ -1,4 +1,4 @@
-"""What the replay page draws and says in a real browser, against the trajectory's file."""
+"""The drawing and the numbers of the replay page in a real browser, against the file."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def team(tab, tmp_path):
 # --- robots ---------------------------------------------------------------------------------------
 
 
-def test_a_click_on_a_robot_shows_its_numbers_as_the_file_has_them(tab, epoch, tmp_path):
+def test_a_click_on_a_robot_shows_its_numbers_of_the_file(tab, epoch, tmp_path):
     open_page(tab, epoch.page, tmp_path / "replay.html")
     channels = epoch.channels
     for t in (0, 101, 239):
@@ -67,9 +67,9 @@ def test_a_click_on_a_robot_shows_its_numbers_as_the_file_has_them(tab, epoch, t
                 break
 
 
-def check_panel(epoch, t, robot, said):
-    """Compare what is shown of a robot with the trajectory's file."""
-    about, field = epoch.about, said["field"]
+def check_panel(epoch, t, robot, panel):
+    """Compare the panel of a robot with the trajectory's file."""
+    about, field = epoch.about, panel["field"]
     action = int(epoch.at("action", t, robot))
     if action >= 0:
         assert about["actions"][action] in field["action"]
@@ -101,11 +101,11 @@ def check_panel(epoch, t, robot, said):
     if "held" in epoch.channels:
         held = int(epoch.at("held", t, robot))
         assert bool(re.search(r"\d|[ABC]", field["holding"])) == (held >= 0), field["holding"]
-    check_network(epoch, t, robot, said)
+    check_network(epoch, t, robot, panel)
 
 
-def check_network(epoch, t, robot, said):
-    """Compare activations: of all sensors, and of the neurons that there are in their slots."""
+def check_network(epoch, t, robot, panel):
+    """Compare activations of all sensors and of the neurons in used slots."""
     about, channels = epoch.about, epoch.channels
     has_network = not about["heuristic"][robot]
     filled = np.flatnonzero(channels["hidden"][:, robot].any(axis=0))
@@ -114,19 +114,19 @@ def check_network(epoch, t, robot, said):
         "hidden": filled if has_network else (),
         "output": range(channels["outputs"].shape[2]) if has_network else (),
     }
-    assert len(said["hidden"]) == (len(about["neurons"][robot]) if has_network else 0)
+    assert len(panel["hidden"]) == (len(about["neurons"][robot]) if has_network else 0)
     for (name, wanted), channel in zip(
         slots.items(), ("sensors", "hidden", "outputs"), strict=True
     ):
-        assert {str(k) for k in wanted} <= set(said[name]), (name, robot)
-        for k, text in said[name].items():
+        assert {str(k) for k in wanted} <= set(panel[name]), (name, robot)
+        for k, text in panel[name].items():
             assert re.fullmatch(r"[-−]?\d+\.\d{3}", text), (name, text)
             number, tolerance = number_in(text)
             value = channels[channel][t, robot, int(k)]
             assert number == pytest.approx(value, abs=tolerance), (name, k, robot, t)
 
 
-def test_a_click_beside_all_robots_deselects(team):
+def test_a_click_away_from_all_robots_deselects(team):
     team.mouse.click(*where(team, 1))
     assert state(team)["selected"] == {"team": 0, "robot": 1}
     team.mouse.click(*at_world(team, 6.0, 5.5))
@@ -158,7 +158,7 @@ def test_robots_have_the_colour_of_their_action_or_caste(tab, epoch, tmp_path):
 
 
 def test_zooming_keeps_robots_under_the_mouse(team):
-    """By keys around the selected robot, by the wheel where the mouse is; dragging moves."""
+    """Keys zoom around the selected robot, the wheel around the mouse; dragging moves the view."""
     seek(team, 75)
     whole = [where(team, robot) for robot in range(R)]
     team.evaluate("conevo.select(0, 2)")
@@ -211,7 +211,7 @@ def test_a_trail_follows_its_robot(team):
     assert patch(team, *behind) != with_trail
 
 
-def test_nothing_is_lost_of_the_numbers_of_everybody(tab, tmp_path):
+def test_all_numbers_of_all_robots_are_shown(tab, tmp_path):
     """Every value of a made-up team at a few iterations, small and large ones."""
     playback = made_up()
     large = tuple(replace(one, fitness=98765.4321 * 10**k) for k, one in enumerate(playback.robots))
@@ -221,8 +221,8 @@ def test_nothing_is_lost_of_the_numbers_of_everybody(tab, tmp_path):
         seek(tab, t)
         for robot in range(R):
             tab.evaluate("r => conevo.select(0, r)", robot)
-            said = shown(tab)
-            number, tolerance = number_in(said["field"]["fitness"])
+            panel = shown(tab)
+            number, tolerance = number_in(panel["field"]["fitness"])
             assert number == pytest.approx(playback.robots[robot].fitness, abs=tolerance)
             for name, channel in (
                 ("sensor", playback.sensors),
@@ -231,10 +231,10 @@ def test_nothing_is_lost_of_the_numbers_of_everybody(tab, tmp_path):
             ):
                 values = channel.values[t, robot]
                 slots = playback.robots[robot].neurons if name == "hidden" else range(len(values))
-                assert set(said[name]) == {str(k) for k in slots}
+                assert set(panel[name]) == {str(k) for k in slots}
                 for k in slots:
                     value = values[k]
-                    number, tolerance = number_in(said[name][str(k)])
+                    number, tolerance = number_in(panel[name][str(k)])
                     assert number == pytest.approx(value, abs=tolerance), (name, k, robot, t)
 
 
@@ -268,7 +268,7 @@ def test_a_detected_rock_fades(team):
 
 
 def distance(one, other):
-    """How far two colours are from each other."""
+    """The distance of two colours."""
     a, b = (np.array([int(c[k : k + 2], 16) for k in (1, 3, 5)]) for c in (one, other))
     return int(np.abs(a - b).sum())
 
@@ -308,7 +308,7 @@ def test_events_jump(tab, epoch, tmp_path):
 
 
 def test_events_can_be_filtered(team):
-    """Of two kinds of events, detections and deliveries, one can be left out."""
+    """One of two kinds of events, detections and deliveries, can be hidden."""
     seen = "#events-0 [data-event]:visible"
     assert team.locator(seen).count() == 3
     team.get_by_label("detection", exact=False).first.uncheck()
@@ -316,20 +316,20 @@ def test_events_can_be_filtered(team):
     assert "delivered" in team.locator(seen).inner_text()
     seek(team, 0)
     team.keyboard.press(".")
-    assert state(team)["t"] == 150  # keys go to what is listed
+    assert state(team)["t"] == 150  # keys jump to listed events
 
 
 # --- the timeline ---------------------------------------------------------------------------------
 
 
-def test_the_timeline_shows_and_jumps_to_what_robots_did(tab, epoch, tmp_path):
+def test_the_timeline_shows_actions_and_jumps_to_them(tab, epoch, tmp_path):
     open_page(tab, epoch.page, tmp_path / "replay.html")
     action = epoch.channels["action"][:, : epoch.n].astype(int)
     check_timeline(tab, epoch.playback, action, 0)
 
 
 def check_timeline(tab, playback, action, team):
-    """In a robot's row, where an iteration is, its action has its colour; a click there jumps."""
+    """In a robot's row, each iteration has the colour of its action; a click jumps to it."""
     length, n = action.shape
     seek(tab, length - 1)
     tab.keyboard.press("Escape")
@@ -338,7 +338,7 @@ def check_timeline(tab, playback, action, team):
     picture = pixels(tab)
     cells = [(robot, t) for robot in range(n) for t in range(2, length - 2, 7)]
     places = np.array(cells_at(tab, team, cells))
-    is_wide = box["width"] >= 3 * length  # else a pixel may stand for several iterations
+    is_wide = box["width"] >= 3 * length  # otherwise a pixel may show several iterations
     for (robot, t), (x, y) in zip(cells, places, strict=True):
         if is_wide or len(set(action[t - 1 : t + 2, robot])) == 1:
             kind = action[t, robot]
@@ -355,7 +355,7 @@ def check_timeline(tab, playback, action, team):
 
 
 def cells_at(tab, team, cells):
-    """Where iterations are in robots' rows of the timeline: x, y in the window."""
+    """Places of iterations in robots' rows of the timeline: x, y in the window."""
     return tab.evaluate(
         """([team, cells]) => cells.map(([robot, t]) => {
             const {x, y} = conevo.row(team, robot, t);
@@ -369,7 +369,7 @@ def cells_at(tab, team, cells):
 
 
 def test_two_teams_side_by_side(tab, tmp_path):
-    """Of the same scenario; both follow the same time, and each says what its own file says."""
+    """In the same scenario; both follow the same time, and each shows the data of its own file."""
     teams = [Epoch("rover", tmp_path, seed) for seed in (2, 3)]
     open_page(tab, replay_page([team.playback for team in teams]), tmp_path / "both.html")
     assert state(tab)["teams"] == 2

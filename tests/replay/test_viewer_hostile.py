@@ -32,7 +32,7 @@ HOSTILE = {
 
 @pytest.mark.parametrize("text", HOSTILE.values(), ids=HOSTILE)
 def test_hostile_names_stay_text(tab, tmp_path, text):
-    """In every place of a playback that holds text; nothing is run, nothing added, all is shown."""
+    """Every text of a playback is shown as it is; none of them runs or adds elements."""
     elements = "() => [...document.querySelectorAll('*')].map((e) => e.localName).sort().join()"
     counts = []
     for name in ("robot", text):
@@ -47,7 +47,7 @@ def test_hostile_names_stay_text(tab, tmp_path, text):
         assert state(tab)["colourBy"] == "caste"
         counts.append(tab.evaluate(elements))
     assert tab.evaluate("window.pwned") is None
-    if text.strip():  # what has no name may be left out
+    if text.strip():  # an element without a name may be missing
         assert counts[0] == counts[1]
     assert text in tab.evaluate("document.body.textContent")
     assert re.sub(r"\s+", " ", text).strip()[:50] in re.sub(r"\s+", " ", tab.title())
@@ -71,17 +71,17 @@ LISTS = {field.name for field in fields(Playback) if field.default == ()} | {"fa
     ids=["numbers", "words", "both"],
 )
 def test_a_page_that_lost_its_data_gets_one_line(tab, cut):
-    """Nothing on the console: the fixture ``tab`` looks there."""
+    """Without errors on the console, which the fixture ``tab`` checks."""
     page = replay_page([made_up()])
     assert cut(page) != page
     tab.set_content(cut(page))
     tab.wait_for_selector("body[data-ready=error]")
-    said = tab.get_by_role("alert").inner_text()
-    assert said == "This replay cannot be shown: its data are missing or damaged."
+    message = tab.get_by_role("alert").inner_text()
+    assert message == "This replay cannot be shown: its data are missing or damaged."
 
 
-def test_what_may_be_missing_may_be_missing(tab, tmp_path):
-    """The least playback that there is: robots, where they are, what they do."""
+def test_optional_parts_may_be_missing(tab, tmp_path):
+    """The smallest possible playback: robots, their places and actions."""
     bare = replace(
         made_up(),
         **dict.fromkeys(OPTIONAL),

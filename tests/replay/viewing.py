@@ -1,4 +1,4 @@
-"""What tests of pages in a browser look through: pixels, numbers, what the viewer says."""
+"""Access to pages in a browser for tests: pixels, numbers, the state of the viewer."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ PLACE = "([team, robot]) => conevo.place(team, robot)"
 
 
 class Epoch:
-    """A world's epoch: what its file says, its playback, its page."""
+    """A world's epoch: the contents of its file, its playback, its page."""
 
     def __init__(self, name: str, folder: Path, seed: int = 2) -> None:
         self.name = name
@@ -42,14 +42,14 @@ class Epoch:
 
 
 def open_page(tab: Page, text: str, path: Path) -> None:
-    """Open a replay page from a file and wait until it is ready, or says that it cannot be."""
+    """Open a replay page from a file and wait until it is ready, or shows that it has failed."""
     path.write_text(text, encoding="utf-8")
     tab.goto(path.as_uri())
     tab.wait_for_selector("body[data-ready]")
 
 
 def state(tab: Page) -> dict[str, Any]:
-    """Return the state of the viewer when what has changed has been drawn."""
+    """Return the state of the viewer after all changes have been drawn."""
     found: dict[str, Any] = tab.evaluate(
         "async () => { await new Promise(requestAnimationFrame); return conevo.state(); }"
     )
@@ -57,12 +57,12 @@ def state(tab: Page) -> dict[str, Any]:
 
 
 def until(tab: Page, condition: str, argument: Any = None) -> None:
-    """Wait until a condition, in JavaScript, holds in the page."""
+    """Wait until a condition, in JavaScript, is true in the page."""
     tab.wait_for_function(condition, arg=argument, polling="raf")
 
 
 def overflow(tab: Page) -> int:
-    """Return by how many pixels the page is wider than the window, when it has been laid out."""
+    """Return by how many pixels the page is wider than the window, after its layout."""
     found: int = tab.evaluate(
         """async () => {
             for (let k = 0; k < 3; k++) await new Promise(requestAnimationFrame);
@@ -73,16 +73,16 @@ def overflow(tab: Page) -> int:
 
 
 def pixels(tab: Page, clip: dict[str, float] | None = None) -> Pixels:
-    """Return what is to be seen in the page, or in a part of it, as [height, width, 3]."""
+    """Return a picture of the page, or of a part of it, as [height, width, 3]."""
     shot = tab.screenshot(clip=clip, animations="disabled", caret="hide")
     with Image.open(io.BytesIO(shot)) as image:
         return np.asarray(image.convert("RGB"))
 
 
 def inside(tab: Page, selector: str) -> dict[str, float]:
-    """Return where an element lies in the window: x, y, width, height in pixels."""
+    """Return the place of an element in the window: x, y, width, height in pixels."""
     box: dict[str, float] | None = tab.locator(selector).bounding_box()
-    assert box is not None, f"{selector} is not to be seen"
+    assert box is not None, f"{selector} is not visible"
     return box
 
 
@@ -102,7 +102,7 @@ def seek(tab, t):
 
 
 def at_world(tab, x, y):
-    """Where a place of the made-up world is drawn: robots 0 and 3 tell how it lies."""
+    """The drawn position of a place in the made-up world, derived from robots 0 and 3."""
     playback, t = made_up(), state(tab)["t"]
     places = np.array([where(tab, 0), where(tab, 3)])
     here = np.array([[c.values[t, r] for c in (playback.x, playback.y)] for r in (0, 3)])
@@ -119,7 +119,7 @@ def patch(tab, x, y, half=3):
 
 
 def number_in(text):
-    """A number as it is shown, and how far it may be from what it stands for."""
+    """A number as it is shown, and its largest possible distance from the exact value."""
     found = re.fullmatch(r"([-−]?[\d,]*\.?(\d*))\D*", text.strip())
     assert found, text
     decimals = len(found[2])
@@ -127,7 +127,7 @@ def number_in(text):
 
 
 def shown(tab, team=0):
-    """Everything that the panel of the selected robot says: fields, sensors, hidden, outputs."""
+    """The contents of the selected robot's panel: fields, sensors, hidden, outputs."""
     return tab.evaluate(
         """team => {
             const panel = document.getElementById(`robot-${team}`);
@@ -143,7 +143,7 @@ def shown(tab, team=0):
 
 
 def apart(x, y):
-    """Robots by how far they are from their nearest neighbour, the loneliest first."""
+    """Robots by the distance to their nearest neighbour, the largest first."""
     places = np.stack([x, y], axis=-1)
     distances = np.hypot(*np.moveaxis(places[:, None] - places, -1, 0))
     np.fill_diagonal(distances, np.inf)

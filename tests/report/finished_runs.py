@@ -1,4 +1,4 @@
-"""Campaigns that nobody ran: tables of any size with means that are known."""
+"""Made-up campaigns: tables of any size with known means."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ SCENARIOS = 20
 
 
 class Task(NamedTuple):
-    """What the tables know of a world."""
+    """The entries of a world in the tables."""
 
     world: str
     measures: tuple[str, ...]
@@ -62,8 +62,8 @@ class Cell(NamedTuple):
     preset: str = "smoke"
     budget: int = 1000
     stage: int = 0
-    planned: int | None = None  # budget; that above is what a run spends
-    reliability: float | None = None  # of fitness in generation 0; without a study of it None
+    planned: int | None = None  # budget; the field above is the number that a run spends
+    reliability: float | None = None  # of fitness in generation 0; None without a study of it
 
 
 def cells(
@@ -76,7 +76,7 @@ def cells(
 
 
 def mean_of(cell: Cell) -> float:
-    """Return what a run of a cell reaches in its main measure, of 1000: CONE most."""
+    """Return the main measure of a cell's runs, out of 1000: CONE has the highest."""
     rank = METHODS.index(cell.method) if cell.method in METHODS else len(METHODS)
     return 300.0 + 80.0 * rank + 10.0 * _number(cell)
 
@@ -101,7 +101,7 @@ def write_campaign(
         generations: of every run.
         mean: of a cell's runs in the main measure.
         spread: standard deviation of the runs around it.
-        failed: messages of runs that came to nothing.
+        failed: messages of failed runs.
         without: tables that the campaign does not have.
     """
     rng = np.random.default_rng(20090)
@@ -120,7 +120,7 @@ def write_campaign(
         if name not in without:
             _write(root / "tables" / f"{name}.parquet", SCHEMA[name], parts)
     (root / "plan.toml").write_text(
-        '[campaign]\nname = "made"\ntitle = "Runs that nobody ran"\nproduces = ["figure 5.6"]\n\n'
+        '[campaign]\nname = "made"\ntitle = "Made-up runs"\nproduces = ["figure 5.6"]\n\n'
         '[factors]\nworld = ["rover/complex-1"]\nmethod = ["cone"]\n'
     )
     with (root / "runs.jsonl").open("w") as file:

@@ -27,14 +27,14 @@ def two_factors(*environments: str, methods: tuple[str, ...] = ("cone",)) -> lis
     ]
 
 
-def test_levels_may_hold_commas() -> None:
+def test_levels_may_contain_commas() -> None:
     assert levels_of("") == {}
     assert levels_of("gst=0.1, sizes=[1, 2], prey=a=b") == {
         "gst": "0.1", "sizes": "[1, 2]", "prey": "a=b"
     }  # fmt: skip
 
 
-def test_of_one_environment_places_are_the_levels_of_the_largest_factor() -> None:
+def test_in_one_environment_places_are_the_levels_of_the_largest_factor() -> None:
     at = arranged(*two_factors("dark-1"))
     assert at.axis == "mutation probability"
     assert at.places == ["0.01", "0.05", "0.2"]
@@ -45,7 +45,7 @@ def test_of_one_environment_places_are_the_levels_of_the_largest_factor() -> Non
     assert at.is_drawable
 
 
-def test_of_several_environments_every_combination_has_a_panel() -> None:
+def test_in_several_environments_every_combination_has_a_panel() -> None:
     at = arranged(*two_factors("dark-1", "dark-2", methods=("mesp", "cone")))
     assert at.places == ["dark-1", "dark-2"]
     assert at.panels[1] == "gst = 0.1, mutation probability = 0.05"
@@ -64,13 +64,13 @@ def test_a_method_without_the_factor_is_in_every_panel_and_has_a_place() -> None
     assert len(curves.panels) == 6
 
 
-def test_a_factor_of_one_level_is_not_drawn_unless_it_sets_runs_apart() -> None:
+def test_a_factor_of_one_level_is_not_drawn_unless_it_distinguishes_runs() -> None:
     one = Treatment("cone", "gst=0.1")
     assert factors_of([one, Treatment("homcne", "")]) == {}
     assert factors_of([one, Treatment("cone", "")]) == {"gst": ["0.1"]}
 
 
-def test_grid_has_a_gap_where_there_are_no_runs() -> None:
+def test_the_grid_has_a_gap_for_missing_runs() -> None:
     first, second = Cell("dark-1", Treatment("cone", "")), Cell("dark-2", Treatment("mesp", ""))
     at = arranged(first, second)
     assert at.grid({first: 1, second: 2}, float) == {"": {"mesp": [None, 2.0], "cone": [1.0, None]}}

@@ -1,4 +1,4 @@
-"""Aggregates over environments against scipy, and against all resamples there are."""
+"""Aggregates over environments against scipy, and against all possible resamples."""
 
 from __future__ import annotations
 
@@ -47,10 +47,10 @@ def chance(x, y):
 
 
 def assert_percentiles(one, outcomes, level):
-    """Assert that an interval leaves out, of all outcomes, what it promises at either end.
+    """Assert that an interval excludes the promised share of all outcomes at either end.
 
-    Outcomes are few and lumped, so an end must be an outcome at which the tail passes its share;
-    within what 20,000 resamples know of it.
+    Outcomes are few and discrete, so an end must be an outcome at which the tail passes its share,
+    within the accuracy of 20,000 resamples.
     """
     outcomes, tail, slack = np.array(outcomes), (1 - level) / 2, 0.006
     assert np.mean(outcomes < one.low - 1e-9) <= tail + slack
@@ -98,7 +98,7 @@ def test_intervals_of_one_environment_equal_those_of_scipy():
     assert (one.low, one.high) == pytest.approx(tuple(other), abs=0.02)
 
 
-def test_strata_are_kept_apart():
+def test_strata_are_kept_separate():
     """Environments that differ greatly do not widen the interval; only their runs' spread does."""
     near, far = [1.0, 1.1, 0.9, 1.0], [1001.0, 1001.1, 1000.9, 1001.0]
     apart, pooled = iqm_interval([near, far]), iqm_interval([[*near, *far]])
@@ -151,7 +151,7 @@ def test_improvement_without_draws_that_differ_has_no_interval(x, y, value, n):
     assert (one.value, one.low, one.high, one.n) == (value, None, None, n)
 
 
-def test_samples_that_never_meet_are_not_called_certain():
+def test_samples_without_overlap_are_not_certain():
     one = probability_of_improvement([[5.0, 6.0, 7.0], [3.0]], [[1.0, 2.0, 4.0], [2.0, 2.5]])
     assert (one.value, one.low, one.high) == (1.0, None, None)
 

@@ -1,4 +1,4 @@
-"""What runs spent, in words: exact, and told apart where headings would be the same."""
+"""Budgets of runs in words: exact, and distinguished if headings would be the same."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def test_a_budget_is_exact() -> None:
     )
 
 
-def test_one_run_or_stage_and_early_ends_are_named_so() -> None:
+def test_a_single_run_or_stage_and_early_ends_are_named() -> None:
     one = DESK._replace(
         runs=1, is_stage=True, evaluations=(300, 300, 300.0), steps=(6000, 6000, 6000.0),
         ended={"target": 1}, presets=("",), versions=("0.1.0", "0.2.0"),
@@ -27,7 +27,7 @@ def test_one_run_or_stage_and_early_ends_are_named_so() -> None:
     )
 
 
-def test_headings_differ_where_only_the_budget_does() -> None:
+def test_headings_differ_if_only_the_budget_does() -> None:
     groups = [Group("rover-v2", "complex", "a"), Group("rover-v2", "complex", "b"),
               Group("rover-v2", "simple", "c")]  # fmt: skip
     small = DESK._replace(evaluations=(300, 320, 310.0), steps=(6000, 6400, 6200.0))

@@ -1,4 +1,4 @@
-"""Cells, pairs and aggregates, against numbers worked out beside them."""
+"""Cells, pairs and aggregates, against numbers worked out separately."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def test_runs_of_other_budgets_are_in_other_groups() -> None:
     assert [len(of) for cells in groups.values() for of in cells.values()] == [1, 1]
 
 
-def test_treatments_stand_in_the_order_of_the_registry_then_by_level() -> None:
+def test_treatments_are_in_the_order_of_the_registry_then_by_level() -> None:
     found = [("own", ""), ("cone", "gst=0.2"), ("cone", "gst=0.1"), ("homcne", "gst=0.2")]
     assert [one.title for one in treatments_of(found)] == [
         "HomCNE, gst=0.2",
@@ -127,7 +127,7 @@ def test_pairs_that_differ_in_method_and_level_are_not_compared() -> None:
     }
 
 
-def test_a_factor_of_one_method_does_not_keep_it_from_the_others() -> None:
+def test_a_factor_of_one_method_does_not_separate_it_from_the_others() -> None:
     low, high = Treatment("cone", "epochs=1, gst=0.1"), Treatment("cone", "epochs=1, gst=0.2")
     clones, more = Treatment("homcne", "epochs=1"), Treatment("homcne", "epochs=3")
     samples = {("complex-1", one): sample(1.0, 4) for one in (low, high, clones, more)}
@@ -139,7 +139,7 @@ def test_a_factor_of_one_method_does_not_keep_it_from_the_others() -> None:
     }
 
 
-def test_what_the_tests_say_is_said_apart_where_they_disagree() -> None:
+def test_results_of_the_tests_are_separate_if_they_disagree() -> None:
     def verdict(a: list[float], b: list[float]) -> str:
         (pair,) = compare_all(cells_of({("complex-1", HOM): b, ("complex-1", CONE): a}))
         return pair.verdict
@@ -155,7 +155,7 @@ def test_what_the_tests_say_is_said_apart_where_they_disagree() -> None:
     assert verdict(sample(1.0, sd=3.0), sample(1.0, seed=1, sd=3.0)) == "undecided"
 
 
-def test_the_smaller_of_two_is_better_where_the_world_declares_so() -> None:
+def test_the_smaller_of_two_is_better_if_the_world_declares_it() -> None:
     samples = {("complex-1", HOM): sample(9.0), ("complex-1", CONE): sample(5.0, seed=1)}
     (more,) = compare_all(cells_of(samples))
     (less,) = compare_all(cells_of(samples, larger_is_better=False))
@@ -169,7 +169,7 @@ def test_the_smaller_of_two_is_better_where_the_world_declares_so() -> None:
     assert second.improvement[HOM].value > 0.95
 
 
-def test_too_few_runs_are_told_from_runs_that_differ_too_little() -> None:
+def test_too_few_runs_are_distinguished_from_runs_that_differ_too_little() -> None:
     few = compare_all(cells_of({("complex-1", t): sample(m, 3) for t, m in ((HOM, 0), (CONE, 9))}))
     enough = compare_all(cells_of({("complex-1", t): sample(0, 4) for t in (HOM, CONE)}))
     three = compare_all(cells_of({("complex-1", t): sample(0, 4) for t in (HOM, MESP, CONE)}))
@@ -178,7 +178,7 @@ def test_too_few_runs_are_told_from_runs_that_differ_too_little() -> None:
     assert not enough[0].too_few  # 2 / C(8, 4) = 0.029
 
 
-def test_environments_are_pooled_as_shares_where_all_treatments_have_runs() -> None:
+def test_environments_are_pooled_as_shares_if_all_treatments_have_runs() -> None:
     cells = {
         Cell(place, treatment): [
             value(place, treatment, k, reached, optimum=optimum)

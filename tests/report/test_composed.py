@@ -1,4 +1,4 @@
-"""Teams composed of several behaviours: who is in them, what they play, and what a report shows."""
+"""Teams composed of several behaviours: their members, their play, and the report."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def test_the_fittest_of_each_behaviour_plays(rollout: Rollout, team: Team) -> No
         assert found.performance[measure].tolist() == values.tolist()
 
 
-def test_one_prey_has_three_compositions_in_their_places_two_have_none(
+def test_one_prey_has_three_placed_compositions_and_two_prey_have_none(
     rollout: Rollout, team: Team
 ) -> None:
     genes, (rows,) = team.as_trial()
@@ -79,7 +79,7 @@ def test_one_prey_has_three_compositions_in_their_places_two_have_none(
     assert list(found) == list(COMPOSED)
     clones = seen.together(keys)
     for name in ("pursuer-blocker", "role-switcher"):
-        assert found[name].scenarios.x.tolist() == clones.x.tolist()  # where clones play
+        assert found[name].scenarios.x.tolist() == clones.x.tolist()  # in the places of clones
     prey = np.stack([found["spiders-fly"].scenarios.x, found["spiders-fly"].scenarios.y])[:, :, 4]
     gap = np.minimum(prey, 60.0 - prey).min(axis=0)
     assert (gap < rollout.world.params.sensor_range_cm + 3).all()

@@ -1,4 +1,4 @@
-"""A report of a world whose main measure is a distance, and of CONE whose exchange hardly ran."""
+"""A report of a world whose main measure is a distance, and of CONE with rare exchange."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ TRUTH = {("complex-1", "mesp"): Cell(100.0), ("complex-1", "cone"): Cell(200.0)}
 
 
 def directed(folder: Path, truth: dict[tuple[str, str], Cell]) -> Path:
-    """Write tables of a world in which a small value is good, in cm."""
+    """Write tables of a world in which a smaller value, in cm, is better."""
     write_tables(folder, "rover-v2", truth, 10, 0.05)
     columns = ", ".join(f'"{name}" {kind}' for name, kind in SCHEMA["measures"].items())
     with duckdb.connect(":memory:") as connection:
@@ -52,11 +52,11 @@ def test_the_smaller_of_two_distances_is_the_better(tmp_path: Path) -> None:
     pooled = next(one for one in reached.exhibits if one.name == "rover-complex-aggregate")
     assert pooled.rows[1]["better than Multi-Agent ESP"].startswith("0")
     assert pooled.rows[1]["iqm"] == pytest.approx(200, rel=0.01)
-    # The lesioned teams of this campaign come a fifth nearer: they gain by it.
+    # The lesioned teams of this campaign come a fifth nearer, which is a gain.
     assert all(row["lost"] == pytest.approx(-20, abs=2) for row in lost.exhibits[0].rows)
 
 
-def test_more_is_lost_where_more_is_better(tmp_path: Path) -> None:
+def test_the_loss_is_larger_if_more_is_better(tmp_path: Path) -> None:
     with Tables(write_tables(tmp_path, "rover-v2", TRUTH, 10, 0.05)) as tables:
         (scope,) = scopes(tables)
         section, lost = comparisons(scope), interventions(scope)[0]

@@ -1,4 +1,4 @@
-"""How numbers are written, and tables as CSV and LaTeX."""
+"""The format of numbers, and tables as CSV and LaTeX."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def test_numbers_have_about_four_digits(value, text) -> None:
     assert number(value) == text
 
 
-def test_a_probability_is_never_nothing() -> None:
+def test_a_probability_is_never_written_as_zero() -> None:
     assert [p_value(p) for p in (0.0, 0.0009, 0.049, None)] == ["<0.001", "<0.001", "0.049", "–"]
 
 

@@ -1,4 +1,4 @@
-"""Figures: the same bytes, nothing cut, readable in grey, and what they show where."""
+"""Figures: reproducible bytes, nothing cut, readable in grey, and the places of their parts."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ NAMES = {"homcne": "HomCNE", "cone": "CONE"}
 
 @pytest.fixture(autouse=True)
 def drawn(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[Any]]:
-    """Collect what is drawn, so that its parts can be measured."""
+    """Collect the drawn figures, so that their parts can be measured."""
     found: list[Any] = []
     saved = drawing.saved
 
@@ -47,7 +47,7 @@ def drawn(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[Any]]:
 
 
 def assert_readable(figure: Any) -> None:
-    """Assert that no text is cut, small or under another one, and that the plot is the largest."""
+    """Assert that no text is cut, too small or overlapped, and that the plot is the largest."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.text import Text
 
@@ -82,7 +82,7 @@ def assert_readable(figure: Any) -> None:
 
 
 def unseen_ticks(figure: Any) -> list[Any]:
-    """Return the labels of ticks that lie outside of their axes, which are not drawn."""
+    """Return the labels of ticks outside their axes, which are not drawn."""
     return [
         label
         for axes in figure.axes
@@ -270,7 +270,7 @@ def test_nothing_is_drawn_beyond_the_range_of_a_measure(drawn) -> None:
     assert heights.max() <= 1 / 1.04 + 1e-9
 
 
-def test_a_method_looks_the_same_whatever_is_drawn_with_it(drawn) -> None:
+def test_a_method_looks_the_same_next_to_any_others(drawn) -> None:
     panel = {"cone": [figures.Bar(1.0, None)]}
     figures.bars({"": panel}, ["1"], {"cone": "CONE"}, x_label="x", y_label="y")
     bars()

@@ -37,7 +37,7 @@ def wide(sentences: int = 0) -> Table:
     columns += [Column(f"x{k}", f"a measure named {k}", number) for k in range(10)]
     columns += [Column(f"s{k}", f"sentence {k}", plain, is_wide=True) for k in range(sentences)]
     row = {f"x{k}": 1234.5 + k for k in range(10)} | {"method": "CONE, gst=0.1, rounds=2"}
-    row |= {f"s{k}": "what is to be known of this row in a whole sentence, " * 4 for k in range(9)}
+    row |= {f"s{k}": "the explanation of this row in a whole sentence, " * 4 for k in range(9)}
     names = ["complex-1", "complex-1", "complex-2"]
     return Table(
         "wide", "A wide table", "All of it.", columns, [row | {"environment": n} for n in names]
@@ -57,7 +57,7 @@ def test_latex_is_booktabs_escaped_and_split_into_pages() -> None:
     assert text.count(r"\label{tab:own}") == 1
 
 
-def test_what_is_too_wide_is_split_by_columns_that_name_their_rows() -> None:
+def test_too_wide_tables_are_split_by_columns_and_repeat_the_names_of_rows() -> None:
     text = to_latex(wide())
     tabulars = text.split(r"\begin{tabular}")[1:]
     assert len(tabulars) > 1
@@ -70,7 +70,7 @@ def test_what_is_too_wide_is_split_by_columns_that_name_their_rows() -> None:
     assert sorted(shown) == [str(k) for k in range(10)]
 
 
-def test_paragraphs_are_as_wide_as_the_page_lets_them() -> None:
+def test_paragraphs_have_the_width_that_the_page_allows() -> None:
     for part in to_latex(wide(2)).split(r"\begin{tabular}")[1:]:
         spec = part.splitlines()[0]
         widths = [float(w) for w in re.findall(r"p\{([\d.]+)pt\}", spec)]

@@ -1,4 +1,4 @@
-"""Courses of runs whose generations have different sizes, worked out by hand."""
+"""Curves of runs whose generations have different sizes, worked out by hand."""
 
 from __future__ import annotations
 
@@ -80,15 +80,15 @@ def test_shares_of_castes_add_up_over_runs(tables) -> None:
     assert (shares["low"] + shares["hi"]).tolist() == [1.0] * 4
 
 
-def test_nothing_is_said_of_castes_before_the_first_generation_has_ended(tables) -> None:
+def test_castes_are_unknown_before_the_first_generation_has_ended(tables) -> None:
     x, found = caste_courses(histories_of(tables), n=8)
     assert x.tolist() == [5, 10, 15, 20, 25, 30, 35, 40]
     assert np.isnan([found[CONE]["low"][0], found[CONE]["hi"][0]]).all()
     assert found[CONE]["low"][1] == 1.0
 
 
-def test_castes_are_drawn_from_zero_on_an_axis_that_begins_empty(tables, tmp_path) -> None:
+def test_castes_are_drawn_on_an_axis_that_starts_at_zero(tables, tmp_path) -> None:
     (scope,) = scopes(tables)
     figure, *_ = castes(scope, read_histories(tables, scope.group)).exhibits
-    assert min(row["evaluations"] for row in figure.rows) >= 10  # the first generation's end
+    assert min(row["evaluations"] for row in figure.rows) >= 10  # the end of the first generation
     assert all(np.isfinite(row["share"]) for row in figure.rows)

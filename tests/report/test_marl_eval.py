@@ -1,4 +1,4 @@
-"""The export against the form that marl-eval documents, and what a rectangle costs."""
+"""The export against the format that marl-eval documents, and the runs that it leaves out."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ BUDGET = 800  # team-steps
 
 
 class Campaign:
-    """Tables of runs whose every value says where it comes from."""
+    """Tables of runs in which every value identifies its origin."""
 
     def __init__(self, folder: Path):
         self.folder = folder
@@ -47,7 +47,7 @@ class Campaign:
             spent = steps * (k + 1) // GENERATIONS
             value = float(k) if values is None else values[k]
             self.add("generations", run=run, generation=k, team_steps=spent, value=value)
-        for k, value in reversed(list(enumerate(tests))):  # in no order of scenarios
+        for k, value in reversed(list(enumerate(tests))):  # not in the order of scenarios
             self.add("scores", run=run, study="test", team="champion", scenario=k, value=value)
             others = {"run": run, "scenario": k, "value": -1.0}
             self.add("scores", study="test", team="generation 0", **others)
@@ -75,8 +75,8 @@ def assert_documented(data):
 
     Environment, task, algorithm, run; steps with a step count and lists of numbers, at the end the
     absolute metrics; and its note: in an environment the same algorithms, number of runs and
-    number of steps everywhere. Further, what its code takes for granted: runs and steps have the
-    same names everywhere, no comma in an algorithm, no "_" in a metric that is to be normalised.
+    number of steps everywhere. Also the assumptions of its code: runs and steps have the same
+    names everywhere, algorithms have no comma, and normalised metrics have no "_".
     """
     read = json.loads(json.dumps(data, allow_nan=False))
     assert read == data
@@ -138,7 +138,7 @@ def test_steps_share_the_smallest_budget_and_show_the_last_generation_that_ended
     assert curves["cone"] == [0] * 9 + [1] * 5 + [2] * 5 + [3]
 
 
-def test_runs_are_named_by_seeds_and_those_that_a_cell_lacks_are_left_out(campaign):
+def test_runs_are_named_by_seeds_and_seeds_missing_in_a_cell_are_left_out(campaign):
     runs = [campaign.run("cone", 1, seed, tests=(float(seed),)) for seed in (17, 3, 5)]
     other = [campaign.run("ccga", 1, seed) for seed in (5, 17, 6)]
     with campaign.tables() as tables:
@@ -155,7 +155,7 @@ def test_cells_without_a_common_seed_have_no_rectangle(campaign):
         assert left_out(tables) == sorted(runs)
 
 
-def test_algorithm_that_few_tasks_have_goes(campaign):
+def test_an_algorithm_of_few_tasks_is_left_out(campaign):
     gone = campaign.run("cone", 1, 1, variant="gst=0.1,gdm=0.2")
     for number in (1, 2, 3):
         for method in ("ccga", "cone"):
@@ -167,7 +167,7 @@ def test_algorithm_that_few_tasks_have_goes(campaign):
     assert_documented(data)
 
 
-def test_task_that_is_not_finished_goes(campaign):
+def test_an_unfinished_task_is_left_out(campaign):
     for method in ("ccga", "cone", "mesp"):
         for number in (1, 2):
             campaign.run(method, number, 1)
@@ -219,7 +219,7 @@ def test_variants_are_algorithms_without_a_comma(campaign):
         pytest.param({"values": (1.0, None)}, id="a generation without a value"),
     ],
 )
-def test_runs_that_lack_something_are_left_out(campaign, flaw):
+def test_incomplete_runs_are_left_out(campaign, flaw):
     for seed in (1, 2):
         campaign.run("cone", 1, seed)
     gone = campaign.run("cone", 1, 3, **flaw)

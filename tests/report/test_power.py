@@ -1,4 +1,4 @@
-"""The power of "alike" is the rate at which the rule finds alike what is."""
+"""The power of "alike" is the rate at which the rule recognizes equal methods."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from conevo.report.statistics import compare, is_alike
 @pytest.mark.parametrize(("n", "m", "scatter"), [(20, 20, 0.2), (5, 8, 0.1), (20, 20, 0.05)])
 def test_power_is_the_rate_of_the_rule_itself(n: int, m: int, scatter: float) -> None:
     def runs(size: int) -> list[float]:
-        """Return runs with exactly this scatter, so that the samples drawn are like them."""
+        """Return runs with exactly this scatter, so that drawn samples are similar."""
         x = np.linspace(-1, 1, size)
         return (50 * (1 + scatter * x / x.std(ddof=1))).tolist()
 
@@ -23,7 +23,7 @@ def test_power_is_the_rate_of_the_rule_itself(n: int, m: int, scatter: float) ->
     assert stated == pytest.approx(rate, abs=0.06)  # three standard errors, and the ranks
 
 
-def test_a_power_that_is_not_known_is_not_stated() -> None:
+def test_an_unknown_power_is_not_stated() -> None:
     assert power_of_pair([1.0], [1.0, 2.0]) is None
     assert power_of_pair([2.0, 2.0], [1.0, 2.0]) is None
     assert power_of_pair([-1.0, 1.0], [1.0, 2.0]) is None

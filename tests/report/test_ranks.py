@@ -33,7 +33,7 @@ def enumerated(a, b):
 
 
 @given(few, few)
-def test_exact_p_is_that_of_all_divisions_of_the_runs_ties_included(a, b):
+def test_exact_p_is_that_of_all_divisions_of_the_runs_including_ties(a, b):
     assert mann_whitney(np.array(a), np.array(b)) == pytest.approx(enumerated(a, b))
 
 
@@ -48,7 +48,7 @@ def test_exact_p_equals_that_of_scipy_without_ties(n, m):
     assert mann_whitney(x, y) == pytest.approx(other, rel=1e-9)
 
 
-def test_approximation_meets_the_exact_test_where_it_takes_over():
+def test_the_approximation_agrees_with_the_exact_test_at_the_transition():
     random = np.random.default_rng(2)
     x, y = random.normal(0.5, 1, 31), random.normal(0, 1, 30)
     exact = mann_whitney(x[:30], y)
@@ -58,7 +58,7 @@ def test_approximation_meets_the_exact_test_where_it_takes_over():
     assert mann_whitney(x, y) == pytest.approx(stats.mannwhitneyu(x, y, method="exact")[1], rel=0.1)
 
 
-def test_many_equal_runs_tell_nothing():
+def test_many_equal_runs_have_no_effect():
     assert mann_whitney(np.full(40, 0.1), np.full(40, 0.1)) == 1.0
 
 

@@ -1,4 +1,4 @@
-"""A report: complete, self-contained, the same bytes again, and never over somebody's changes."""
+"""A report: complete, self-contained, reproducible, and never written over a user's changes."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def rows_of(path: Path) -> list[dict[str, str]]:
 
 
 class Page(HTMLParser):
-    """Collects ids, links, text and whatever a page would load."""
+    """Collects ids, links, text and everything that a page would load."""
 
     def __init__(self, text: str) -> None:
         super().__init__()
@@ -70,7 +70,7 @@ class Page(HTMLParser):
             self.loads.append(tag)
 
 
-def test_the_page_stands_alone_and_its_links_lead_somewhere(report) -> None:
+def test_the_page_is_self_contained_and_its_links_lead_somewhere(report) -> None:
     text = (report / "index.html").read_text()
     page = Page(text)
     assert page.loads == []
@@ -84,7 +84,7 @@ def test_the_page_stands_alone_and_its_links_lead_somewhere(report) -> None:
         assert used in page.ids, used
 
 
-def test_every_section_is_there_and_says_n_and_tests(report) -> None:
+def test_every_section_exists_and_states_n_and_tests(report) -> None:
     text = (report / "index.html").read_text()
     for title in ("Runs", r"Task performance: value \(points, larger is better\)",
                   "How champions were chosen", "Comparisons", "Learning", "Castes", "Lesions",
@@ -101,7 +101,7 @@ def test_every_section_is_there_and_says_n_and_tests(report) -> None:
     assert "The thesis has 20 runs per cell; here are 4." in text
 
 
-def test_what_chose_the_champions_stands_next_to_what_is_left_of_them(report) -> None:
+def test_the_selection_of_champions_is_next_to_their_test(report) -> None:
     rows = rows_of(report / "numbers/rover-complex-chosen.csv")
     assert [(row["measure"], row["n"]) for row in rows] == [("fitness", "4")] * 6 + [
         ("value", "4")
@@ -139,7 +139,7 @@ def test_scenarios_without_a_finite_value_are_counted_in_words(campaign, tmp_pat
     )
 
 
-def test_what_failed_is_listed_and_escaped(report) -> None:
+def test_failures_are_listed_and_escaped(report) -> None:
     text = (report / "index.html").read_text()
     assert "Runs finished: 36 of 37 planned; failed: 1; not ended: 0." in text
     assert "the disk is &lt;full&gt; &amp; lost" in text
@@ -188,7 +188,7 @@ def test_losses_are_those_of_the_same_run(report, campaign) -> None:
     assert float(hom["percent"]) == pytest.approx(left, rel=1e-9)
 
 
-def test_castes_by_s_stand_next_to_favourite_settings(tmp_path) -> None:
+def test_castes_by_s_are_next_to_favourite_settings(tmp_path) -> None:
     """Two champions of two robots: one moves and detects in turn, one is of an earlier version."""
     campaign = write_campaign(tmp_path / "c", cells(["rover/complex-1"], ["mesp"]), 3)
     robots = (
@@ -210,7 +210,7 @@ def test_castes_by_s_stand_next_to_favourite_settings(tmp_path) -> None:
             )
         scope = scopes(tables)[0]
         teams, favourites = castes(scope, read_histories(tables, scope.group)).exhibits[-2:]
-    assert [row["devoted"] for row in teams.rows] == [1.0]  # one of each of two champions
+    assert [row["devoted"] for row in teams.rows] == [1.0]  # one from each of two champions
     method = {"treatment": "Multi-Agent ESP"}
     low = {"caste": "non-specialized", "setting": "low", "robots": 2, "share": 0.75, "devoted": 1}
     hi = {"caste": "hi", "setting": "hi", "robots": 1, "share": 0.8, "devoted": 1}
@@ -290,7 +290,7 @@ def test_only_an_unchanged_report_is_replaced(tmp_path) -> None:
     assert sorted(path.name for path in tmp_path.iterdir()) == ["camp", "other", "out", "own"]
 
 
-def test_budgets_stand_apart(tmp_path) -> None:
+def test_budgets_are_separate(tmp_path) -> None:
     of = [
         *cells(["rover/complex-1"], ["mesp", "cone"], budget=1000),
         *cells(["rover/complex-1"], ["mesp", "cone"], budget=5000),
@@ -332,7 +332,7 @@ def test_odd_campaigns_have_a_report_too(of, tmp_path) -> None:
     assert "95 % interval" not in re.sub(r"(?s)<section id=.section-claims.*?</section>", "", text)
 
 
-def test_many_variants_are_tables_where_drawings_could_not_be_read(tmp_path) -> None:
+def test_many_variants_are_tables_if_drawings_would_be_unreadable(tmp_path) -> None:
     of = [
         Cell("rover", f"complex-{n}", "cone", variant=f"gst=0.{k}")
         for n in (1, 2)
@@ -355,14 +355,14 @@ def test_a_world_where_nothing_was_achieved_has_no_losses(tmp_path) -> None:
     )
 
 
-def test_a_campaign_without_a_finished_run_says_so(tmp_path) -> None:
+def test_a_report_without_a_finished_run_states_it(tmp_path) -> None:
     root = empty(tmp_path)
     text = write_report(Campaign(root), tmp_path / "out").read_text()
     assert "Runs finished: 0 of 4 planned; failed: 0; not ended: 4." in text
 
 
-def test_the_best_method_is_found_best(report) -> None:
-    """What the runs were made of comes out: each method 80 above the one before."""
+def test_the_best_method_is_found(report) -> None:
+    """The known truth of the runs is found: each method is 80 above the previous one."""
     rows = rows_of(report / "numbers/rover-complex-comparisons.csv")
     pair = next(
         r for r in rows if (r["environment"], r["first"], r["second"]) ==
@@ -375,7 +375,7 @@ def test_the_best_method_is_found_best(report) -> None:
     assert pair["verdict"] == "better (t-test only)"
 
 
-def test_diversity_that_pays_is_that_of_the_runs_of_a_cell(campaign, report) -> None:
+def test_diversity_that_pays_is_computed_from_the_runs_of_a_cell(campaign, report) -> None:
     with Tables(campaign / "tables") as tables:
         value_of = {one.run: one.value for one in tables.values()}
         _, found = tables.query(
@@ -395,7 +395,7 @@ def test_diversity_that_pays_is_that_of_the_runs_of_a_cell(campaign, report) -> 
     assert row["n"] == "4"
 
 
-def test_behaviours_of_no_study_that_is_known_are_shown_by_name(
+def test_behaviours_of_an_unknown_study_are_shown_by_name(
     campaign, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def shown() -> list[str]:

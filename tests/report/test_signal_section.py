@@ -1,4 +1,4 @@
-"""The signal in a report: a row per method and task, and what it does to comparisons."""
+"""The signal in a report: a row per method and task, and its effect on comparisons."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def test_signal_in_the_last_populations_alone_is_enough(tmp_path) -> None:
     cell = Cell("rover", "complex-1", "mesp", reliability=0.08)
     root = write_campaign(tmp_path / "c", [cell], 2, 2)
     stored = root / "tables" / "signal.parquet"
-    with duckdb.connect() as connection:  # .08 first and .04 last, the other way round
+    with duckdb.connect() as connection:  # .08 first and .04 last, reversed
         connection.execute(
             f"CREATE TABLE swapped AS SELECT * REPLACE (CASE generation WHEN 'first' THEN 'last'"
             f" ELSE 'first' END AS generation) FROM '{stored}'"
@@ -68,7 +68,7 @@ def test_signal_in_the_last_populations_alone_is_enough(tmp_path) -> None:
     assert (row["verdict"], blind) == ("signal", set())
 
 
-def test_comparisons_with_a_blind_method_say_so(folder) -> None:
+def test_comparisons_with_a_blind_method_are_marked(folder) -> None:
     with Tables(folder / "tables") as tables:
         (scope,) = scopes(tables)
         section = comparisons(scope)
@@ -81,7 +81,7 @@ def test_comparisons_with_a_blind_method_say_so(folder) -> None:
     assert "(reliability below 0.05 first and last" in section.text[-1]
 
 
-def test_without_a_study_there_is_no_section(tmp_path) -> None:
+def test_the_section_is_absent_without_a_study(tmp_path) -> None:
     root = write_campaign(tmp_path / "c", [Cell("rover", "complex-1", "ccga")], 2, 2)
     with Tables(root / "tables") as tables:
         (scope,) = scopes(tables)

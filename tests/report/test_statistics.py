@@ -30,7 +30,7 @@ SLEEP_1 = (0.7, -1.6, -0.2, -1.2, -0.1, 3.4, 3.7, 0.8, 0.0, 2.0)
 SLEEP_2 = (1.9, 0.8, 1.1, 0.1, -0.1, 4.4, 5.5, 1.6, 4.6, 3.4)
 
 
-# What statsmodels finds for samples and families of which some values tie.
+# Results of statsmodels for samples and families with ties.
 STATSMODELS = json.loads(Path(__file__).with_name("statsmodels.json").read_text())
 
 
@@ -184,7 +184,7 @@ def test_ks_equals_the_exact_distribution(seed):
     [(5, 0.337, 0.405), (10, 0.258, 0.294), (20, 0.190, 0.231), (30, 0.161, 0.187)],
 )
 def test_lilliefors_agrees_with_his_table(n, five, one):
-    """Lilliefors 1967, table 1: distances that chance exceeds in 5 and 1 of 100 samples.
+    """Lilliefors 1967, table 1: distances exceeded by chance in 5 and 1 of 100 samples.
 
     He drew 1000 samples, so his quantiles are known to about 5 +- 0.7 and 1 +- 0.3 percent.
     """
@@ -204,16 +204,16 @@ def test_lilliefors_equals_the_table_of_statsmodels(row):
     assert p == pytest.approx(row["p"], abs=0.02) or row["p"] == 0.99
 
 
-def test_normal_samples_are_refused_as_often_as_promised():
-    """Of 1000 normal samples Lilliefors refuses about 50 (+- 21 at three deviations)."""
+def test_normal_samples_are_rejected_at_the_promised_rate():
+    """Of 1000 normal samples Lilliefors rejects about 50 (+- 21 at three deviations)."""
     random = np.random.default_rng(7)
     tests = [normality(random.normal(size=8)) for _ in range(1000)]
     assert 29 <= sum(one.p_lilliefors < 0.05 for one in tests) <= 71
-    # The thesis' test hardly ever refuses: the normal was fitted to the very sample.
+    # The thesis' test hardly ever rejects: the distribution was fitted to the same sample.
     assert sum(one.p_ks < 0.05 for one in tests) <= 2
 
 
-def test_a_sample_of_samples_never_proves_the_impossible():
+def test_a_simulated_p_is_never_zero():
     assert normality([0.0] * 19 + [1.0]).p_lilliefors == 1 / 10_001
 
 
@@ -259,7 +259,7 @@ def test_holm_of_a_worked_family():
     assert holm([0.01, 0.04, 0.03, 0.005]) == pytest.approx([0.03, 0.06, 0.06, 0.02])
 
 
-def test_tests_that_could_not_be_made_do_not_count():
+def test_impossible_tests_do_not_count():
     assert holm([0.02, None, 0.01, math.nan]) == pytest.approx([0.02, None, 0.02, None])
     assert holm([]) == []
     assert holm([None]) == [None]
@@ -310,7 +310,7 @@ def test_the_margin_is_of_the_larger_mean():
 
 
 @pytest.mark.parametrize(("level", "reach"), [(0.9, 1.8331129), (0.95, 2.2621572)])
-def test_mean_interval_reaches_as_many_errors_as_students_table_says(level, reach):
+def test_the_mean_interval_has_the_half_width_of_students_table(level, reach):
     one = mean_interval(SLEEP_1, level)
     error = 1.789010 / math.sqrt(10)
     assert one.value == pytest.approx(0.75)
@@ -333,7 +333,7 @@ def test_proportion_interval_of_none_and_of_all(n):
     assert all_of_them.low == pytest.approx(0.025 ** (1 / n))
 
 
-def test_proportion_interval_ends_where_chance_would_give_a_fortieth():
+def test_the_proportion_interval_ends_where_chance_has_one_fortieth():
     def share(p, counts):
         return sum(math.comb(20, c) * p**c * (1 - p) ** (20 - c) for c in counts)
 

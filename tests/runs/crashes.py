@@ -1,4 +1,4 @@
-"""What goes wrong while a run writes its files."""
+"""Failures while a run writes its files."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ class Crash(BaseException):
 
 
 def fail_at(monkeypatch: pytest.MonkeyPatch, call: int, problem: BaseException) -> list[int]:
-    """Let the ``call``-th fsync of the run's files fail; return the list that counts them."""
+    """Make the ``call``-th fsync of the run's files fail; return the list that counts them."""
     calls: list[int] = []
     sync = os.fsync
 

@@ -1,4 +1,4 @@
-"""A checkpoint comes back to the bit, or not at all."""
+"""A checkpoint is restored bit for bit, or refused."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def saved(tmp_path: Path) -> Path:
     return path
 
 
-def test_everything_comes_back_to_the_bit(saved: Path) -> None:
+def test_everything_is_restored_bit_for_bit(saved: Path) -> None:
     assert is_same(load(saved, Example, IDENTITY), example())
 
 
@@ -83,7 +83,7 @@ def test_numpy_scalars_are_stored_as_plain_numbers(tmp_path: Path) -> None:
 
 
 def test_any_flipped_bit_is_noticed_or_harmless(saved: Path) -> None:
-    """Every byte, one random bit of each: the same content, or a refusal."""
+    """One random bit of every byte: the same content, or a refusal."""
     data, rng = saved.read_bytes(), np.random.default_rng(1)
     refusals: list[str] = []
     for position in range(len(data)):
@@ -94,7 +94,7 @@ def test_any_flipped_bit_is_noticed_or_harmless(saved: Path) -> None:
             assert is_same(load(saved, Example, IDENTITY), example()), position
         except UnusableFile as error:
             refusals.append(str(error))
-    assert len(refusals) > len(data) // 3  # the rest are dates and such in zip's own records
+    assert len(refusals) > len(data) // 3  # the others are in zip's own records, such as dates
     assert all(str(saved) in line and "\n" not in line for line in refusals)
 
 
@@ -156,7 +156,7 @@ def outer(**changes: Any) -> Outer:
     return replace(Outer(inner, True, 0.1 + 0.2, np.array([1e-320]), "x"), **changes)
 
 
-def test_dataclasses_within_dataclasses_come_back_bit_for_bit(tmp_path: Path) -> None:
+def test_dataclasses_within_dataclasses_are_restored_bit_for_bit(tmp_path: Path) -> None:
     path = tmp_path / "outer.npz"
     save(path, outer(), IDENTITY)
     with np.load(path) as archive:
@@ -171,7 +171,7 @@ def test_dataclasses_within_dataclasses_come_back_bit_for_bit(tmp_path: Path) ->
     assert difference(found, outer(inner=Inner(0, np.zeros(2, np.float32), {}))) == "inner.fitness"
 
 
-def test_what_is_not_of_the_examples_kind_is_refused(tmp_path: Path) -> None:
+def test_values_of_another_kind_than_the_examples_are_refused(tmp_path: Path) -> None:
     path = tmp_path / "outer.npz"
     save(path, outer(), IDENTITY)
     for like, words in (

@@ -1,4 +1,4 @@
-"""Which code made a run: one digest of all that decides results, and no silent change of it."""
+"""The code of a run: one digest of all code that affects results, and no silent change of it."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from conevo.runs.config import resolve
 from conevo.runs.start import start
 from runs.tiny import TASK, evolve_tiny, tiny_settings
 
-# Loaded by what decides results without deciding any: what is asked for is spelt out in a run's
-# config.toml, and files keep what they are given.
+# Loaded by modules that affect results, but without effect themselves: a run's config.toml has all
+# settings in full, and files store data unchanged.
 NOT_DECIDING = {
     "conevo",
     "conevo.errors",
@@ -39,7 +39,7 @@ NOT_DECIDING = {
 
 @pytest.fixture
 def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A copy of the package's text, whose digest is looked at."""
+    """A copy of the package's source, whose digest is computed."""
     copy = tmp_path / "conevo"
     shutil.copytree(Path(conevo.__file__).parent, copy, ignore=shutil.ignore_patterns("*.npz"))
     monkeypatch.setattr(conevo, "__file__", str(copy / "__init__.py"))
@@ -47,7 +47,7 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return copy
 
 
-def test_the_digest_is_of_all_that_decides_results_and_of_nothing_else(package: Path) -> None:
+def test_the_digest_covers_exactly_the_code_that_affects_results(package: Path) -> None:
     digest = code_digest.__wrapped__
     assert digest() == code_digest()  # wherever it is installed
     for name in ("evolution/variation.py", "controllers/srn.py", "runs/loop.py", "rng.py"):
@@ -55,12 +55,12 @@ def test_the_digest_is_of_all_that_decides_results_and_of_nothing_else(package: 
         (package / name).write_text(text + "\n")
         assert digest() != before, name
         (package / name).write_bytes(text.replace("\n", "\r\n").encode())
-        assert digest() == before, name  # checked out with other ends of lines
+        assert digest() == before, name  # checked out with other line endings
     (package / "cli" / "show.py").write_text("")
     assert digest() == before
 
 
-def test_whatever_decides_results_counts() -> None:
+def test_all_modules_that_affect_results_count() -> None:
     parts = "conevo.runs.lab, conevo.runs.testing, conevo.worlds.rollout"
     find = f"import sys, {parts}; print(*sys.modules)"
     loaded = subprocess.run(
@@ -115,7 +115,7 @@ def of_first_release(about: dict[str, Any]) -> None:
     ]
 
 
-def test_sessions_say_what_made_them(tmp_path: Path) -> None:
+def test_sessions_record_their_versions(tmp_path: Path) -> None:
     run = interrupted(tmp_path / "run")
     run.resume(threads=1)
     first, second = run.provenance["sessions"]
@@ -169,7 +169,7 @@ def test_other_code_is_refused_or_recorded(
     )
 
 
-def test_generations_that_are_made_again_count_for_the_later_code() -> None:
+def test_repeated_generations_count_for_the_later_code() -> None:
     def session(start: int, code: str) -> dict[str, Any]:
         of = {"conevo": code[0], "code": code, "numpy": "2", "warp": "1", "device": "cpu"}
         return of | {"from_generation": start}
@@ -180,13 +180,13 @@ def test_generations_that_are_made_again_count_for_the_later_code() -> None:
     ]
 
 
-def test_a_finished_run_by_other_code_is_looked_at_and_tested(tmp_path: Path) -> None:
+def test_a_finished_run_by_other_code_is_shown_and_tested(tmp_path: Path) -> None:
     run = evolve_tiny(tmp_path / "run")
     change(run.path, of_another)
     assert conevo.Run(run.path).test(threads=1) == run.test_result["champion"]
 
 
-def test_the_code_of_an_origin_is_shown_where_it_is_another(
+def test_the_code_of_an_origin_is_shown_if_it_differs(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     def shown(*command: str) -> tuple[str, str]:
@@ -219,7 +219,7 @@ def test_the_code_of_an_origin_is_shown_where_it_is_another(
     assert "made by" not in shown("show", f"{run}-again")[0]
 
 
-def test_the_world_is_described_where_no_world_is_needed(tmp_path: Path) -> None:
+def test_the_world_is_described_without_loading_it(tmp_path: Path) -> None:
     header = evolve_tiny(tmp_path / "run").provenance["world"]
     assert (header["name"], header["environment"], header["n_robots"]) == (
         "rover-v2",

@@ -27,7 +27,7 @@ def test_unchanged_conditions_change_nothing(run: conevo.Run) -> None:
     assert {p: p.read_bytes() for p in run.path.rglob("*") if p.is_file()} == before
 
 
-def test_settings_and_environment_are_those_asked_for(run: conevo.Run) -> None:
+def test_settings_and_environment_are_the_requested_ones(run: conevo.Run) -> None:
     both = run.test_under("complex-2", {"world.iterations": 90}, scenarios=4, threads=1)
     params = replace(run.config.world_params, iterations=90)
     config = replace(run.config, environment="complex-2", world_params=params)
@@ -53,7 +53,7 @@ def test_fewer_robots_are_the_first_and_more_repeat_them(
     assert len(both["changed"]["labels"]) == both["conditions"]["robots"] == robots
 
 
-def test_controllers_move_on_and_clones_do_not_mind(run: conevo.Run, tmp_path: Path) -> None:
+def test_controllers_rotate_and_clones_are_unaffected(run: conevo.Run, tmp_path: Path) -> None:
     champion = run.champion
     assert champion is not None
     assert not (champion.genes[0] == champion.genes[1]).all()
@@ -85,7 +85,7 @@ def test_numbers_out_of_bounds_are_refused_before_anything_is_played(run: conevo
             run.test(scenarios, seed)
 
 
-def test_what_cannot_be_played_is_one_line(run: conevo.Run) -> None:
+def test_impossible_conditions_are_one_line(run: conevo.Run) -> None:
     for arguments, words in (
         ({"on": "gacc/complex-1"}, "16 inputs became 27"),
         ({"on": "complex-99"}, "complex-99"),

@@ -1,4 +1,4 @@
-"""Every layer overrides the one before; every wrong word is named with its place."""
+"""Every layer overrides the previous one; every wrong word is named with its place."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def test_every_preset_resolves_for_every_world_and_method(
 
 @pytest.mark.parametrize("preset", PRESETS)
 def test_tables_of_a_preset_are_those_of_known_worlds_and_methods(preset: str) -> None:
-    """A misspelt table would leave its world with the sizes of any."""
+    """A misspelt table would leave its world with the sizes for any world."""
     text = (resources.files("conevo.runs") / "presets" / f"{preset}.toml").read_text()
     tables = tomllib.loads(text)
     assert set(tables) <= {"any", *(entry.short_name for entry in WORLDS.values())}
@@ -97,7 +97,7 @@ def test_layers_override_one_another_in_order(tmp_path: Path) -> None:
     assert (with_set.run.epochs, with_set.run.generations) == (4, 7)
 
 
-def test_names_on_the_command_line_win_over_the_files(tmp_path: Path) -> None:
+def test_names_on_the_command_line_override_files(tmp_path: Path) -> None:
     file = tmp_path / "mine.toml"
     file.write_text(
         '[run]\nworld = "rover/simple-2"\nmethod = "mesp"\npreset = "smoke"\nseed = 9\n'
@@ -118,7 +118,9 @@ def test_short_keys_are_understood_where_they_are_unique() -> None:
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_resolved_configuration_comes_back_from_its_own_file(method: str, tmp_path: Path) -> None:
+def test_a_resolved_configuration_is_restored_from_its_own_file(
+    method: str, tmp_path: Path
+) -> None:
     config = resolve(TASK, method, "desk", seed=5, overrides={"run.target": 12.5})
     file = tmp_path / "config.toml"
     file.write_text(config.to_toml())
@@ -126,7 +128,9 @@ def test_resolved_configuration_comes_back_from_its_own_file(method: str, tmp_pa
     assert resolve(file=file).run_id == config.run_id
 
 
-def test_run_id_changes_with_every_setting_but_not_with_the_presets_name(tmp_path: Path) -> None:
+def test_the_run_id_changes_with_every_setting_but_not_with_the_presets_name(
+    tmp_path: Path,
+) -> None:
     config = resolve(TASK, preset="desk")
     ids = {config.run_id}
     variations = [
@@ -243,7 +247,7 @@ def test_a_missing_file_is_a_wrong_request(tmp_path: Path) -> None:
         resolve(TASK, file=tmp_path / "none.toml")
 
 
-def test_configuration_file_spells_out_every_field() -> None:
+def test_a_configuration_file_contains_every_field() -> None:
     config = resolve(TASK, "cone", "desk")
     tables = tomllib.loads(config.to_toml())
     assert set(tables["method"]) == set(type(config.method_config).__dataclass_fields__)

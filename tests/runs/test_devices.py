@@ -1,4 +1,4 @@
-"""A run goes on, is tested and shown on any device, with the same bits; there are two pretended."""
+"""A run is continued, tested and shown on any device, bit for bit; two devices are simulated."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ OTHER = "this machine has no 'cuda:1', on which the run was last played: it is p
 
 
 @pytest.fixture(autouse=True)
-def nothing_said_before():
+def no_earlier_notes():
     provenance._warn_of_missing.cache_clear()
 
 
 def begun(path: Path, device: str, generations: int = 5) -> conevo.Run:
-    """Begin a run on a device and leave it after its first generation."""
+    """Start a run on a device and leave it after its first generation."""
     settings = tiny_settings("cone", run__generations=generations)
     config = resolve(TASK, "cone", "smoke", overrides=settings)
     return start(config, path, threads=1, device=device).resume(time_limit=1e-9, threads=1)
@@ -37,7 +37,7 @@ def devices(run: conevo.Run) -> list[str]:
     return [run.provenance["device"], *(one["device"] for one in run.provenance["sessions"])]
 
 
-def test_a_run_goes_on_on_another_kind_of_device_with_the_same_bits(two_cards, tmp_path):
+def test_a_run_continues_on_another_kind_of_device_bit_for_bit(two_cards, tmp_path):
     whole = content(evolve_tiny(tmp_path / "whole").path)
     run = begun(tmp_path / "down", "cuda:1")
     assert (run.status, len(run.generations())) == ("interrupted", 1)
@@ -50,7 +50,7 @@ def test_a_run_goes_on_on_another_kind_of_device_with_the_same_bits(two_cards, t
     assert content(run.path) == whole
 
 
-def test_by_default_a_run_goes_on_where_it_was_last(two_cards, tmp_path, caplog):
+def test_by_default_a_run_continues_on_its_last_device(two_cards, tmp_path, caplog):
     run = begun(tmp_path / "run", "cpu")
     run.resume(device="cuda:1", time_limit=1e-9)
     conevo.Run(run.path).resume()
@@ -62,7 +62,7 @@ def test_by_default_a_run_goes_on_where_it_was_last(two_cards, tmp_path, caplog)
     assert caplog.messages == []
 
 
-def test_a_device_that_is_missing_is_said_once_and_the_cpu_plays(
+def test_a_missing_device_is_noted_once_and_the_cpu_is_used(
     two_cards, tmp_path, monkeypatch, caplog
 ):
     run = begun(tmp_path / "run", "cuda:1", 2)
@@ -78,7 +78,7 @@ def test_a_device_that_is_missing_is_said_once_and_the_cpu_plays(
 
 
 @pytest.mark.parametrize("cards", [["cuda:0", "cuda:1"], []])
-def test_auto_is_recorded_as_what_it_became(cards, two_cards, tmp_path, monkeypatch):
+def test_auto_is_recorded_as_the_chosen_device(cards, two_cards, tmp_path, monkeypatch):
     if not cards:
         monkeypatch.setattr("warp.get_cuda_devices", list)
     became = cards[0] if cards else "cpu"
@@ -112,16 +112,16 @@ def test_the_command_line_takes_the_device(words, tmp_path, monkeypatch, capsys)
     run = begun(tmp_path / "run", "cpu", 2)
     monkeypatch.chdir(tmp_path)
 
-    def said(device: str) -> tuple[int, str]:
+    def outcome(device: str) -> tuple[int, str]:
         with pytest.raises(SystemExit) as caught:
             main([*words, str(run.path), "--device", device])
         return int(caught.value.code or 0), capsys.readouterr().err
 
-    assert said("gpu") == (
+    assert outcome("gpu") == (
         2, "conevo: error: 'gpu' is not a device; allowed: auto, cpu, cuda, cuda:N\n"
     )  # fmt: skip
     if words[0] in ("resume", "test", "replay", "film"):
-        code, err = said("cuda:99")
+        code, err = outcome("cuda:99")
         assert code == 3
         assert err.startswith("conevo: error: device 'cuda:99': ")
         assert err.count("\n") == 1
@@ -139,12 +139,14 @@ def test_commands_print_notes_of_the_library(two_cards, tmp_path, monkeypatch, c
         with pytest.raises(SystemExit) as caught:
             main([*command, str(run.path)])
         assert caught.value.code in (0, None)
-    said = capsys.readouterr()
-    assert said.err == f"conevo: note: {OTHER.replace('cuda:1', 'cuda:0')}, with the same results\n"
-    assert json.loads(said.out.splitlines()[0])["scenarios"] == 3
+    output = capsys.readouterr()
+    assert (
+        output.err == f"conevo: note: {OTHER.replace('cuda:1', 'cuda:0')}, with the same results\n"
+    )
+    assert json.loads(output.out.splitlines()[0])["scenarios"] == 3
 
 
-def test_what_is_not_a_device_is_refused_in_python_too(tmp_path):
+def test_other_names_than_those_of_devices_are_refused_in_python_too(tmp_path):
     run = begun(tmp_path / "run", "cpu", 2)
     with pytest.raises(UsageError, match="'tpu' is not a device; allowed: auto, cpu, cuda"):
         run.resume(device="tpu")

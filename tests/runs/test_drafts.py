@@ -1,4 +1,4 @@
-"""What is written appears all at once; what a kill leaves is removed, what lives is left alone."""
+"""Files appear all at once; drafts of killed processes are removed, those of others are not."""
 
 import errno
 import os
@@ -30,7 +30,7 @@ with (appearing if make == "directory" else draft_of)(Path(path)) as draft:
 
 @pytest.fixture
 def writer():
-    """Return a function that begins a process which writes a draft until it is killed."""
+    """Return a function that starts a process which writes a draft until it is killed."""
     begun = []
 
     def begin(make, path):
@@ -68,7 +68,7 @@ def test_a_draft_is_left_alone_while_it_is_written_and_removed_after_a_kill(tmp_
     assert names(tmp_path) == ["other", "page.html"]
 
 
-def test_whoever_takes_the_lock_removes_what_killed_processes_left_inside(tmp_path, writer):
+def test_the_owner_of_the_lock_removes_drafts_of_killed_processes(tmp_path, writer):
     for name in ("runs", "studies", "teams"):
         (tmp_path / name).mkdir()
     (tmp_path / "plan.toml").touch()
@@ -95,7 +95,7 @@ def test_whoever_takes_the_lock_removes_what_killed_processes_left_inside(tmp_pa
     assert alive.poll() is None
 
 
-def test_whoever_takes_the_lock_removes_the_draft_that_the_directory_was(tmp_path, writer):
+def test_the_owner_of_the_lock_removes_the_draft_of_the_directory(tmp_path, writer):
     path = tmp_path / "run"
     process = writer("directory", path)
     (hidden,) = tmp_path.iterdir()
@@ -115,7 +115,7 @@ def test_whoever_takes_the_lock_removes_the_draft_that_the_directory_was(tmp_pat
         {"owner": "", "letter.txt": "mine"},
     ],
 )
-def test_what_may_be_somebody_elses_is_left_alone(tmp_path, files):
+def test_files_of_unknown_origin_are_left_alone(tmp_path, files):
     hidden = tmp_path / ".thing.abcdefgh"
     hidden.mkdir()
     for name, text in files.items():
@@ -139,7 +139,7 @@ def test_a_draft_that_never_had_an_owner_is_removed(tmp_path, files):
     assert names(tmp_path) == ["thing"]
 
 
-def test_a_draft_that_another_process_took_for_abandoned_is_begun_again(tmp_path, monkeypatch):
+def test_a_draft_that_another_process_removed_as_abandoned_is_started_again(tmp_path, monkeypatch):
     real, taken = locks.take, []
 
     def take(handle, tries=locks.TRIES):
@@ -171,7 +171,7 @@ def test_torn_files_of_others_are_left_alone(tmp_path):
 
 @pytest.fixture(params=["ENOLCK", "ENOSYS", "ENOTSUP", "EIO"])
 def without_locks(request, monkeypatch):
-    """Make flock fail as file systems without locks do; return what that error is called."""
+    """Make flock fail as on file systems without locks; return the text of the error."""
     number = getattr(errno, request.param)
 
     def flock(handle, kind):
@@ -184,15 +184,13 @@ def without_locks(request, monkeypatch):
 def test_a_file_system_without_locks_is_named_and_nothing_appears(tmp_path, without_locks):
     with pytest.raises(EnvironmentFailure) as caught, appearing(tmp_path / "run"):
         pytest.fail("there is no lock")
-    said = f"cannot lock {tmp_path}: {without_locks}; without locks two processes could write"
-    assert said in str(caught.value)
+    message = f"cannot lock {tmp_path}: {without_locks}; without locks two processes could write"
+    assert message in str(caught.value)
     assert "--out" in str(caught.value)
     assert names(tmp_path) == []
 
 
-def test_a_directory_that_was_moved_to_such_a_file_system_is_read_but_not_written(
-    tmp_path, without_locks
-):
+def test_a_directory_moved_to_such_a_file_system_is_read_but_not_written(tmp_path, without_locks):
     (tmp_path / "config.toml").touch()
     directory = Directory(tmp_path, "run")
     assert not directory.is_in_use
@@ -200,9 +198,7 @@ def test_a_directory_that_was_moved_to_such_a_file_system_is_read_but_not_writte
         pytest.fail("there is no lock")
 
 
-def test_what_needs_no_lock_is_written_there_and_no_draft_of_others_removed(
-    tmp_path, without_locks
-):
+def test_files_without_a_lock_are_written_there_and_no_draft_is_removed(tmp_path, without_locks):
     hidden = tmp_path / ".film.gif.abcdefgh"
     hidden.mkdir()
     (hidden / "owner").write_text(hidden.name)
@@ -210,7 +206,7 @@ def test_what_needs_no_lock_is_written_there_and_no_draft_of_others_removed(
     assert names(tmp_path) == [hidden.name, "page.html"]
 
 
-def test_only_a_lock_that_another_process_holds_is_in_use(tmp_path):
+def test_only_a_lock_of_another_process_is_in_use(tmp_path):
     path = tmp_path / "lock"
     path.touch()
     with path.open("rb+") as first, path.open("rb+") as second:

@@ -1,4 +1,4 @@
-"""Scores by hand: means over epochs, private and team credit, degree of specialization, castes."""
+"""Scores by hand: means over epochs, individual and team credit, specialization, castes."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ OUTCOME = Outcome(
 
 @dataclass(frozen=True)
 class Counting(RoverWorld):
-    """Remembers how many scenarios were drawn each time."""
+    """Records the number of scenarios of every draw."""
 
     n_drawn: list[int] = field(default_factory=list)
 
@@ -53,7 +53,7 @@ def test_team_credit_is_the_sum_for_every_robot() -> None:
 
 
 class Rocks:
-    """Plays three robots and two rocks; a scenario multiplies what rocks are worth.
+    """Plays three robots and two rocks; a scenario is a factor of the rocks' values.
 
     Robot 0 alone finds a rock of 4; robot 1 finds one of 6, and if it does not, robot 2 does.
     """
@@ -78,8 +78,8 @@ class Worths:
         return np.arange(1, len(keys) + 1)
 
 
-def test_a_difference_is_what_the_team_lacks_without_the_robot() -> None:
-    """Robot 1 is paid for a rock that robot 2 would have found: it makes no difference."""
+def test_a_difference_is_the_loss_of_the_team_without_the_robot() -> None:
+    """Robot 1 is credited with a rock that robot 2 would have found: it makes no difference."""
     sizes: dict[str, Any] = {"seed": 1, "epochs": 2, "fittest_epochs": 3}
     played = {
         credit: make_evaluator(Rocks(), Worths(), **sizes, credit=credit)  # type: ignore[arg-type]
@@ -88,7 +88,7 @@ def test_a_difference_is_what_the_team_lacks_without_the_robot() -> None:
     genes = np.zeros((1, 4), np.float32)
     whole = np.zeros((1, 3, 2), np.int32)
     halves = whole.copy()
-    halves[0, 1] = -1  # robot 1 is without a network anyhow
+    halves[0, 1] = -1  # robot 1 has no network in any case
     trials = Trials(0, genes, np.concatenate([whole, halves]))
 
     def fitness(credit: str, trials: Trials) -> list[list[float]]:
@@ -191,8 +191,8 @@ def test_a_generation_shares_scenarios_and_fixed_ones_are_the_same_in_all() -> N
     np.testing.assert_array_equal(counts(4, scenarios="fixed"), fixed)
 
 
-def test_a_run_may_meet_those_of_generation_0_in_all_generations() -> None:
-    """In all rounds of all phases; what is the same in all generations is drawn once."""
+def test_a_run_may_use_the_scenarios_of_generation_0_in_all_generations() -> None:
+    """In all rounds of all phases; scenarios shared by all generations are drawn once."""
     task = Counting("complex-1", RoverParams(n_robots=3, iterations=60))
     small = controller(world=task, n_hidden=2, max_hidden=2)
     rollout = Rollout(task, small, 1)
@@ -215,11 +215,11 @@ def test_a_run_may_meet_those_of_generation_0_in_all_generations() -> None:
         counts(fresh, generation)
         counts(fresh, generation, scenarios="fixed")
         counts(fixed, generation, rounds=2)
-    assert task.n_drawn == [2, 2, 2]  # fresh ones of each generation, nothing else
+    assert task.n_drawn == [2, 2, 2]  # only the fresh ones of each generation
 
 
-def test_each_round_of_trials_meets_scenarios_of_its_own() -> None:
-    """The first round those of the generation, every further one as many others."""
+def test_each_round_of_trials_has_its_own_scenarios() -> None:
+    """The first round has those of the generation, every further one the same number of others."""
     task = world("rover/complex-1", n_robots=3, iterations=60)
     small = controller(world=task, n_hidden=2, max_hidden=2)
     evaluate = make_evaluator(

@@ -1,4 +1,4 @@
-"""A run that is continued beyond its end is the run that was planned that long: bit for bit."""
+"""A run continued beyond its end equals one planned with that length, bit for bit."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def run(short: Path, tmp_path: Path) -> conevo.Run:
 
 
 @pytest.mark.parametrize(("method", "task"), PAIRS)
-def test_a_continued_run_is_the_one_planned_that_long(
+def test_a_continued_run_equals_one_planned_with_that_length(
     method: str, task: str, tmp_path: Path
 ) -> None:
     planned = evolve_tiny(tmp_path / "planned", method, task, run__generations=18)
@@ -79,7 +79,7 @@ def test_both_ends_stay_in_the_provenance(run: conevo.Run, whole: dict[str, Any]
     assert [session["from_generation"] for session in run.provenance["sessions"]] == [0, 5, 7]
 
 
-def test_a_run_ended_by_its_budget_goes_on_with_a_larger_one(tmp_path: Path) -> None:
+def test_a_run_ended_by_its_budget_continues_with_a_larger_one(tmp_path: Path) -> None:
     cost = evolve_tiny(tmp_path / "one", run__generations=1).generations()[0]["team_evaluations"]
     small, large = int(2.5 * cost), int(6.5 * cost)
     planned = evolve_tiny(tmp_path / "planned", run__generations=50, run__budget_evaluations=large)
@@ -91,7 +91,7 @@ def test_a_run_ended_by_its_budget_goes_on_with_a_larger_one(tmp_path: Path) -> 
     assert content(run.path) == content(planned.path)
 
 
-def test_a_run_ended_by_its_target_goes_on_without_it(
+def test_a_run_ended_by_its_target_continues_without_it(
     run: conevo.Run, whole: dict[str, Any], tmp_path: Path
 ) -> None:
     ended = evolve_tiny(tmp_path / "ended", run__generations=9, run__target=-1.0)
@@ -118,7 +118,7 @@ def test_a_run_that_is_not_finished_is_given_another_length(
         assert run.provenance["extended"][0]["stopped_by"] is None
 
 
-def test_less_than_what_is_done_is_refused(run: conevo.Run) -> None:
+def test_less_than_the_finished_length_is_refused(run: conevo.Run) -> None:
     before = {p: p.read_bytes() for p in run.path.rglob("*") if p.is_file() and p.name != "lock"}
     for length, words in (
         ({"generations": 4}, r"has done 5 generations: run\.generations = 4 is fewer"),
@@ -215,12 +215,12 @@ def test_a_run_of_conevo_0_1_0_keeps_its_length(run: conevo.Run) -> None:
         run.resume(generations=9)
 
 
-def test_a_command_line_stops_in_time_and_goes_on(tmp_path: Path, whole: dict[str, Any]) -> None:
+def test_a_command_line_stops_in_time_and_continues(tmp_path: Path, whole: dict[str, Any]) -> None:
     path = tmp_path / "run"
     process = spawn(*command(path, "cone", run__generations=9), "--time-limit", "0.001s")
-    out, said = process.communicate(timeout=120)
-    assert process.returncode == 0, said
-    assert f"after 1 generation; continue with: conevo resume {path}" in out + said
+    out, message = process.communicate(timeout=120)
+    assert process.returncode == 0, message
+    assert f"after 1 generation; continue with: conevo resume {path}" in out + message
     assert conevo.Run(path).status == "interrupted"
     conevo.Run(path).resume(threads=1)
     assert content(path) == whole

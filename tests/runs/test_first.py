@@ -34,7 +34,7 @@ def begin(path: Path, method: str = "ccga", **more: Any) -> Shaping:
     return start_stages(both(method, **more), path, threads=1)
 
 
-def test_the_second_stage_begins_with_copies_of_the_champion_and_noise(tmp_path: Path) -> None:
+def test_the_second_stage_starts_from_copies_of_the_champion_and_noise(tmp_path: Path) -> None:
     shaping = begin(tmp_path / "two", **{"method.start_noise": 0.02}).resume(threads=1)
     first, second = shaping.stages
     champion = first.champion
@@ -56,7 +56,7 @@ def test_the_second_stage_begins_with_copies_of_the_champion_and_noise(tmp_path:
     assert origin["generation"] == champion.generation
 
 
-def test_the_first_stage_is_a_run_of_its_share_of_the_length_as_any_other(tmp_path: Path) -> None:
+def test_the_first_stage_is_an_ordinary_run_with_its_share_of_the_length(tmp_path: Path) -> None:
     shaping = begin(tmp_path / "two", first_share=1 / 3)
     shaping.resume(threads=1)
     first, second = shaping.stages
@@ -124,7 +124,7 @@ def test_strategies_of_whole_teams_may_come_first_and_second(tmp_path: Path) -> 
         )
 
 
-def test_a_method_that_cannot_begin_with_a_team_may_come_first_only(tmp_path: Path) -> None:
+def test_a_method_that_cannot_start_from_a_team_may_come_first_only(tmp_path: Path) -> None:
     name = f"{OWN_METHOD}:team-es"
     stages = resolve_stages([TASK], "ccga", "smoke", 1, SHORT | {"first": name}, TINY)
     shaping = start_stages(stages, tmp_path / "two", threads=1).resume(threads=1)
@@ -137,7 +137,7 @@ def test_a_method_that_cannot_begin_with_a_team_may_come_first_only(tmp_path: Pa
         resolve_stages([TASK], name, "smoke", 1, SHORT, TINY)
 
 
-def test_kills_between_and_within_the_stages_are_not_noticed(tmp_path: Path) -> None:
+def test_kills_between_and_within_the_stages_change_nothing(tmp_path: Path) -> None:
     path = tmp_path / "killed"
     settings = {k: v for k, v in SHORT.items() if k not in ("first", "method.genotypes")}
     sets = [word for key, value in settings.items() for word in ("--set", f"{key}={value}")]
@@ -175,7 +175,7 @@ def test_kills_between_and_within_the_stages_are_not_noticed(tmp_path: Path) -> 
         ({"run.budget_evaluations": 1}, "run.budget_evaluations = 1 here cannot be shared"),
     ],
 )
-def test_what_cannot_be_two_stages_is_one_clear_line(changes: dict[str, Any], words: str) -> None:
+def test_wrong_stages_are_one_clear_line(changes: dict[str, Any], words: str) -> None:
     with pytest.raises(UsageError, match=words) as caught:
         both(**changes)
     assert "\n" not in str(caught.value)

@@ -1,4 +1,4 @@
-"""Tables of a run as DataFrames: what they show is what the records have, typed and flat."""
+"""Tables of a run as DataFrames: the contents of the records, typed and flat."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A run holds the files that it needs: moved, without them or with other ones, it is the same."""
+"""A run has copies of its files: moved, without the originals or with others, it is the same."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ TINY: dict[str, Any] = {
 
 @pytest.fixture
 def light(tmp_path: Path) -> Path:
-    """A world in a file of its own, with a neighbour."""
+    """A world in its own file, which imports another file."""
     folder = tmp_path / "worlds"
     folder.mkdir()
     text = LIGHT.read_text().replace("ENTRY = ", "import colours\n\nENTRY = ")
@@ -49,7 +49,7 @@ def test_a_run_in_an_own_world_needs_nothing_outside_its_directory(
     assert {p.name for p in (run.path / "inputs").iterdir()} == {"light.py", "colours.py"}
     assert 'world = "inputs/light.py:dark-1"' in (run.path / "config.toml").read_text()
     made, team = content(run.path), run.champion
-    light.write_text("raise SystemExit")  # edited, then gone
+    light.write_text("raise SystemExit")  # edited, then removed
     moved = run.path.rename(tmp_path / "elsewhere")
     shutil.rmtree(light.parent)
     found = conevo.Run(moved)
@@ -61,7 +61,7 @@ def test_a_run_in_an_own_world_needs_nothing_outside_its_directory(
     assert content(again.path) == made
 
 
-def test_a_moved_run_is_carried_on_with_its_own_prey(tmp_path: Path) -> None:
+def test_a_moved_run_is_continued_with_its_own_prey(tmp_path: Path) -> None:
     file = tmp_path / "p" / "prey.npz"
     file.parent.mkdir()
     shutil.copy(SHIPPED, file)
@@ -119,7 +119,7 @@ def test_two_files_of_one_name_are_refused_and_nothing_is_written(
     assert not list(tmp_path.glob("*run*"))
 
 
-def test_a_shaping_holds_what_its_stages_need(tmp_path: Path, light: Path) -> None:
+def test_a_shaping_contains_the_files_of_its_stages(tmp_path: Path, light: Path) -> None:
     text = light.read_text().replace('("dark-1",)', '("dark-1", "dark-2")')
     light.write_text(text)
     tasks = [f"{light}:dark-1", f"{light}:dark-2"]
@@ -131,7 +131,7 @@ def test_a_shaping_holds_what_its_stages_need(tmp_path: Path, light: Path) -> No
     assert (moved.path / "stage-2" / "inputs" / "colours.py").is_file()
 
 
-def test_a_preset_that_would_be_a_label_only_is_refused(tmp_path: Path) -> None:
+def test_a_preset_without_any_effect_is_refused(tmp_path: Path) -> None:
     run = evolve_tiny(tmp_path / "run")
     file = run.path / "config.toml"
     refused = r"'thesis' would change only the run's label.*already set in .*config\.toml"

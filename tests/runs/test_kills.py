@@ -1,4 +1,4 @@
-"""A hundred kills at random moments: nothing is lost, and all ends as if nothing had happened."""
+"""A hundred kills at random moments: nothing is lost, and results are those without kills."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ PAIRS = [(method, task) for method in conevo.METHODS for task in TASKS]
 
 
 def spawn(*words: str) -> subprocess.Popen[str]:
-    """Start conevo as a group of processes, so that its workers are killed with it."""
+    """Start conevo as a process group, so that its workers are killed with it."""
     return subprocess.Popen(
         [sys.executable, "-m", "conevo", *words],
         stdout=subprocess.PIPE,
@@ -35,7 +35,7 @@ def spawn(*words: str) -> subprocess.Popen[str]:
 
 
 def to_the_end(words: list[str]) -> float:
-    """Carry out a command and return the seconds that it took."""
+    """Execute a command and return its duration in seconds."""
     began, process = time.monotonic(), spawn(*words)
     _, err = process.communicate()
     assert (process.returncode, "Traceback" in err) == (0, False), err
@@ -43,9 +43,9 @@ def to_the_end(words: list[str]) -> float:
 
 
 def kill(words: list[str], again: list[str], path: Path, n: int, rng: random.Random) -> None:
-    """Kill what a command makes at ``path`` ``n`` times while it evolves, and carry on each time.
+    """Kill a command that evolves at ``path`` ``n`` times, and resume it each time.
 
-    The moments are random: so many of 40 generations, and up to a twentieth of a second more.
+    The moments are random: after up to 40 generations, and up to a twentieth of a second more.
     """
     for generation in sorted(rng.choices(range(36), k=n)):
         process = spawn(*words)

@@ -1,4 +1,4 @@
-"""What a method has to give the loop: each omission is one line."""
+"""The duties of a method towards the loop: each omission is one line."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ LAYOUT = Layout(n_robots=2, n_hidden=1, max_hidden=1, n_genes=3)
 
 @dataclass(frozen=True)
 class Note:
-    """A state that is no more than its header."""
+    """A state that consists of its header alone."""
 
     progress: Progress
 
@@ -49,13 +49,13 @@ class Still:
 
     def tell(self, state: Note, trials: Trials, scores: Scores) -> Note:
         """Return the next generation."""
-        told = state.progress.counted(trials, scores, is_first=True).graded(scores.fitness)
-        told = told.crowned(trials, scores).with_numbers(**self.numbers)
-        return Note(replace(told, generation=told.generation + 1))
+        changes = state.progress.counted(trials, scores, is_first=True).graded(scores.fitness)
+        changes = changes.crowned(trials, scores).with_numbers(**self.numbers)
+        return Note(replace(changes, generation=changes.generation + 1))
 
 
 def play(trials: Trials) -> Evaluation:
-    """Return scores that any teams get."""
+    """Return scores that do not depend on the teams."""
     n = len(trials.teams)
     fitness = np.full((n, 2), 0.5)
     outcome = Outcome(
@@ -95,7 +95,7 @@ def test_a_header_is_enough_and_the_methods_numbers_are_in_the_log() -> None:
     assert price(Still(), Still().init(LAYOUT, 1), RunSettings()) == 2
 
 
-def test_what_a_difference_takes_is_counted_and_paid() -> None:
+def test_evaluations_of_a_difference_are_counted_and_paid() -> None:
     """Teams of two robots play three times: six evaluations a generation, in three epochs each."""
     records: list[dict[str, Any]] = []
     settings = RunSettings(epochs=7, fittest_epochs=3, credit="difference", budget_evaluations=13)
@@ -143,7 +143,7 @@ def test_a_generation_without_a_portrait_is_refused() -> None:
         ({"generation": 4}, "its generation must be 0, not 4"),
     ],
 )
-def test_what_cannot_be_evaluated_is_refused(asked: dict[str, Any], words: str) -> None:
+def test_wrong_trials_are_refused(asked: dict[str, Any], words: str) -> None:
     @dataclass(frozen=True)
     class Wrong(Still):
         def ask(self, state: Note) -> Trials:
@@ -155,18 +155,18 @@ def test_what_cannot_be_evaluated_is_refused(asked: dict[str, Any], words: str) 
 
 
 @pytest.mark.parametrize(
-    ("told", "words"),
+    ("changes", "words"),
     [
         ({"team_evaluations": 0}, "tell counts 0 team evaluations, 2 were made"),
         ({"generation": 3}, "generation 0 of 1 became 3 of 1"),
         ({"root": 5}, "generation 0 of 1 became 1 of 5"),
     ],
 )
-def test_a_header_that_does_not_follow_is_refused(told: dict[str, Any], words: str) -> None:
+def test_a_header_that_does_not_follow_is_refused(changes: dict[str, Any], words: str) -> None:
     @dataclass(frozen=True)
     class Wrong(Still):
         def tell(self, state: Note, trials: Trials, scores: Scores) -> Note:
-            return Note(replace(super().tell(state, trials, scores).progress, **told))
+            return Note(replace(super().tell(state, trials, scores).progress, **changes))
 
     for use in (log_of, lambda method: price(method, method.init(LAYOUT, 1), RunSettings())):
         with pytest.raises(UsageError, match=words) as caught:
@@ -174,7 +174,7 @@ def test_a_header_that_does_not_follow_is_refused(told: dict[str, Any], words: s
         assert "\n" not in str(caught.value)
 
 
-def test_what_is_no_request_or_no_state_is_refused() -> None:
+def test_anything_but_a_request_or_a_state_is_refused() -> None:
     @dataclass(frozen=True)
     class Mute(Still):
         def ask(self, state: Note) -> Any:

@@ -32,7 +32,7 @@ SETTINGS = tiny_settings("homcne")
 
 @pytest.fixture
 def mine(tmp_path: Path) -> Path:
-    """The example, in a file that a test may change, next to one that it imports."""
+    """The example, in a file that a test may change, next to a file that it imports."""
     folder = tmp_path / "methods"
     folder.mkdir()
     (folder / "sizes.py").write_text("MANY = 30\n")
@@ -60,11 +60,11 @@ def test_a_name_finds_the_method_wherever_it_is_named(
         assert again.method_entry == config.method_entry
         assert again.method_config.genotypes == 30  # its own default, from the file that it imports
         assert conevo.method(name, genotypes=5).config.genotypes == 5
-    assert again.run == resolve(TASK, "cone").run  # the preset says how long, not how large
+    assert again.run == resolve(TASK, "cone").run  # the preset sets the length, not the sizes
     assert NAME not in METHODS
 
 
-def test_a_run_is_known_by_the_text_and_needs_nothing_outside_its_directory(
+def test_a_run_is_identified_by_the_text_and_needs_nothing_outside_its_directory(
     mine: Path, tmp_path: Path
 ) -> None:
     run = evolved(tmp_path / "run", f"{mine}:{NAME}")
@@ -129,7 +129,7 @@ def imported(file: Path) -> ModuleType:
     return module
 
 
-def test_an_object_is_as_good_as_its_name(
+def test_an_object_works_like_its_name(
     mine: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.syspath_prepend(str(mine.parent))
@@ -171,7 +171,7 @@ class Homeless:
 def test_an_object_that_no_run_can_keep_is_refused(
     mine: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    session = ModuleType("__main__")  # as in a session of Python
+    session = ModuleType("__main__")  # as in an interactive session
     monkeypatch.setitem(sys.modules, "__main__", session)
     exec(TEXT.partition("if __name__")[0], vars(session))
     other = TEXT.replace("class RandomSearch:", "class Other(object):\n    pass\n\n\n"
@@ -225,7 +225,7 @@ def test_a_session_on_the_command_line(
         assert say(capsys, *shlex.split(line)[1:])[::2] == (0, ""), line
 
 
-def test_no_other_run_begins_with_it_unless_it_has_populations(mine: Path, tmp_path: Path) -> None:
+def test_no_other_run_starts_from_it_unless_it_has_populations(mine: Path, tmp_path: Path) -> None:
     origin = evolved(tmp_path / "origin", f"{mine}:{NAME}")
     run = evolved(tmp_path / "run", "homcne", origin=origin)  # both have whole networks
     assert run.status == "finished"
@@ -269,7 +269,7 @@ def test_a_bad_file_is_one_clear_line_and_nothing_is_written(
     monkeypatch.chdir(tmp_path)
     text, words = BAD[name]
     Path("bad.py").write_text(text)
-    for _ in range(2):  # a file that failed once is not taken for loaded
+    for _ in range(2):  # a file that failed once does not count as loaded
         code, out, err = say(capsys, "run", TASK, "--method", "bad.py:other")
         assert (code, out, err.count("\n")) == (2, "", 1)
         assert err.startswith("conevo: error: ")
@@ -338,7 +338,7 @@ def test_a_state_that_cannot_be_kept_is_refused_before_anything_is_written(
     assert not (tmp_path / "run").exists()
 
 
-def test_an_error_of_its_own_is_named_with_its_line(
+def test_an_error_in_the_file_is_named_with_its_line(
     mine: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     old = "credit.of_clones(scores.fitness)[None]"
@@ -355,6 +355,6 @@ def test_an_error_of_its_own_is_named_with_its_line(
     )
 
 
-def test_the_example_is_what_the_registry_finds() -> None:
+def test_the_registry_finds_the_example() -> None:
     entry = resolve_method(f"{EXAMPLE}:{NAME}")
     assert (entry.name, entry.title, entry.file) == (NAME, "random search", str(EXAMPLE))

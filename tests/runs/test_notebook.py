@@ -1,4 +1,4 @@
-"""Runs in a notebook: the bar while they evolve, and the cards that are displayed of them."""
+"""Runs in a notebook: the bar while they evolve, and their cards."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from runs.tiny import TASK, evolve_tiny, tiny_settings
 
 
 class Notebook:
-    """Stands in for IPython in a kernel: keeps what is displayed, and its updates."""
+    """Replaces IPython in a kernel: stores displayed objects and their updates."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.shown: list[dict[str, str]] = []
@@ -53,7 +53,7 @@ def unbegun(path: Path) -> conevo.Run:
 
 
 def shares(notebook: Notebook) -> list[float]:
-    """The values of the bar, one for each time that it was displayed."""
+    """The values of the bar, one for each display."""
     return [float(re.findall(r'value="([\d.]+)"', one["text/html"])[0]) for one in notebook.shown]
 
 
@@ -71,7 +71,7 @@ def test_a_notebook_shows_one_bar_and_nothing_is_printed(
     assert capsys.readouterr().out == ""
 
 
-def test_an_interrupted_run_says_how_to_continue_it(tmp_path: Path, notebook: Notebook) -> None:
+def test_an_interrupted_run_shows_how_to_continue_it(tmp_path: Path, notebook: Notebook) -> None:
     run = unbegun(tmp_path / "a<b")
 
     def stop(run: conevo.Run, record: dict[str, Any]) -> None:
@@ -164,7 +164,7 @@ def test_the_card_of_a_run_shows_its_curve_its_test_and_its_castes(tmp_path: Pat
         assert re.search(rf"{caste} +{robots}\b", card.text)
 
 
-def test_the_card_of_a_run_that_has_not_begun_or_is_damaged_is_a_card(tmp_path: Path) -> None:
+def test_a_run_that_has_not_started_or_is_damaged_has_a_card(tmp_path: Path) -> None:
     run = unbegun(tmp_path / "run")
     assert "0 of 5 generations, 0 team evaluations" in Balanced(run._repr_html_()).text
     (run.path / "generations.jsonl").write_text("{<b>}\n")

@@ -1,4 +1,4 @@
-"""A run resolves its settings once, builds its world once, and uses what it has written."""
+"""A run resolves its settings once, builds its world once, and uses the written ones."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ LIGHT = f"{Path(__file__).resolve().parents[2] / 'examples' / 'light.py'}:dark-1
 
 @pytest.fixture
 def counted(monkeypatch: pytest.MonkeyPatch) -> Counter[str]:
-    """Calls of what resolves settings and of what builds a world."""
+    """Calls of the functions that resolve settings and build a world."""
     calls: Counter[str] = Counter()
 
     def counting(name: str, function: Any) -> Any:
@@ -54,7 +54,7 @@ def test_a_run_resolves_and_builds_once(
 
 
 @pytest.mark.parametrize("case", ["plain", "prey", "file"])
-def test_what_a_run_uses_is_what_it_has_written(case: str, tmp_path: Path) -> None:
+def test_a_run_uses_the_settings_that_it_has_written(case: str, tmp_path: Path) -> None:
     task = {"plain": "rover/complex-1", "prey": "pursuit/team-2", "file": LIGHT}[case]
     overrides = tiny_settings("homcne", task)
     if case == "prey":

@@ -1,4 +1,4 @@
-"""One run that begins with the populations of another."""
+"""A run that starts from the populations of another."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def descend(origin: conevo.Run, path: Path | None, seed: int = 1) -> conevo.Run:
     return start(config, path, threads=1, origin=origin)
 
 
-def test_a_run_may_begin_with_the_populations_of_another(
+def test_a_run_may_start_from_the_populations_of_another(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -30,7 +30,7 @@ def test_a_run_may_begin_with_the_populations_of_another(
     run = descend(origin, None)
     checkpoint = run.provenance["origin"]["checkpoint"]
     assert run.path.name == f"{origin.config.label}-from-{checkpoint[:6]}"
-    shutil.rmtree(origin.path)  # nothing of it is needed any more
+    shutil.rmtree(origin.path)  # it is no longer needed
     run.resume(threads=1)
     again = evolve_tiny(tmp_path / "again")
     assert run.config.run_id == again.config.run_id
@@ -91,7 +91,7 @@ def test_a_run_may_be_bred_from_the_champion_of_another(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("method", ["homcne", "hetcne", "ccga", "mesp", "cone"])
-def test_clones_may_be_followed_by_any_method_with_a_spread_of_its_own(
+def test_clones_may_be_followed_by_any_method_with_its_own_spread(
     method: str, tmp_path: Path
 ) -> None:
     origin = evolve_tiny(tmp_path / "origin", "homcne")
@@ -106,10 +106,10 @@ def test_clones_may_be_followed_by_any_method_with_a_spread_of_its_own(
         genes = first["field.genes"]
     assert origin.champion is not None
     away = genes[0] - origin.champion.genes[0][:, None]
-    used = away[origin.champion.active[0], 2:]  # hetcne has two robots' networks first
+    used = away[origin.champion.active[0], 2:]  # hetcne starts with two robots' networks
     assert 0.01 < used.std() < 0.03
     again = conevo.Run(run.path)
-    again.extend(generations=4, threads=1)  # before anything is done
+    again.extend(generations=4, threads=1)  # before anything else
     assert again.resume(threads=1).status == "finished"
 
 

@@ -1,4 +1,4 @@
-"""The example of ask and tell by hand works, and shows what it is there to show."""
+"""The example of ask and tell by hand works, and demonstrates its point."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ EXAMPLE = Path(__file__).parents[2] / "examples" / "own_function.py"
 def test_populations_divide_the_places_and_clones_cannot(
     name: str, least: float, most: float, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Four clones do best in the middle, at 4 x 1.5 x sqrt(2) = 8.485 from the places."""
+    """Four clones are best in the middle, at 4 x 1.5 x sqrt(2) = 8.485 from the places."""
     runpy.run_path(str(EXAMPLE))["main"](name)
     worth = [float(text) for text in re.findall(r"is worth (\S+)", capsys.readouterr().out)]
     assert len(worth) == 6

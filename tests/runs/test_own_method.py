@@ -85,7 +85,9 @@ def test_another_state_is_refused_by_its_own_check(tmp_path: Path) -> None:
             conevo.Run(run.path).resume(threads=1)
 
 
-def test_no_run_begins_with_its_populations_but_with_its_champion(tmp_path: Path) -> None:
+def test_no_run_starts_from_its_populations_but_one_may_start_from_its_champion(
+    tmp_path: Path,
+) -> None:
     origin = evolved(tmp_path / "origin")
     for method, words in (
         ("homcne", "the method it is from has none from which another run could start"),

@@ -77,7 +77,7 @@ def changed(path: Path, text: str, old: str, new: str) -> Path:
 
 
 def refused(tmp_path: Path, world: Path, method: str) -> str:
-    """Return why no run begins; nothing must have been written."""
+    """Return the reason why no run starts; nothing must have been written."""
     with pytest.raises(UsageError) as caught:
         conevo.evolve(
             f"{world}:open-1", method, "smoke", out=tmp_path / "run", overrides=FEW, threads=1
@@ -115,9 +115,9 @@ def test_a_simulator_that_cannot_play_empty_networks_has_no_difference_credit(
     monkeypatch.setitem(FEW, "run.generations", 1)
     conevo.evolve(f"{world}:open-1", "homcne", "smoke", out=tmp_path / "plain", overrides=FEW)
     monkeypatch.setitem(FEW, "run.credit", "difference")
-    said = refused(tmp_path, world, "homcne")
-    assert 'run.credit = "difference" needs robots with an empty network' in said
-    assert words in said
+    reason = refused(tmp_path, world, "homcne")
+    assert 'run.credit = "difference" needs robots with an empty network' in reason
+    assert words in reason
 
 
 @pytest.mark.parametrize(

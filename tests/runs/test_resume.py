@@ -1,4 +1,4 @@
-"""A run that was broken off, anywhere, ends as if it never had been: bit for bit."""
+"""A run that was broken off anywhere ends as if it had not been, bit for bit."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def test_resume_after_a_failure_at_every_write(
             assert caught.value.exit_code == 3
             assert str(path) in str(caught.value)
             assert "No space left on device" in str(caught.value)
-        if not path.exists():  # broken off in the first write: nothing is left
+        if not path.exists():  # interrupted in the first write: nothing is left
             assert [p.name for p in tmp_path.iterdir()] == ["whole"]
             continue
         run = conevo.Run(path)
@@ -77,17 +77,17 @@ def test_interrupt_keeps_the_last_finished_generation(tmp_path: Path) -> None:
     log = path / "generations.jsonl"
     wait_for(lambda: log.exists() and log.read_bytes().count(b"\n") >= 3)
     process.send_signal(signal.SIGINT)
-    _, said = process.communicate(timeout=30)
-    assert process.returncode == 130, said
-    assert f"continue with: conevo resume {path}" in said
+    _, message = process.communicate(timeout=30)
+    assert process.returncode == 130, message
+    assert f"continue with: conevo resume {path}" in message
     run = conevo.Run(path)
     count = len(run.generations())
     assert run.status == "interrupted"
     assert 3 <= count < 150
-    assert f"interrupted after {count} generations" in said
+    assert f"interrupted after {count} generations" in message
     starts: list[int] = []
     run.resume(threads=1, watch=lambda _, record: starts.append(record["generation"]))
-    # Ctrl-C between the log's line and the next statement: that generation is made again.
+    # Ctrl-C between the log's line and the next statement: that generation is repeated.
     assert starts[0] in (count - 1, count)
     whole = evolve_tiny(tmp_path / "whole", "mesp", **changes)
     assert content(path) == content(whole.path)
@@ -106,7 +106,7 @@ def interrupted(path: Path, *, after: int = 3) -> conevo.Run:
     return conevo.Run(path)
 
 
-def test_a_damaged_newest_checkpoint_falls_back_to_the_one_before(tmp_path: Path) -> None:
+def test_a_damaged_newest_checkpoint_falls_back_to_the_previous_one(tmp_path: Path) -> None:
     whole = evolve_tiny(tmp_path / "whole")
     run = interrupted(tmp_path / "run")
     damaged = max(run.path.glob("checkpoint-?.npz"), key=lambda p: p.stat().st_mtime_ns)

@@ -1,4 +1,4 @@
-"""A whole run: stop conditions, record, champion, testing phase, the same bits twice."""
+"""A whole run: stop conditions, record, champion, testing phase, repeated bit for bit."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def test_the_same_seed_gives_the_same_run_for_any_number_of_threads(tmp_path: Pa
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_a_budget_is_never_passed_and_nearly_spent(method: str, tmp_path: Path) -> None:
+def test_a_budget_is_never_exceeded_and_nearly_spent(method: str, tmp_path: Path) -> None:
     free = evolve_tiny(tmp_path / "free", method)
     spent = [record["team_evaluations"] for record in free.generations()]
     budget = spent[2] + 1
@@ -53,7 +53,7 @@ def test_a_first_generation_that_searches_more_widely_is_priced_apart(tmp_path: 
     run = evolve_tiny(tmp_path / "run", "hom-es", run__budget_evaluations=45)
     records = run.generations()
     spent = [record["team_evaluations"] for record in records]
-    assert spent == [17, 26, 35, 44]  # four pairs, tried twice at first
+    assert spent == [17, 26, 35, 44]  # four pairs, tried twice in the first generation
     price = price_of(run.config)
     assert (price.evaluations, price.generations) == (17, 4)
     assert price.team_steps == records[-1]["team_steps"]
@@ -79,7 +79,7 @@ def test_a_run_on_differences_counts_every_team_that_was_played(
     )
     assert run.test_result is not None
     finalist = run.test_result["validation"]["finalists"][0]
-    assert finalist["selection"]["fitness"] is None  # a difference is not a fitness
+    assert finalist["selection"]["fitness"] is None  # a difference differs from the fitness
     assert finalist["selection"]["performance"]["value"] is not None
 
 
@@ -170,7 +170,7 @@ def test_the_record_of_a_generation(tmp_path: Path) -> None:
     assert (homcne["sst"], homcne["gst"], homcne["n_hidden"]) == (None, None, [2])
 
 
-def test_the_champion_is_the_best_of_the_fittest_teams_in_scenarios_of_their_own(
+def test_the_champion_is_the_best_of_the_fittest_teams_in_separate_scenarios(
     tmp_path: Path,
 ) -> None:
     lucky = 0
@@ -216,7 +216,7 @@ def test_the_champion_is_the_best_of_the_fittest_teams_in_scenarios_of_their_own
     assert lucky > 0  # at least once the best by selection was not the best
 
 
-def test_while_a_run_goes_on_its_champion_is_the_fittest_so_far(tmp_path: Path) -> None:
+def test_the_champion_of_an_unfinished_run_is_the_fittest_so_far(tmp_path: Path) -> None:
     seen: list[int] = []
 
     def look(run: conevo.Run, record: dict[str, Any]) -> None:
@@ -285,7 +285,7 @@ def test_a_team_as_a_trial_uses_exactly_its_active_slots() -> None:
     assert teams.tolist() == [[[0, 1], [-1, 3]]]
 
 
-def test_generations_worth_keeping_are_few_and_begin_with_the_first() -> None:
+def test_kept_generations_are_few_and_start_with_the_first() -> None:
     assert sampled_generations(3) == {0, 1, 2}
     assert sampled_generations(100) == set(range(0, 100, 8))
     for n in range(17, 300):
@@ -338,7 +338,7 @@ def test_a_run_can_be_repeated_from_its_own_configuration(tmp_path: Path) -> Non
     assert content(again.path) == content(run.path)
 
 
-def test_provenance_says_what_the_result_was_made_with(tmp_path: Path) -> None:
+def test_provenance_lists_versions_and_machine(tmp_path: Path) -> None:
     about = evolve_tiny(tmp_path / "run").provenance
     assert about["preset"] == "smoke"
     assert about["numpy"] == np.__version__

@@ -1,4 +1,4 @@
-"""A task learned in stages: each begins with the last one's populations, and no kill is noticed."""
+"""A task learned in stages: each starts from the previous populations, and kills change nothing."""
 
 from __future__ import annotations
 
@@ -33,13 +33,13 @@ PREY = {key: value for key, value in TINY.items() if key != "world.n_robots"} | 
 
 
 def begin(path: Path, method: str = "cone", tasks: list[str] = TASKS, **more: Any) -> Shaping:
-    """Start a tiny shaping in which everything a method has is at work."""
+    """Start a tiny shaping that uses every feature of a method."""
     settings = tiny_settings(method) | BRIEF | more
     return start_shaping(tasks, method, "smoke", out=path, overrides=settings, threads=1)
 
 
 def stages_content(path: Path) -> dict[str, Any]:
-    """Return everything that a shaping amounts to, without times."""
+    """Return all results of a shaping, without times."""
     found: dict[str, Any] = {"run_ids": [config.run_id for config in Shaping(path).configs]}
     lines = (path / "generations.jsonl").read_text().splitlines()
     found["generations"] = [json.loads(line) | {"seconds": 0} for line in lines]
@@ -53,7 +53,7 @@ def stages_content(path: Path) -> dict[str, Any]:
 
 
 def genes(path: Path) -> np.ndarray:
-    """Return what a checkpoint hands on, genotypes or the fittest team, or what it was handed."""
+    """Return the genotypes or the fittest team that a checkpoint hands on, or those it received."""
     with np.load(path) as archive:
         if "field.genes" in archive:
             return archive["field.genes"]
@@ -63,7 +63,7 @@ def genes(path: Path) -> np.ndarray:
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_every_stage_begins_with_the_populations_of_the_one_before(
+def test_every_stage_starts_from_the_populations_of_the_previous_one(
     method: str, tmp_path: Path
 ) -> None:
     shaping = begin(tmp_path / "shaped", method).resume(threads=1)
@@ -73,7 +73,7 @@ def test_every_stage_begins_with_the_populations_of_the_one_before(
     assert not (first.path / "origin.npz").exists()
     assert "origin" not in first.provenance
     alone = evolve_tiny(tmp_path / "alone", method, run__generations=3)
-    assert content(first.path) == content(alone.path)  # the first stage is a run as any other
+    assert content(first.path) == content(alone.path)  # the first stage is an ordinary run
     for before, run in zip(shaping.stages, others, strict=False):
         (last,) = before.path.glob("checkpoint-?.npz")
         rounded = 2.0**-23 if method == "cone-es" else 0  # its sum of a mean and a deviation
@@ -98,13 +98,13 @@ def test_the_same_settings_give_the_same_stages(tmp_path: Path) -> None:
     assert stages_content(one.path) == stages_content(two.path)
 
 
-def test_every_generation_is_numbered_through_and_says_what_it_saw(tmp_path: Path) -> None:
+def test_generations_are_numbered_through_and_name_their_tasks(tmp_path: Path) -> None:
     shaping = begin(tmp_path / "shaped")
     assert shaping.generations() == []
     interrupt(shaping, stage=2)
     file = shaping.path / "generations.jsonl"
     assert len(file.read_text().splitlines()) == 3  # of the stage that is sealed
-    assert len(shaping.generations()) == 5  # of what is under way too
+    assert len(shaping.generations()) == 5  # including the unfinished stage
     shaping.resume(threads=1)
     seen = shaping.generations()
     assert [json.loads(line) for line in file.read_text().splitlines()] == seen
@@ -165,7 +165,7 @@ def test_resume_after_a_failure_at_every_write(
         if isinstance(caught.value, EnvironmentFailure):
             assert str(path) in str(caught.value)
             assert "No space left on device" in str(caught.value)
-        if not path.exists():  # broken off in the first write: nothing is left
+        if not path.exists():  # interrupted in the first write: nothing is left
             assert [p.name for p in tmp_path.iterdir()] == ["whole"]
             continue
         shaping = Shaping(path)
@@ -208,7 +208,7 @@ def command(path: Path, settings: dict[str, Any]) -> list[str]:
 
 
 @pytest.mark.slow
-def test_kills_between_and_within_the_stages_are_not_noticed(tmp_path: Path) -> None:
+def test_kills_between_and_within_the_stages_change_nothing(tmp_path: Path) -> None:
     path, settings = tmp_path / "killed", tiny_settings("cone") | BRIEF
     first = ["run", "rover/complex-3", "--shape", *command(path, settings)]
     killed_at(r"/\.killed\.\w+/killed/shaping\.toml", *first)
@@ -238,8 +238,8 @@ def test_kills_between_and_within_the_stages_are_not_noticed(tmp_path: Path) -> 
     assert list(path.glob(".*")) == []
 
 
-def test_kills_while_construction_is_learned_in_turn_are_not_noticed(tmp_path: Path) -> None:
-    """The environments differ in objects, obstacles and what is to be built, not in teams."""
+def test_kills_during_stages_of_construction_change_nothing(tmp_path: Path) -> None:
+    """The environments differ in objects, obstacles and complex objects, not in teams."""
     tasks, path = tasks_up_to("gacc/complex-4"), tmp_path / "killed"
     settings = tiny_settings("cone", tasks[0]) | {"run.generations": 2, "world.iterations": 150}
     arguments = ["run", "gacc/complex-4", "--shape", *command(path, settings)]
@@ -274,7 +274,7 @@ def test_an_interrupted_stage_can_also_be_finished_by_itself(tmp_path: Path) -> 
 
 
 def interrupt(shaping: Shaping, stage: int) -> None:
-    """Carry a shaping on to the second generation of a stage."""
+    """Continue a shaping up to the second generation of a stage."""
 
     def stop(run: conevo.Run, record: dict[str, Any]) -> None:
         if run.path.name == f"stage-{stage}" and record["generation"] == 1:
@@ -284,7 +284,7 @@ def interrupt(shaping: Shaping, stage: int) -> None:
         shaping.resume(threads=1, watch=stop)
 
 
-def test_a_stage_without_checkpoints_begins_again_with_what_it_was_given(tmp_path: Path) -> None:
+def test_a_stage_without_checkpoints_starts_again_from_its_origin(tmp_path: Path) -> None:
     shaping = begin(tmp_path / "shaped")
     interrupt(shaping, stage=2)
     for file in (shaping.path / "stage-2").glob("checkpoint-?.npz"):
@@ -311,10 +311,10 @@ def test_a_lost_or_damaged_origin_is_not_silently_replaced(tmp_path: Path) -> No
 
 def test_two_processes_do_not_work_in_one_shaping(tmp_path: Path) -> None:
     shaping = begin(tmp_path / "shaped")
-    said: list[str] = []
+    messages: list[str] = []
 
     def again(run: conevo.Run, record: dict[str, Any]) -> None:
-        if said:
+        if messages:
             return
         for path, name in ((shaping.path, "shaping"), (run.path, "run")):
             done = subprocess.run(
@@ -325,18 +325,18 @@ def test_two_processes_do_not_work_in_one_shaping(tmp_path: Path) -> None:
                 check=False,
             )
             assert done.returncode == 2
-            said.append(done.stderr)
+            messages.append(done.stderr)
             with pytest.raises(UsageError, match=f"already holds a {name}, in use by process"):
                 begin(path)
         assert shaping.status == "running"
 
     shaping.resume(threads=1, watch=again)
-    assert len(said) == 2
-    for line in said:
+    assert len(messages) == 2
+    for line in messages:
         assert re.fullmatch(rf"conevo: error: .* is in use by process {os.getpid()}; .*\n", line)
 
 
-# --- what cannot be done ------------------------------------------------------------------------
+# --- wrong requests -----------------------------------------------------------------------------
 
 
 # For both worlds.
@@ -353,7 +353,7 @@ SMALL = {"run.generations": 1, "controller.n_hidden": 2, "controller.max_hidden"
         (TASKS, TINY | {"run.generatoins": 3}, "did you mean 'run.generations'"),
     ],
 )
-def test_what_any_stage_cannot_do_is_refused_before_anything_is_written(
+def test_a_wrong_setting_of_any_stage_is_refused_before_anything_is_written(
     tasks: list[str], settings: dict[str, Any], words: str, tmp_path: Path
 ) -> None:
     with pytest.raises(UsageError, match=words):
@@ -391,7 +391,7 @@ def test_an_edited_or_damaged_plan_is_refused(tmp_path: Path) -> None:
     assert Shaping(file.parent).tasks == TASKS
 
 
-def test_a_stage_that_was_exchanged_is_refused(tmp_path: Path) -> None:
+def test_an_exchanged_stage_is_refused(tmp_path: Path) -> None:
     shaping = begin(tmp_path / "shaped")
     evolve_tiny(shaping.path / "stage-1", run__seed=5)
     with pytest.raises(UsageError, match="is not stage 1 of"):
@@ -411,7 +411,7 @@ def test_a_finished_shaping_is_sealed(tmp_path: Path) -> None:
     assert shaping.changed_files == ["stage-2/champion.npz"]
 
 
-def test_what_is_no_shaping_is_refused(tmp_path: Path) -> None:
+def test_other_folders_than_shapings_are_refused(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="is not a shaping"):
         Shaping(evolve_tiny(tmp_path / "run").path)
 
@@ -461,7 +461,7 @@ def test_the_six_prey_experiments_leave_a_prey_file(tmp_path: Path) -> None:
         shaping.test(threads=1)
 
 
-def test_a_kill_before_the_prey_file_is_written_is_not_noticed(tmp_path: Path) -> None:
+def test_a_kill_before_the_prey_file_is_written_changes_nothing(tmp_path: Path) -> None:
     path = tmp_path / "killed"
     killed_at(r"stage-6/DONE", "shape-prey", *command(path, PREY))
     shaping = Shaping(path)
@@ -470,14 +470,15 @@ def test_a_kill_before_the_prey_file_is_written_is_not_noticed(tmp_path: Path) -
     assert shaping.product is not None
     whole = shape_prey(tmp_path / "whole")
     one, two = (stages_content(p) for p in (path, whole.path))
-    assert [one.pop("prey")[:2], two.pop("prey")[:2]] == [b"PK", b"PK"]  # they name other commands
+    # They record different commands.
+    assert [one.pop("prey")[:2], two.pop("prey")[:2]] == [b"PK", b"PK"]
     assert one == two
 
 
 @pytest.mark.parametrize(
     ("setting", "value"), [("bias", True), ("recurrent", True), ("weight_scale", 5.0)]
 )
-def test_prey_that_a_prey_file_cannot_hold_are_refused(
+def test_prey_that_do_not_fit_a_prey_file_are_refused(
     setting: str, value: Any, tmp_path: Path
 ) -> None:
     settings = PREY | {f"controller.{setting}": value}

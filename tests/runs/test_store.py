@@ -41,7 +41,7 @@ def fresh_store(path: Path) -> Store:
     return create(path, config, about | {"run_id": config.run_id, "sessions": []})
 
 
-def test_a_new_directory_holds_the_resolved_configuration(tmp_path: Path) -> None:
+def test_a_new_directory_contains_the_resolved_configuration(tmp_path: Path) -> None:
     store = fresh_store(tmp_path / "deep" / "run")
     assert store.read_config() == resolve("rover/complex-1", preset="smoke")
     assert store.read_generations() == []
@@ -62,14 +62,14 @@ def test_a_directory_with_other_things_is_left_alone(tmp_path: Path) -> None:
     assert [p.name for p in tmp_path.iterdir()] == ["thesis.txt"]
 
 
-def test_an_unfinished_run_is_not_begun_again(tmp_path: Path) -> None:
+def test_an_unfinished_run_is_not_started_again(tmp_path: Path) -> None:
     path = tmp_path / "run"
     fresh_store(path)
     with pytest.raises(UsageError, match=f"unfinished: continue it with 'conevo resume {path}'"):
         fresh_store(path)
 
 
-def test_a_finished_run_is_not_begun_again(tmp_path: Path) -> None:
+def test_a_finished_run_is_not_started_again(tmp_path: Path) -> None:
     run = evolve_tiny(tmp_path / "run")
     before = {p: p.read_bytes() for p in run.path.rglob("*") if p.is_file()}
     with pytest.raises(UsageError, match=f"finished: see it with 'conevo show {run.path}'"):
@@ -149,7 +149,7 @@ def test_a_damaged_log_is_not_cut(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="damaged in line 2"):
         store.cut_generations(2)
     assert (store.path / "generations.jsonl").read_text() == content
-    assert [one["generation"] for one in store.cut_generations(1)] == [0]  # the rest comes again
+    assert [one["generation"] for one in store.cut_generations(1)] == [0]  # the rest is repeated
 
 
 def test_a_log_shorter_than_the_checkpoint_is_refused(tmp_path: Path) -> None:
@@ -204,12 +204,12 @@ def test_a_place_inside_a_file_is_a_wrong_request(out: str, tmp_path: Path) -> N
     assert [p.name for p in tmp_path.iterdir()] == ["file"]
 
 
-def test_what_is_no_run_is_refused(tmp_path: Path) -> None:
+def test_other_folders_than_runs_are_refused(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="is not a run"):
         conevo.Run(tmp_path)
 
 
-def test_teams_and_states_of_other_shapes_are_refused_however_whole_their_files(
+def test_teams_and_states_of_other_shapes_are_refused_even_in_intact_files(
     tmp_path: Path,
 ) -> None:
     run = evolve_tiny(tmp_path / "run", run__generations=2)

@@ -1,4 +1,4 @@
-"""The walk of a setting, from the flag to the kernel's parameters, is short."""
+"""The path of a setting, from the flag to the kernel's parameters, is short."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ MARK = 4321.5  # no other setting has this value
 
 
 class Arrived(BaseException):
-    """The kernel's parameters hold the value."""
+    """The kernel's parameters contain the value."""
 
 
 def holds(value: Any, depth: int = 3) -> bool:
-    """Return whether a value is or contains the one that is followed."""
+    """Return whether a value is or contains the traced one."""
     if isinstance(value, float | str):
         return str(MARK) in str(value)
     inner: Any = ()
@@ -44,7 +44,7 @@ def test_a_setting_passes_at_most_twenty_files_from_flag_to_kernel(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     assert callable(start)
-    assert callable(Rollout)  # loaded by now: what modules do when they are loaded is no walk
+    assert callable(Rollout)  # loaded here, so that the loading of modules is not part of the path
     passed: list[str] = []
 
     def follow(frame: FrameType, event: str, value: Any) -> None:

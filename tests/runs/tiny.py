@@ -1,4 +1,4 @@
-"""Worlds so small that a whole run takes a tenth of a second, and what a run amounts to."""
+"""Worlds so small that a whole run takes a tenth of a second, and the results of a run."""
 
 from __future__ import annotations
 
@@ -38,13 +38,13 @@ RESTLESS = {"stagnation_v": 1, "stagnation_w": 1, "stagnation_y": 1, "gst": 1.0,
 
 
 def tiny_settings(method: str, task: str = TASK, **changes: Any) -> dict[str, Any]:
-    """Return the settings of a tiny run in which everything a method has is at work."""
+    """Return the settings of a tiny run that uses every feature of a method."""
     known = conevo.METHODS[method].config_class.__dataclass_fields__
     restless = {f"method.{key}": value for key, value in RESTLESS.items() if key in known}
     world = resolve_world(task)[0].params_class.__dataclass_fields__
     tiny = {k: v for k, v in TINY.items() if k[:6] != "world." or k[6:] in world}
     small = conevo.world(task, **{k[6:]: v for k, v in tiny.items() if k[:6] == "world."})
-    tiny["method.genotypes"] = max(tiny["method.genotypes"], small.n_robots)  # HetCNE's least
+    tiny["method.genotypes"] = max(tiny["method.genotypes"], small.n_robots)  # HetCNE's minimum
     if "genotypes" not in known:
         del tiny["method.genotypes"]
         tiny |= {"method.pairs": 4, "method.rounds": 2}
@@ -52,7 +52,7 @@ def tiny_settings(method: str, task: str = TASK, **changes: Any) -> dict[str, An
 
 
 def evolve_tiny(path: Path, method: str = "cone", task: str = TASK, **changes: Any) -> conevo.Run:
-    """Make a finished tiny run; run__epochs=3 and the like change its settings."""
+    """Make a finished tiny run; arguments such as run__epochs=3 change its settings."""
     settings = tiny_settings(method, task, **changes)
     return conevo.evolve(task, method, "smoke", out=path, overrides=settings, threads=1)
 
@@ -65,7 +65,7 @@ def command(path: Path, method: str, task: str = TASK, **changes: Any) -> list[s
 
 
 def spawn(*arguments: str) -> subprocess.Popen[str]:
-    """Start conevo in a process of its own, one that Ctrl-C reaches."""
+    """Start conevo in its own process, one that Ctrl-C reaches."""
     return subprocess.Popen(
         [sys.executable, "-m", "conevo", *arguments, "--threads", "1"],
         stdout=subprocess.PIPE,
@@ -85,7 +85,7 @@ def wait_for(condition: Callable[[], bool], seconds: float = 60) -> None:
 
 
 def kill_twice(path: Path, arguments: list[str]) -> list[int]:
-    """Make a run of 60 generations, killed in two of the first 45; return which."""
+    """Make a run of 60 generations, killed in two of the first 45; return these two."""
     kills = sorted(random.choices(range(45), k=2))
     for generation in kills:
         process = spawn(*arguments, "--quiet")
@@ -99,16 +99,16 @@ def kill_twice(path: Path, arguments: list[str]) -> list[int]:
 
 
 def is_past(path: Path, process: subprocess.Popen[str], generation: int) -> bool:
-    """Whether a process is at work in a run that has finished so many generations, or has ended."""
+    """Whether a process has ended, or runs and has finished a number of generations."""
     lock, log = path / "lock", path / "generations.jsonl"
-    is_at_work = lock.exists() and lock.read_text() == f"process {process.pid}"
+    is_running = lock.exists() and lock.read_text() == f"process {process.pid}"
     return process.poll() is not None or (
-        is_at_work and log.read_bytes().count(b"\n") >= generation
+        is_running and log.read_bytes().count(b"\n") >= generation
     )
 
 
 def content(path: Path) -> dict[str, Any]:
-    """Return everything that a run amounts to, without times: arrays as bytes."""
+    """Return all results of a run, without times: arrays as bytes."""
     found: dict[str, Any] = {"config": (path / "config.toml").read_text()}
     lines = (path / "generations.jsonl").read_text().splitlines()
     found["generations"] = [json.loads(line) | {"seconds": 0} for line in lines]

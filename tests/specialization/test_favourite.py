@@ -24,7 +24,7 @@ def switches(life: tuple[int, ...]) -> int:
     return sum(a != b for a, b in pairwise(life))
 
 
-def test_who_moves_and_detects_in_turn_has_a_caste_that_s_cannot_see() -> None:
+def test_a_robot_that_moves_and_detects_in_turn_has_a_caste_unseen_by_s() -> None:
     """Fifty times move, then low: S = 1, but all detections are with one setting."""
     life = (3, 0) * 50
     counts = np.bincount(life, minlength=4)
@@ -58,7 +58,7 @@ def test_with_a_single_setting_its_share_is_one() -> None:
 
 
 def test_devoted_robots_do_more_than_half_of_their_work_with_one_setting() -> None:
-    """For one robot each: 51 of 100 are enough, 50 are not, and an idle one does not count."""
+    """Of 100 actions 51 are enough, 50 are not, and an idle robot is not devoted."""
     assert portion_devoted([[51, 49], [50, 50], [0, 0], [1, 9]]) == 0.5
     assert portion_devoted([[0, 0]]) == 0
 

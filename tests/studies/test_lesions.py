@@ -117,7 +117,7 @@ def test_the_heuristic_controller_that_replaces_a_caste(task, stands_in) -> None
 
 
 @pytest.mark.parametrize("task", ["rover/simple-1", "gacc/complex-1"])
-def test_all_castes_of_the_thesis_have_a_heuristic_of_their_own(task: str) -> None:
+def test_all_castes_of_the_thesis_have_their_own_heuristic(task: str) -> None:
     """Tables 5.3 and 6.3 name a controller for every caste that sections 5.5 and 6.5 replace."""
     world = conevo.world(task)
     castes = [caste for caste in world.castes if caste != "move"]

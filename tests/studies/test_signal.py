@@ -135,7 +135,7 @@ def test_the_scheme_has_rounds_times_epochs_trials() -> None:
     assert (other["scheme"], other["icc"]) == (3, row["icc"])  # tried alike, at a third of the cost
 
 
-def test_a_sample_of_genotypes_keeps_their_genes_whatever_the_method() -> None:
+def test_a_sample_of_genotypes_keeps_their_genes_for_every_method() -> None:
     for method in UNITS:
         config = tiny(method, method__genotypes=9)
         lab = Lab.equip(config, 1, "cpu")

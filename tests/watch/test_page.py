@@ -360,7 +360,7 @@ def test_it_fits_windows_of_all_sizes(live):
         assert overflow(live) <= 0
 
 
-def test_the_table_below_a_chart_is_no_wider_than_the_chart(live):
+def test_the_table_below_a_chart_is_at_most_as_wide(live):
     live.set_viewport_size({"width": 1280, "height": 800})
     live.wait_for_selector(".standings td")
     assert overflow(live) <= 0

@@ -160,7 +160,7 @@ def damaged(**changes):
         ("[" * 100_000 + "\n", "nested too deeply"),
     ],
 )
-def test_a_damaged_line_is_one_line_and_the_others_go_on(tmp_path, line, why):
+def test_a_damaged_line_is_one_line_and_other_runs_are_shown(tmp_path, line, why):
     path = write_run(tmp_path / "bad", torn=line)
     append(path, record(4))
     good = write_run(tmp_path / "good")

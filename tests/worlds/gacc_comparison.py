@@ -1,8 +1,8 @@
 """Whether a recorded epoch of the gathering world is the oracle's, phase by phase.
 
-Every iteration starts from the recorded state of the one before, so differences of float32 and
-float64 do not grow. Where a comparison falls within float32's grain of its threshold the kernel
-must agree with the oracle for some state a hair's breadth away; such ties are counted, and few.
+Every iteration starts from the previous recorded state, so differences of float32 and float64 do
+not grow. If a comparison is within float32's rounding of its threshold, the kernel must agree with
+the oracle for a state within this rounding; such ties are counted, and are rare.
 """
 
 from collections import Counter
@@ -23,7 +23,7 @@ TOLERANCE = {"x": 1e-6, "y": 1e-6, "object_x": 1e-6, "object_y": 1e-6, "demand":
 
 @dataclass
 class Tally:
-    """What comparisons met: near-ties and, so that they are not vacuous, events."""
+    """Counts of comparisons: near-ties and, so that they are not vacuous, events."""
 
     steps: int = 0
     near_ties: int = 0
@@ -37,7 +37,7 @@ class Tally:
 
 
 def nearby(w, n=60):
-    """Copies of a world a hair's breadth away; what lies in one place does so still."""
+    """Copies of a world within rounding; things in one place stay together."""
     rng = stream(0, "nearby")
     for k in range(n):
         other = twin(w)
@@ -52,7 +52,7 @@ def nearby(w, n=60):
 
 
 def differences(w, seen, t, atol=0.0):
-    """What of the state after an iteration is not as recorded."""
+    """The parts of the state after an iteration that differ from the record."""
     found = []
     for name, ours in state(w).items():
         theirs = seen[name][t].ravel().astype(float)
@@ -81,7 +81,7 @@ def check_senses(w, i, inputs, tally):
 def check_choice(w, i, sums, action, situation, tally):
     """Return robot i's decision, after asserting that its action and situation are right.
 
-    Where two of a network's outputs are equal for float32, the sums are changed to what it did.
+    If two of a network's outputs are equal in float32, the sums are changed to the recorded ones.
     """
     decision = oracle.decide(w, i, sums)
 

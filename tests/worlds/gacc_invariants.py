@@ -1,4 +1,4 @@
-"""What holds in every recorded epoch of the gathering world, whoever plays."""
+"""Invariants of every recorded epoch of the gathering world, for any team."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ UNDETECTED = 2**31 - 1
 
 
 def is_home(x, y, half):
-    """Whether places lie in the home area, as float32 has it."""
+    """Whether places lie in the home area, in float32."""
     middle = np.float32(0.5)
     return (np.abs(x - middle) <= half) & (np.abs(y - middle) <= half)
 
@@ -29,7 +29,7 @@ def check_epoch(a_world, scenarios, seen):
 
 
 def check_places(a_world, scenarios, seen):
-    """All is in the square and out of obstacles; objects go only with who holds them."""
+    """Everything is in the square and outside obstacles; objects move only with their holders."""
     p, s = a_world.params, scenarios
     for x, y in (("x", "y"), ("object_x", "object_y")):
         assert seen[x].min() >= 0
@@ -49,7 +49,7 @@ def check_places(a_world, scenarios, seen):
     steps = np.hypot(np.diff(at["x"], axis=0), np.diff(at["y"], axis=0))
     assert steps.max() <= p.move_range * (1 + 1e-4)
     assert not steps[seen["action"] != 3].any()
-    # An object moves with its only holder, to where that goes, or to its place in the zone.
+    # An object moves with its only holder, to the holder's place, or to its place in the zone.
     moved = (np.diff(at["object_x"], axis=0) != 0) | (np.diff(at["object_y"], axis=0) != 0)
     for t, k in zip(*np.nonzero(moved), strict=True):
         if seen["life"][t, k] == DELIVERED:
@@ -58,14 +58,14 @@ def check_places(a_world, scenarios, seen):
         assert steps[t, i] > 0
         assert seen["object_x"][t, k] == seen["x"][t, i]
         assert seen["object_y"][t, k] == seen["y"][t, i]
-    # And its holder does not go without it.
+    # Its holder never moves without it.
     for t, i in zip(*np.nonzero(steps[1:] > 0), strict=True):
         k = seen["held"][t, i]
         assert k < 0 or moved[t + 1, k]
 
 
 def check_lives(a_world, scenarios, seen):
-    """Who holds what agrees with what is recorded of the object."""
+    """The objects held by robots agree with the recorded states of the objects."""
     half = np.float32(a_world.params.home_side / 2)
     held, life = seen["held"], seen["life"]
     n_objects = life.shape[1]
@@ -82,7 +82,7 @@ def check_lives(a_world, scenarios, seen):
     assert (life[before == DELIVERED] == DELIVERED).all()
     assert (before[life == LYING] == LYING).all()
     assert np.isin(before[life == CARRIED], (GRIPPED, CARRIED)).all()
-    # At home a robot with an object stands still and waits, with the fitting grip.
+    # At home a robot with an object does not move and waits, with the fitting grip.
     at_home = is_home(seen["x"], seen["y"], half)
     waits = (held[:-1] >= 0) & at_home[:-1] & (seen["energy"][:-1] > 0)
     assert np.isin(seen["situation"][1:][waits], (2, 4)).all()
@@ -100,7 +100,7 @@ def check_lives(a_world, scenarios, seen):
 
 
 def check_deliveries(a_world, scenarios, seen):
-    """What is built in follows the plans, and is all that is rewarded."""
+    """Deliveries follow the plans, and only they are rewarded."""
     part, kinds = seen["part"], scenarios.object_type[0]
     final = part[-1]
     delivered = final[final >= 0]
@@ -124,7 +124,7 @@ def check_deliveries(a_world, scenarios, seen):
         if not len(now):
             assert not gained[t].any()
         elif t:
-            # Those who held one of them before, and are alive, are among the rewarded.
+            # All previous holders of one of them that are alive are rewarded.
             before = np.isin(seen["held"][t - 1], now) & (seen["energy"][t] > 0)
             assert (gained[t][before] == 1).all()
             assert (seen["held"][t][gained[t] == 1] == -1).all()
@@ -133,7 +133,7 @@ def check_deliveries(a_world, scenarios, seen):
 
 
 def check_accounts(a_world, scenarios, seen):
-    """Every executed action is counted in one column, and paid."""
+    """Every executed action is counted in one column, and costs energy."""
     r = a_world.n_robots
     counts = seen["counts"]
     assert counts.min() >= 0

@@ -17,12 +17,12 @@ from oracles import gacc_oracle as oracle
 from oracles.gacc_scene import Block, Complex, Obstacle, Params, Robot, World, networks, sigmoid
 
 PARTS = 10
-# Environments by what is to be built: ordered and disordered complex objects.
+# Environments by their complex objects, ordered and disordered.
 BUILDS = {"o": "complex-3", "d": "complex-1", "oo": "complex-5", "od": "complex-4",
           "ooo": "complex-7", "ood": "complex-6"}  # fmt: skip
-FAR = (0.97, 0.97)  # where objects lie that take no part
-# A small home area and short sight, so that what happens at home and outside, near and far, is
-# close together; objects are known from the start and waits are short, so that it happens soon.
+FAR = (0.97, 0.97)  # the place of unused objects
+# A small home area and short sight, so that home and outside, near and far, are close together;
+# objects are known from the start and waits are short, so that events happen soon.
 SMALL = {
     "home_side": 0.2,
     "home_sight": 0.05,
@@ -33,7 +33,7 @@ SMALL = {
     "needs_detection": False,
     "wait": 5,
 }
-STEP = 0.0055  # in both directions at once a script can go so far, and no farther
+STEP = 0.0055  # the longest step of a script in both directions at once
 IDLE = ["detect C"]
 
 
@@ -42,7 +42,7 @@ def logit(y):
 
 
 def targets(phase, move_range=0.01):
-    """Weighted sums of the 8 outputs for "detect A", "grip B" or a way (dx, dy)."""
+    """Weighted sums of the 8 outputs for "detect A", "grip B" or a step (dx, dy)."""
     sums = np.full(8, -3.0)
     if isinstance(phase, str):
         verb, _, letter = phase.partition(" ")
@@ -54,7 +54,7 @@ def targets(phase, move_range=0.01):
 
 
 def script(phases, n_genes=45, n_inputs=37, move_range=0.01):
-    """Neurons [n, G] that do one phase per iteration, at most 10, and repeat the last."""
+    """Neurons [n, G] that execute one phase per iteration, at most 10, and repeat the last."""
     n = len(phases)
     genes = np.zeros((n, n_genes))
     on = np.zeros((n, n))  # activation of each neuron in each iteration
@@ -88,11 +88,11 @@ def team(robots, genome, move_range=0.01):
 
 
 def gathering(robots, objects, plans, *, ordered=None, obstacles=(), **params):
-    """A world, and one scenario of it, with these things and no others within sight.
+    """A world and a scenario with these robots and objects, and no others within sight.
 
     Args:
         robots: (x, y, script or name of a heuristic controller).
-        objects: (x, y, letter); those of ``plans`` that are left over lie ``FAR`` off.
+        objects: (x, y, letter); the other ones of ``plans`` lie at ``FAR``.
         plans: the parts of each complex object, as in "ABBC"; filled up with C to ten.
         ordered: "o" or "d" for each complex object; all ordered by default.
         params: of the world; ``SMALL`` and 12 iterations by default.
@@ -145,7 +145,7 @@ def random_team(a_world, seed, scale=0.3):
     genome = genome_of(mind, a_world)
     r, u = a_world.n_robots, genome.max_parts
     genes = rng.uniform(-scale, scale, (r * u, genome.n_genes)).astype(np.float32)
-    # Rather gather than detect; which of both changes with what is seen and remembered.
+    # Gathering is more likely than detecting; the choice depends on inputs and memory.
     first = len(a_world.inputs) + mind.n_context
     genes[:, first : first + 3] -= 0.05
     slots = np.arange(r * u, dtype=np.int32).reshape(r, u)
@@ -155,7 +155,7 @@ def random_team(a_world, seed, scale=0.3):
 
 
 def crowded(scenarios, seed, robots=0.3, objects=0.3, e=0):
-    """The same scenario with robots and objects in squares of these sides round the centre."""
+    """The same scenario with robots and objects in squares of these sides around the centre."""
     rng = stream(seed, "crowd")
     sides = (getattr(scenarios, name)[e] for name in ("left", "bottom", "right", "top"))
     blocks = np.stack(list(sides), axis=1)
@@ -213,7 +213,7 @@ OBJECT = {"object_x": "x", "object_y": "y", "life": "life", "detected": "detecte
 
 
 def twin(w):
-    """A copy whose state changes apart from the original's."""
+    """A copy whose state changes independently of the original."""
     other = copy(w)
     other.robots = [replace(r, counts=list(r.counts)) for r in w.robots]
     other.objects = [copy(block) for block in w.objects]
@@ -223,7 +223,7 @@ def twin(w):
 
 
 def load(w, seen, t):
-    """Make the state after iteration t that was recorded the oracle's."""
+    """Set the oracle's state to the recorded one after iteration t."""
     for name in ROBOT:
         for robot, value in zip(w.robots, seen[name][t].tolist(), strict=True):
             setattr(robot, name, value)
@@ -243,7 +243,7 @@ def load(w, seen, t):
 
 
 def state(w):
-    """The oracle's state as ``Rollout.record`` keeps it."""
+    """The oracle's state in the form of ``Rollout.record``."""
     found = {name: np.array([getattr(r, name) for r in w.robots]) for name in ROBOT}
     for name, ours in OBJECT.items():
         found[name] = np.array([getattr(block, ours) for block in w.objects])

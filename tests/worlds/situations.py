@@ -1,7 +1,7 @@
 """Hand-built situations of the pursuit worlds, for tests.
 
 The robots of a situation drive with constant wheels: a neuron whose input weights are 0 has the
-activation 1/2, and without neurons a wheel stands still.
+activation 1/2, and without neurons a wheel does not turn.
 """
 
 import math
@@ -18,7 +18,7 @@ from conevo.worlds.rollout import Rollout
 STOP, FORWARD, LEFT, RIGHT, REVERSE, NONE = 0, 1, 2, 3, 4, -1
 PI = math.pi
 IDLE, AHEAD = (0.0, 0.0), (1.0, 1.0)
-FAR = (90.0, 90.0, 0.0)  # out of everything's sight
+FAR = (90.0, 90.0, 0.0)  # out of sight
 T = 40
 NAN = float("nan")
 
@@ -71,7 +71,7 @@ def shaping(prey, predators=(), obstacles=(), heuristic=None, **params):
 
 
 def placed(a_world, poses, obstacles):
-    """One scenario with these bodies and obstacles and no others."""
+    """A scenario with only these bodies and obstacles."""
     scenarios = a_world.scenarios([11])
     fields = {name: getattr(scenarios, name).copy() for name in ("x", "y", "heading")}
     fields |= {name: np.zeros((1, 6), np.float32) for name in ("obstacle_x", "obstacle_y")}
@@ -100,7 +100,7 @@ def play(a_world, wheels, scenarios, heuristic):
 
 
 def around(x, y, distance, angles, wheels=IDLE):
-    """Robots around a place that face it."""
+    """Robots around a place, facing it."""
     return [
         (
             x + distance * math.cos(math.radians(a)),
@@ -135,7 +135,7 @@ def random_team(a_world, seed, scale=0.15):
 
 
 def random_prey_file(path, seed):
-    """A prey set of random networks that go ahead and turn with what they see.
+    """A prey set of random networks that drive ahead and turn depending on their inputs.
 
     The lone prey has fewer slots than the two, and one of these has an empty slot.
     """

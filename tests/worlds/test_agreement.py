@@ -1,4 +1,4 @@
-"""A device shows that it gives the bits of the CPU before it is used; here it is pretended."""
+"""A device must agree with the CPU bit for bit before it is used; here a device is simulated."""
 
 from dataclasses import replace
 
@@ -19,7 +19,7 @@ TASK = world("rover/complex-1", n_robots=4, iterations=50)
 
 @pytest.fixture(autouse=True)
 def asked(monkeypatch):
-    """Forget what was asked before, and return the iterations of every evaluation."""
+    """Clear previous comparisons, and return the iterations of every evaluation."""
     monkeypatch.setattr(agreement, "_agreed", set())
     seen, evaluate = [], Rollout.evaluate
 
@@ -31,7 +31,7 @@ def asked(monkeypatch):
     return seen
 
 
-def test_blocks_of_lanes_agree_with_the_cpu_and_are_asked_once(cpu_blocks, asked):
+def test_blocks_of_lanes_agree_with_the_cpu_and_are_compared_once(cpu_blocks, asked):
     with cpu_blocks():
         block = Rollout(TASK, n_threads=1, lanes=32)
         refuse_other_bits(block, "cuda:0")
@@ -45,13 +45,13 @@ def test_blocks_of_lanes_agree_with_the_cpu_and_are_asked_once(cpu_blocks, asked
 
 
 def wrong(task):
-    """Return a rollout that says it plays a task, and plays by other rules."""
+    """Return a rollout that claims to play a task, but plays by other rules."""
     played = Rollout(world("rover/complex-1", n_robots=4, iterations=50, move_range=0.005), None, 1)
     played.world = task
     return played
 
 
-def test_a_kernel_that_gives_other_bits_is_refused_each_time(asked):
+def test_a_kernel_with_other_results_is_refused_each_time(asked):
     for _ in range(2):
         with pytest.raises(
             EnvironmentFailure,
@@ -62,7 +62,7 @@ def test_a_kernel_that_gives_other_bits_is_refused_each_time(asked):
     assert asked == [20] * 4
 
 
-def test_what_plays_on_a_device_has_been_asked(two_cards, asked, monkeypatch):
+def test_every_rollout_on_a_device_has_been_compared(two_cards, asked, monkeypatch):
     simulator(TASK, controller(world=TASK), 1)
     assert asked == []
     simulator(TASK, controller(world=TASK), 1, "cuda:1")
@@ -72,7 +72,7 @@ def test_what_plays_on_a_device_has_been_asked(two_cards, asked, monkeypatch):
         simulator(TASK, controller(world=TASK), 1, "cuda")
 
 
-def test_short_epochs_are_played_as_far_as_they_go():
+def test_short_epochs_are_played_to_their_end():
     genes, teams = agreement.random_teams_of(Rollout(TASK).genome, 4, 2)
     short = world("rover/complex-1", n_robots=4, iterations=20)
     scenarios = TASK.scenarios([1])
@@ -94,8 +94,8 @@ def test_a_difference_in_any_bit_is_named():
     other[1, 0, 1] = -np.nan
     assert difference(one, replace(one, fitness=other)) == ""
     other[0, 0, 0] = -0.0
-    said = "fitness of team 0 is -0.0, on the CPU 0.0"
-    assert difference(one, replace(one, fitness=other)) == said
+    message = "fitness of team 0 is -0.0, on the CPU 0.0"
+    assert difference(one, replace(one, fitness=other)) == message
     near = {"value": np.array([[1.0], [3.0]], np.float32)}
     assert difference(one, replace(one, performance=near)) == (
         "value of team 1 is 3.0, on the CPU nan"

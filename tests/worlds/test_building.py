@@ -126,7 +126,7 @@ def test_a_cache_that_cannot_be_written_is_named_with_its_variable(
         engine.start() if step == "start" else rollout.build()
 
 
-def test_an_error_that_is_not_in_a_world_file_stays_what_it_is(
+def test_an_error_outside_world_files_is_passed_on(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     conevo.world(f"{EXAMPLE}:dark-1")
@@ -135,7 +135,7 @@ def test_an_error_that_is_not_in_a_world_file_stays_what_it_is(
         main(["run", "rover/complex-1"])
 
 
-def test_python_gets_the_same_line(tmp_path: Path) -> None:
+def test_python_raises_the_same_line(tmp_path: Path) -> None:
     file = written(tmp_path / "light.py", (SCORE, "another_name"))
     place = re.escape(f"{file}:{line_with(SCORE)}: Referencing undefined symbol")
     with pytest.raises(UsageError, match=place):

@@ -1,4 +1,4 @@
-"""The ten canal layouts keep the promises of conevo.worlds.rover.canals."""
+"""The ten canal layouts have the properties documented in conevo.worlds.rover.canals."""
 
 from itertools import pairwise
 
@@ -39,7 +39,7 @@ def test_the_shipped_layout_is_the_generators(environment: int) -> None:
 
 
 @every_layout
-def test_there_is_a_site_for_every_rock(environment: int) -> None:
+def test_every_rock_has_a_site(environment: int) -> None:
     assert 5000 <= load(environment).sum() <= 6000
 
 

@@ -119,7 +119,7 @@ DECLARED = {
               "unknown class 'LightWord' in its ENTRY; did you mean 'LightWorld'?"),
 }  # fmt: skip
 
-# One kernel with all of these mistakes; the parameter ``fault`` chooses one.
+# One kernel with all of these mistakes; the parameter ``fault`` selects one.
 PLAYED = {
     "fitness": ("resolve", "team.fitness[i] = wp.sqrt(-1.0)", "values", "fitness is not finite"),
     "measure": ("outcome", "team.performance[0] = 1.0 / p.zero", "values", "nearness is not"),
@@ -173,19 +173,19 @@ def problems(file: Path) -> list[tuple[str, str]]:
 
 
 @pytest.mark.parametrize("name", DECLARED)
-def test_a_mistake_in_what_is_declared_is_one_line(name: str, tmp_path: Path) -> None:
+def test_a_mistake_in_a_declaration_is_one_line(name: str, tmp_path: Path) -> None:
     old, new, topic, words = DECLARED[name]
     file = written(tmp_path / "bad.py", (old, new))
     found = problems(file)
     assert [one for one, _ in found] == [topic]
     assert words in found[0][1]
-    if topic == "structure":  # no run begins with it either
+    if topic == "structure":  # no run starts with it either
         with pytest.raises(UsageError, match=re.escape(words)):
             conevo.Rollout(conevo.world(f"{file}:dark-1"))
 
 
 def faulty(path: Path, name: str) -> Path:
-    """Write the example with a kernel that has all mistakes and a parameter that chooses one."""
+    """Write the example with a kernel that has all mistakes and a parameter that selects one."""
     number = [*PLAYED].index(name) + 1 if name else 0
     state, given = "    y: wp.array[float]\n", "kernel_params(Params, self.params)"
     begin = "    team.x[i] = scene.places[2 * i]\n"
@@ -212,7 +212,7 @@ def faulty(path: Path, name: str) -> Path:
 
 
 @pytest.mark.parametrize("name", ["", *PLAYED])
-def test_a_mistake_in_what_is_played_is_one_line(name: str, tmp_path: Path) -> None:
+def test_a_mistake_in_a_phase_is_one_line(name: str, tmp_path: Path) -> None:
     found = problems(faulty(tmp_path / "bad.py", name))
     if not name:
         assert found == []
@@ -236,7 +236,7 @@ NOTED = {
 
 
 @pytest.mark.parametrize("name", NOTED)
-def test_what_is_declared_and_never_used_is_noted(name: str, tmp_path: Path) -> None:
+def test_unused_declarations_are_noted(name: str, tmp_path: Path) -> None:
     old, new, topic, words = NOTED[name]
     file = written(tmp_path / "odd.py", (old, new))
     found = [one for one in findings(f"{file}:dark-1") if one.status in ("note", "problem")]
@@ -263,7 +263,7 @@ def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str]:
     return int(caught.value.code or 0), out
 
 
-# What is changed, and the line that is then found to be wrong.
+# The change, and the line in which the mistake is then found.
 OUTSIDE = {
     "counts": (("i, a, a)", "i, a, a + 1)"),
                "count_action(team.action, team.switches, team.counts, i, a, a + 1)"),
@@ -286,12 +286,12 @@ def test_an_index_outside_an_array_is_found_with_its_line(
     name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     change, line = OUTSIDE[name]
-    imports = ("from conevo.rng", "from beside import NOTHING\nfrom conevo.rng")
-    (tmp_path / "beside.py").write_text("NOTHING = 0\n")
+    imports = ("from conevo.rng", "from neighbour import NOTHING\nfrom conevo.rng")
+    (tmp_path / "neighbour.py").write_text("NOTHING = 0\n")
     file = written(tmp_path / "bad.py", change, imports)
     code, out = run(capsys, str(file))
     assert code == 2
-    assert "ok       file          bad.py, which imports beside.py" in out
+    assert "ok       file          bad.py, which imports neighbour.py" in out
     number = 1 + [text.strip() for text in file.read_text().splitlines()].index(line)
     assert f"problem  memory        {file}:{number}: in `{line}` an index lies outside its" in out
     assert out.endswith("1 problem\n")
@@ -327,9 +327,7 @@ MISPLACED = {
 
 
 @pytest.mark.parametrize("name", MISPLACED)
-def test_the_line_is_the_one_that_reads_not_the_one_that_ran_before(
-    name: str, tmp_path: Path
-) -> None:
+def test_the_line_is_the_one_that_reads_not_the_previous_one(name: str, tmp_path: Path) -> None:
     lines, words = MISPLACED[name]
     a = "    a = team.chosen[i]\n"
     file = written(
@@ -342,7 +340,7 @@ def test_the_line_is_the_one_that_reads_not_the_one_that_ran_before(
     assert found == [f"{file}:{at}: {words} an index lies outside its array"]
 
 
-def test_a_check_that_does_not_go_on_is_ended(
+def test_a_check_without_progress_is_ended(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(checking, "STEP_SECONDS", 2)
@@ -358,8 +356,8 @@ def test_a_check_that_does_not_go_on_is_ended(
     )
 
 
-def test_only_what_is_running_must_go_on_soon() -> None:
-    """Kernels that are compiled after a finding take the time they take."""
+def test_only_running_kernels_have_a_time_limit() -> None:
+    """The compilation of kernels after a finding has no time limit."""
     code = (
         "import time; print('[\"ok\"]', flush=True); time.sleep(1);"
         "print('[\"running\"]', flush=True); time.sleep(60)"
@@ -388,7 +386,7 @@ def test_a_world_that_ends_the_process_is_not_sound(
     assert words in out.splitlines()[-2]
 
 
-def test_a_machine_that_fails_says_nothing_of_the_world(
+def test_a_failure_of_the_machine_is_not_one_of_the_world(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setenv("WARP_CACHE_PATH", "/proc/none")
@@ -417,7 +415,7 @@ def test_a_sound_world_has_no_problem_and_a_wrong_name_is_one_line(
         assert words in err
 
 
-def test_no_run_and_no_campaign_begins_with_an_index_outside_its_array(
+def test_no_run_and_no_campaign_starts_with_an_index_outside_its_array(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -441,7 +439,7 @@ def test_no_run_and_no_campaign_begins_with_an_index_outside_its_array(
         assert sorted(one.name for one in tmp_path.iterdir()) == ["bad.py", "plan.toml"]
 
 
-def test_a_sound_world_is_tried_once_for_its_text_and_parameters(
+def test_a_sound_world_is_checked_once_for_its_text_and_parameters(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     entry, environment = resolve(f"{written(tmp_path / 'light.py')}:dark-1")

@@ -1,6 +1,6 @@
 """Noise of sensors and actions, and failing robots: from their addresses, number by number.
 
-One kernel for each world serves all tests: what a test is not about happens with a chance of 1e-12.
+One kernel for each world serves all tests: other disturbances have a probability of 1e-12.
 """
 
 import numpy as np
@@ -24,7 +24,7 @@ KEY = 11
 
 
 def play(task, teams="networks", lanes=None, **options):
-    """Return a world, the seed of a scenario, and what happened in it to a team."""
+    """Return a world, the seed of a scenario, and the record of a team in it."""
     all_on = {"sensor_noise": HARDLY, "action_noise": HARDLY, "failure": HARDLY}
     a_world = conevo.world(task, iterations=T, **(all_on | options if options else {}))
     rollout = Rollout(a_world, n_threads=1, lanes=lanes)
@@ -44,8 +44,8 @@ def draws(seed, counter, robots, times=range(T)):
 
 
 @pytest.mark.parametrize("task", TASKS)
-def test_a_reading_is_off_by_what_is_drawn_for_it(task):
-    """Heuristic robots do not read their sensors: all else stays, and what is kept of them too."""
+def test_a_reading_differs_by_the_number_drawn_for_it(task):
+    """Heuristic robots do not read their sensors: the rest of their record stays the same."""
     _, _, clean = play(task, "heuristics")
     a_world, seed, noisy = play(task, "heuristics", sensor_noise=0.3)
     for name in clean.keys() - {"inputs"}:
@@ -72,13 +72,13 @@ def test_an_action_is_replaced_by_one_from_random_outputs(task):
 
 @pytest.mark.parametrize("task", TASKS)
 def test_with_all_actions_replaced_any_team_is_the_same(task):
-    """Heuristic robots, too; each is itself again where its action is not replaced."""
+    """Also with heuristic robots; each chooses for itself when its action is not replaced."""
     plays = [play(task, t, action_noise=1.0)[2] for t in ("networks", "others", "heuristics")]
     for name in plays[0].keys() - {"hidden"}:
         assert plays[0][name].tobytes() == plays[1][name].tobytes() == plays[2][name].tobytes()
 
 
-def test_a_heuristic_rover_is_itself_again_afterwards():
+def test_a_heuristic_rover_chooses_for_itself_afterwards():
     a_world, seed, seen = play(TASKS[0], "heuristics", action_noise=0.25)
     is_random = draws(seed, 2**20 - 320, a_world.n_robots) < 0.25
     is_low = np.arange(a_world.n_robots) % 4 == 0  # detects with low, or moves
@@ -91,7 +91,7 @@ def test_a_heuristic_rover_is_itself_again_afterwards():
 
 @pytest.mark.parametrize("options", [{"failure": 0.03}, {"failure": 0.5, "failure_at": 20}])
 @pytest.mark.parametrize("task", TASKS)
-def test_robots_fail_when_it_is_drawn_and_for_good(task, options):
+def test_robots_fail_when_it_is_drawn_and_permanently(task, options):
     _, _, clean = play(task, failure=HARDLY)
     a_world, seed, seen = play(task, **options)
     r = a_world.n_robots
@@ -131,7 +131,7 @@ def test_a_gatherer_that_fails_lets_go():
 
 
 @pytest.mark.parametrize("task", TASKS)
-def test_any_number_of_lanes_gives_the_same_bits(task, cpu_blocks):
+def test_any_number_of_lanes_agrees_bit_for_bit(task, cpu_blocks):
     options = {"sensor_noise": 0.1, "action_noise": 0.1, "failure": 0.01}
     _, _, one = play(task, **options)
     with cpu_blocks():
@@ -140,8 +140,8 @@ def test_any_number_of_lanes_gives_the_same_bits(task, cpu_blocks):
         assert many[name].tobytes() == values.tobytes(), name
 
 
-def test_what_is_off_is_not_there():
-    """No phase, and a single number where something would be kept."""
+def test_disturbances_that_are_off_take_no_phase_and_no_memory():
+    """No phase, and arrays of a single number."""
     for task, functions in zip(
         TASKS, (rover.FUNCTIONS, gacc.FUNCTIONS, pursuit.PURSUIT_FUNCTIONS), strict=True
     ):

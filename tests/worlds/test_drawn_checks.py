@@ -1,4 +1,4 @@
-"""What a world says is drawn is looked at by ``conevo check``, before an epoch is replayed."""
+"""``conevo check`` checks the drawing that a world declares before an epoch is replayed."""
 
 from pathlib import Path
 
@@ -23,7 +23,7 @@ def played():
 
 
 def faults(played):
-    """Return what is found in an epoch of the world."""
+    """Return the faults found in an epoch of the world."""
     genes, (team,) = random_teams(played.world, 1)
     return list(of_drawing(played, genes, team, np.full(len(team), -1, np.int32), 1))
 
@@ -59,7 +59,7 @@ def test_each_mistake_is_one_line(played, monkeypatch, drawn, words):
     assert not found.startswith(("world", "the trajectory"))
 
 
-def test_what_can_be_drawn_is_named(played):
+def test_drawn_objects_are_named(played):
     assert faults(played) == []
     assert drawn_in_words(played.world) == "robots, ball, goal, begins to push"
 
@@ -80,12 +80,12 @@ def test_check_shows_it(old, new, words, tmp_path):
     assert [words in one.text for one in found] == [True]
 
 
-def test_a_world_that_says_nothing_of_drawing_need_not_record_places(tmp_path):
+def test_a_world_without_a_drawing_need_not_record_places(tmp_path):
     text = (EXAMPLES / "light.py").read_text()
     (line,) = (line for line in text.splitlines(keepends=True) if "drawn: ClassVar" in line)
     text = text.replace(line, "").replace('recorded=("x", "y", ', "recorded=(")
     (tmp_path / "plain.py").write_text(text)
-    said = {one.topic: one for one in findings(f"{tmp_path / 'plain.py'}:dark-1")}
-    assert said["drawn"].status == "note"
-    assert "does not record x, y of every robot" in said["drawn"].text
-    assert "problem" not in {one.status for one in said.values()}
+    topics = {one.topic: one for one in findings(f"{tmp_path / 'plain.py'}:dark-1")}
+    assert topics["drawn"].status == "note"
+    assert "does not record x, y of every robot" in topics["drawn"].text
+    assert "problem" not in {one.status for one in topics.values()}

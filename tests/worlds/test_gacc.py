@@ -19,7 +19,7 @@ from worlds.gathering import IDLE, SMALL, STEP, crowded, gathering, random_team,
 
 # --- environments -------------------------------------------------------------------------------
 
-# Tables 6.6 (as settled) and 6.8: sequences, with a * where any order will do; obstacles.
+# Tables 6.6 (as settled) and 6.8: sequences, with a * if the order is free; obstacles.
 ENVIRONMENTS = {
     "simple-1": ("A" * 10, 0),
     "simple-2": ("B" * 10, 0),
@@ -44,7 +44,7 @@ ENVIRONMENTS = {
 
 
 @pytest.mark.parametrize("environment", ENVIRONMENTS)
-def test_what_there_is_to_build(environment):
+def test_plans_of_all_environments(environment):
     text, n_obstacles = ENVIRONMENTS[environment]
     sequences = text.split()
     a_world = world(f"gacc/{environment}")
@@ -91,7 +91,7 @@ def test_names_and_sizes():
         ("complex-2", {"obstacle_least": 0.1, "home_side": 0.3, "n_robots": 64}),
     ],
 )
-def test_everything_lies_where_it_may(environment, params):
+def test_everything_starts_in_allowed_places(environment, params):
     a_world = world(f"gacc/{environment}", **params)
     p = a_world.params
     s = a_world.scenarios(range(40))
@@ -163,7 +163,7 @@ def test_objects_are_sensed_after_an_activation_with_their_setting_only(setting)
     assert inputs[5, :8] == pytest.approx(reading["C"], rel=1e-4)
 
 
-def test_obstacles_and_walls_are_sensed_and_hide_what_is_behind():
+def test_obstacles_and_walls_are_sensed_and_hide_objects_behind_them():
     robots = [(0.2, 0.2, ["detect A"]), (0.2, 0.24, ["detect A"]), (0.03, 0.015, ["detect A"])]
     wall = [(0.19, 0.215, 0.23, 0.22)]
     objects = [(0.205, 0.235, "A"), (0.165, 0.2, "A")]
@@ -179,7 +179,7 @@ def test_obstacles_and_walls_are_sensed_and_hide_what_is_behind():
 
 @pytest.mark.parametrize("bottom", [0.25, 0.2501])
 def test_a_view_along_the_side_of_an_obstacle_is_blocked(bottom):
-    """An obstacle is closed: only one that leaves a gap is seen past."""
+    """An obstacle is a closed set: the view is free only if a gap is left."""
     robots = [(0.25, 0.25, ["detect A"]), (0.29, 0.25, ["grip B"])]
     things = [(0.28, 0.25, "A"), (0.3, 0.25, "B")]
     inputs = sensed(robots, things, ["AB"], obstacles=[(0.26, bottom, 0.27, 0.3)])[1, 0]
@@ -196,7 +196,7 @@ def test_robots_show_what_they_carry():
     inputs = sensed(robots, things, ["AABC"])[:, 0, 8:16]
     assert not inputs[0].any()
     expected = np.zeros(8)
-    expected[0] = 2 / 3 * 1e-4 / (0.03**2 + 0.001**2)  # not the A behind it
+    expected[0] = 2 / 3 * 1e-4 / (0.03**2 + 0.001**2)  # not the A behind B
     expected[2] = 1e-4 / (0.001**2 + 0.025**2)  # and the A in the west is too far
     assert inputs[1] == pytest.approx(expected, rel=1e-4)
 
@@ -213,7 +213,7 @@ def test_home_is_sensed_in_one_octant(reach):
 
 
 def test_accuracy_is_the_chance_to_see_each_thing():
-    """One robot, one object, many iterations; a wall is drawn for on its own."""
+    """One robot, one object, many iterations; walls have their own draws."""
     robots = [(0.03, 0.2, ["detect A"]), (0.8, 0.8, IDLE)]
     seen = {}
     for accuracy in (0.0, 0.3, 1.0):
@@ -232,7 +232,7 @@ def test_accuracy_is_the_chance_to_see_each_thing():
 
 @pytest.mark.parametrize("environment", ENVIRONMENTS)
 @pytest.mark.parametrize("minds", ["networks", "heuristics"])
-def test_no_object_is_duplicated_lost_or_built_in_against_the_plan(environment, minds):
+def test_no_object_is_duplicated_lost_or_delivered_against_the_plan(environment, minds):
     n = list(ENVIRONMENTS).index(environment)
     short = {"iterations": 250, "wait": 8, "energy": 6.513 if n % 3 == 2 else 1000.0}
     params = short | {"needs_detection": n % 2 == 0, "grip_distance": (0.02, 0.04)[n % 2]}
@@ -276,7 +276,7 @@ OBJECTS = ("object_x", "object_y", "life", "detected", "part", "demand")
 
 
 def scripted(seed, turn):
-    """Robots with random scripts and objects about the home area, all of it turned by a map."""
+    """Robots with random scripts and objects around the home area, all turned by a map."""
     rng = stream(seed, "scripted")
     kinds = [f"{verb} {letter}" for verb in ("detect", "grip", "grip") for letter in "ABC"]
     places = 0.5 + rng.uniform(-0.12, 0.12, (44, 2))
@@ -322,7 +322,7 @@ def test_a_turned_world_is_a_turned_outcome(seed, turn, octants):
 
 
 def test_relabelling_the_robots_relabels_the_outcome():
-    """Without bodies, and as long as no two grip one object outside in the same iteration."""
+    """Without bodies, and if no two grip one object outside in the same iteration."""
     params = SMALL | {"iterations": 150, "separation": 0.0, "home_sight": 0.1}
     a_world = world("gacc/complex-8", **params)
     genes, slots = random_team(a_world, 5)
@@ -343,7 +343,7 @@ def test_relabelling_the_robots_relabels_the_outcome():
 
 
 def test_objects_of_one_type_are_alike():
-    """Their numbers only say which comes first: those that are left do as the others did."""
+    """Their numbers only determine the order: renumbered objects end in the same states."""
     robots = [(0.5 + 0.02 * math.cos(a), 0.5 + 0.02 * math.sin(a), IDLE) for a in range(6)]
     things = [(0.5, 0.5, "A"), (0.535, 0.5, "A"), (0.47, 0.48, "A"), (0.5, 0.45, "B")]
     results = []
@@ -435,7 +435,7 @@ def test_environments_that_do_not_exist_name_the_nearest():
         world("gacc")
 
 
-def test_of_equal_outputs_the_first_acts():
+def test_ties_of_outputs_go_to_the_first():
     """All outputs of a network without neurons are equal."""
     a_world, (genes, slots, scenarios, heuristic), _ = gathering(
         [(0.2, 0.2, IDLE), (0.8, 0.8, IDLE)], [], ["A"]
@@ -445,8 +445,8 @@ def test_of_equal_outputs_the_first_acts():
     assert seen["action"].tolist() == [[0, 2]] * 12
 
 
-def test_teams_of_scripts_do_what_they_say():
-    """The hand-made controllers that these tests steer robots with."""
+def test_teams_of_scripts_execute_them():
+    """The controllers made by hand that steer the robots in these tests."""
     phases = ["detect B", "grip C", (STEP, -0.002), (-STEP, -STEP), (0.0, 0.006), "detect A"]
     a_world, rest, _ = gathering([(0.2, 0.2, phases), (0.8, 0.8, IDLE)], [], ["A"])
     genome = genome_of(controller(world=a_world), a_world)

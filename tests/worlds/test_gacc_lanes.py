@@ -1,4 +1,4 @@
-"""The gathering world in blocks of any number of lanes: the same bits in every iteration."""
+"""The gathering world in blocks of any number of lanes: equal bit for bit in every iteration."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ PARAMS = SMALL | {"wait": 4, "energy": 1.503, "robot_range": 0.1}
 
 @pytest.fixture(scope="module")
 def epoch():
-    """A crowd of networks and heuristic robots that grips, builds, lets go and runs dry."""
+    """A crowd of networks and heuristic robots that grip, build, let go and run out of energy."""
     a_world = world("gacc/complex-9", iterations=60, **PARAMS)
     heuristic = (np.arange(a_world.n_robots) % 11 - 1).astype(np.int32)
     scenarios = crowded(a_world.scenarios([fold(3, "lanes")]), 3)
@@ -26,7 +26,7 @@ def serial(epoch):
     return Rollout(a_world, n_threads=1).record(*played)
 
 
-def test_the_epoch_has_what_lanes_share(serial):
+def test_the_epoch_has_the_events_that_lanes_share(serial):
     assert set(np.unique(serial["life"])) == set(range(7))
     assert (serial["energy"][-1] <= 0).any()
     assert (serial["situation"] == 4).any()
@@ -34,7 +34,7 @@ def test_the_epoch_has_what_lanes_share(serial):
 
 
 @pytest.mark.parametrize("lanes", [32, 64, 96, 128, 256])
-def test_any_number_of_lanes_gives_the_same_bits(epoch, serial, cpu_blocks, lanes):
+def test_any_number_of_lanes_agrees_bit_for_bit(epoch, serial, cpu_blocks, lanes):
     a_world, played = epoch
     with cpu_blocks():
         seen = Rollout(a_world, n_threads=1, lanes=lanes).record(*played)

@@ -1,8 +1,8 @@
-"""The life of an object of the gathering world, by hand-solved miniatures.
+"""The life of an object of the gathering world, in small cases solved by hand.
 
-Every miniature is played by the kernels and, phase by phase, by the oracle. Coordinates: the home
-area is [0.4, 0.6] x [0.4, 0.6], robots grip within 0.02, go 0.01 on their own and see others at
-home within 0.05. Objects are known from the start and the wait is 5, if nothing else is said.
+Every case is played by the kernels and, phase by phase, by the oracle. Coordinates: the home area
+is [0.4, 0.6] x [0.4, 0.6], robots grip within 0.02, move 0.01 by themselves and see others at home
+within 0.05. By default objects are known from the start and the wait is 5.
 """
 
 import math
@@ -20,7 +20,7 @@ EAST, WEST = (0.0055, 0.0), (-0.005, 0.0)
 
 
 class Play:
-    """What was recorded, with the objects in the order in which they were given."""
+    """The record, with objects in the given order."""
 
     def __init__(self, robots, objects, plans, **how):
         a_world, rest, self.numbers = gathering(robots, objects, plans, **how)
@@ -43,7 +43,7 @@ class Play:
         return self.seen["object_x"][t, k], self.seen["object_y"][t, k]
 
     def of(self, name, i):
-        """A robot's recorded values; objects by the order in which they were given."""
+        """A robot's recorded values; objects are numbered in the given order."""
         values = self.seen[name][:, i].tolist()
         if name in ("held", "dropped"):
             order = {k: n for n, k in enumerate(self.numbers)} | {NONE: NONE}
@@ -86,7 +86,7 @@ def test_a_grip_and_a_step_over_the_border_skip_the_carrying():
 
 
 def test_three_are_needed_and_only_two_come():
-    """Both wait five iterations after the one in which they grip, then do not touch it again."""
+    """Both wait for five iterations after their grip, then do not touch it again."""
     robots = [(0.5, 0.49, IDLE), (0.5, 0.51, IDLE)]
     play = Play(robots, [(0.505, 0.5, "B")], ["B"])
     assert play.life() == [HELPED] * 5 + [DROPPED] * 7
@@ -97,7 +97,7 @@ def test_three_are_needed_and_only_two_come():
         assert play.of("situation", i) == [3] + [2] * 5 + [0] * 6
     assert not any(play.fitness)
     assert play.place(11) == pytest.approx((0.505, 0.5))
-    # A third one makes it enough, in the very iteration.
+    # A third one is enough, in the same iteration.
     play = Play([*robots, (0.515, 0.5, IDLE)], [(0.505, 0.5, "B")], ["B"])
     assert play.life() == [DELIVERED] * 12
     assert play.fitness == [1, 1, 1]
@@ -123,7 +123,7 @@ def test_a_helper_in_the_last_waiting_iteration_and_one_that_is_too_late(y, in_t
         assert play.fitness == [1, 1]
         assert play.counts[0, 7] == 6
     else:
-        # It finds the object dropped, waits for help itself, and robot 0 does not give it.
+        # It finds the dropped object, waits for help itself, and gets none from robot 0.
         assert play.life() == [WAITING] * 5 + [DROPPED] + [WAITING] * 5 + [DROPPED] * 3
         assert play.of("situation", 1) == [0] + [1] * 5 + [3] + [2] * 5 + [0] * 2
         assert play.of("held", 0) == [0] * 5 + [NONE] * 9
@@ -131,7 +131,7 @@ def test_a_helper_in_the_last_waiting_iteration_and_one_that_is_too_late(y, in_t
 
 
 def test_every_robot_waits_its_own_time():
-    """The first lets go of a B after its wait, the second, who came later, is left alone."""
+    """The first lets go of a B after its wait; the second one, which came later, is left alone."""
     play = Play([(0.5, 0.5, IDLE), (0.508, 0.456, IDLE)], [(0.5, 0.515, "B")], ["B"], iterations=14)
     assert play.of("held", 1).index(0) == 5  # in which robot 0 lets go
     assert play.life() == [WAITING] * 10 + [DROPPED] * 4
@@ -156,7 +156,7 @@ def test_out_of_order_is_dropped_at_once_by_two_and_waited_for_by_one():
     play = Play([(0.5, 0.5, IDLE), (0.508, 0.47, IDLE)], [(0.5, 0.515, "A")], ["BA"])
     assert play.life() == [WAITING] * 3 + [DROPPED] * 9
     assert play.of("situation", 0)[2:5] == [2, 4, 0]
-    # Alone it waits, whatever is next.
+    # Alone it waits, whatever the next part is.
     play = Play([(0.5, 0.5, IDLE), (0.1, 0.1, IDLE)], [(0.5, 0.515, "A")], ["BA"])
     assert play.life() == [WAITING] * 5 + [DROPPED] * 7
 
@@ -171,7 +171,7 @@ def test_a_disordered_complex_object_takes_any_type_that_it_lacks():
     assert play.fitness == [2, 2]
 
 
-def test_what_no_complex_object_lacks_any_more_is_out_of_order():
+def test_a_type_that_no_complex_object_needs_is_out_of_order():
     """The only A of the first plan is built in; the other A belongs to the second, after a B."""
     robots = [(0.5, 0.49, IDLE), (0.5, 0.51, IDLE)]
     two = [(0.505, 0.5, "A"), (0.515, 0.5, "A")]
@@ -207,13 +207,13 @@ def test_of_objects_that_are_ready_at_once_the_lower_number_comes_first(plan, pa
     assert play.fitness == [float(plan == "AB")] * 2 + [1.0] * 3
 
 
-def test_the_last_part_and_demand_on_the_way_to_it():
+def test_the_last_part_and_the_demand_before_it():
     robots = [(0.499, 0.5, IDLE), (0.501, 0.5, IDLE)]
     objects = [(0.5, 0.5015 + 0.0015 * k, "A") for k in range(10)]
     play = Play(robots, objects, ["A" * 10], iterations=12)
     assert [play.part(n) for n in range(10)] == list(range(10))
     demand = play.seen["demand"]
-    # Two parts begin to broadcast; the next part is an A, of so many that are left.
+    # With two parts it starts to broadcast; the next part is an A, divided by the number left.
     assert demand[:, 0] == pytest.approx([0] + [1 / left for left in range(8, 0, -1)] + [0] * 3)
     assert not demand[:, 1:].any()
     assert play.performance == {"delivered": 10, "completed": 1, "delivered_share": 100}
@@ -248,12 +248,12 @@ def test_the_wrong_setting_grips_nothing_and_lets_go():
     assert play.of("held", 0) == [NONE, NONE, 0, 0, 0, 0, NONE, NONE, NONE]
     assert play.life() == [LYING] * 2 + [GRIPPED] * 2 + [CARRIED] * 2 + [DROPPED] * 3
     assert play.place(8) == pytest.approx((0.2055, 0.2))
-    assert play.of("dropped", 0) == [NONE] * 9  # that is remembered at home only
+    assert play.of("dropped", 0) == [NONE] * 9  # this is remembered at home only
     assert play.of("action", 0) == [4, 6, 5, 5, 3, 5, 6, 2, 2]
     assert play.counts[0].tolist() == [0, 0, 2, 0, 1, 4, 2, 0, 0, 0]  # moving a B is gathering it
 
 
-def test_the_gripper_reaches_as_far_as_it_does_and_takes_the_closest():
+def test_the_gripper_has_its_range_and_takes_the_closest():
     far = (0.2, 0.22 + 2e-5, "A")
     assert Play([(0.2, 0.2, ["grip A"]), (0.8, 0.2, IDLE)], [far], ["A"]).life() == [LYING] * 12
     near = (0.2, 0.22 - 2e-5, "A")
@@ -265,8 +265,8 @@ def test_the_gripper_reaches_as_far_as_it_does_and_takes_the_closest():
     assert play.of("held", 0) == [3] * 12
 
 
-def test_of_equally_close_ones_the_first_is_taken():
-    """At distances that are exact in binary: outside, at home, and among those who need help."""
+def test_ties_of_distance_go_to_the_first():
+    """At distances that are exact in binary: outside, at home, and among robots that need help."""
     x = 1 / 64
     around = [(0.25 + x, 0.25, "A"), (0.25 - x, 0.25, "A"), (0.25, 0.25 - x, "A")]
     play = Play([(0.25, 0.25, ["grip A"]), (0.8, 0.8, IDLE)], around, ["AAA"], iterations=2)
@@ -290,15 +290,15 @@ def test_of_two_that_grip_one_object_outside_the_lower_number_gets_it():
     for robots in ([here, there], [there, here]):
         play = Play(robots, thing, ["A"])
         assert play.of("held", 0) == [0] * 12
-        assert play.of("held", 1) == [NONE] * 12  # nor later: it is held
+        assert play.of("held", 1) == [NONE] * 12  # nor later: another robot holds it
         assert play.life() == [GRIPPED] * 12
-    # Carried past a third robot, it is nobody else's either.
+    # Carried past a third robot, it is not taken either.
     play = Play([(0.2, 0.2, ["grip A", EAST]), (0.22, 0.205, ["grip A"])], thing, ["A"])
     assert play.life() == [GRIPPED] + [CARRIED] * 11
     assert play.of("held", 1) == [NONE] * 12
 
 
-def test_nobody_grips_over_the_border():
+def test_no_robot_grips_across_the_border():
     inside = [(0.405, 0.5, "A")]
     play = Play([(0.395, 0.5, ["grip A"]), (0.1, 0.1, IDLE)], inside, ["A"])
     assert play.life() == [LYING] * 12
@@ -343,7 +343,7 @@ def test_at_home_too_an_object_must_be_known():
 
 
 def test_at_home_robots_see_as_far_as_home_sight():
-    """Whatever the ranges of their sensors: a lying object, then a robot that holds one."""
+    """Whatever the ranges of sensors: an object in place, then a robot that holds one."""
     robots = [(0.45, 0.5, IDLE), (0.57, 0.5, IDLE)]
     how = {"object_range": 0.2, "robot_range": 0.2, "grip_distance": 0.05, "iterations": 3}
     for sight, comes in ((0.115, 0), (0.125, 1)):
@@ -400,8 +400,8 @@ def test_a_step_to_an_object_does_not_go_beyond_it():
     assert play.life() == [LYING, WAITING, WAITING]
 
 
-def test_a_lying_object_is_taken_only_if_nobody_needs_help():
-    """Situation 1 comes before situation 3, however close the lying object is."""
+def test_a_free_object_is_taken_only_if_no_robot_needs_help():
+    """Situation 1 precedes situation 3, however close the free object is."""
     robots = [(0.43, 0.516, IDLE), (0.1, 0.1, IDLE), (0.398, 0.5, [EAST, "detect C"])]
     objects = [(0.445, 0.508, "A"), (0.404, 0.496, "A")]
     play = Play(robots, objects, ["AAA"], iterations=8)
@@ -410,7 +410,7 @@ def test_a_lying_object_is_taken_only_if_nobody_needs_help():
     assert play.part(0) == 0
 
 
-def test_a_robot_does_not_help_with_what_it_dropped_but_with_something_else():
+def test_a_robot_does_not_help_with_an_object_that_it_dropped_but_with_others():
     """Robot 2 grips what robot 0 dropped; robot 1 comes home with a B, a little farther off."""
     robots = [
         (0.4485, 0.5, IDLE),
@@ -451,9 +451,9 @@ def test_one_that_waits_at_home_and_runs_out_of_energy():
     assert play.life() == [WAITING] * 3 + [DROPPED] * 3
     assert play.fitness == [0, 0]
     assert play.of("action", 1) == [3, 3, 4, 4, NONE, NONE]
-    # Had it a little more, there would have been two.
+    # With a little more energy, it would have been the second holder.
     play = Play(robots, [(0.5, 0.515, "A")], ["A"], energy=0.2, grip_cost=0.05, iterations=6)
     assert play.life() == [WAITING] * 2 + [DELIVERED] * 4
-    # One that dies of the grip itself has not gripped.
+    # A robot that runs out of energy in the grip itself has not gripped.
     play = Play(robots, [(0.5, 0.515, "A")], ["A"], energy=0.05, grip_cost=0.05, iterations=3)
     assert play.life() == [LYING] * 3

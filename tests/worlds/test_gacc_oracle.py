@@ -1,4 +1,4 @@
-"""The kernels of the gathering world against the slow oracle, and that by hand."""
+"""The kernels of the gathering world against the slow oracle, and the oracle by hand."""
 
 import math
 from functools import cache
@@ -61,7 +61,7 @@ def test_octants_run_counter_clockwise_from_east():
         ((0, 0.4), (0.4, 0.4), True),  # ends on the corner, which belongs
         ((0.5, 0), (0.5, 0.39), False),
         ((0.5, 0), (0.5, 0.4), True),  # ends on the side
-        ((0.39, 0), (0.39, 1), False),  # beside it
+        ((0.39, 0), (0.39, 1), False),  # next to it
         ((0.3, 0.35), (0.45, 0.65), True),  # cuts the corner off: x = 0.4 at y = 0.55
         ((0.3, 0.3), (0.41, 0.71), False),  # passes it: y = 0.6 at x = 0.38
         ((0.5, 0.5), (0.5, 0.5), True),  # inside, of no length
@@ -126,7 +126,7 @@ def test_the_demand_of_the_thesis_example():
     assert [oracle.demand(w, x) for x in range(3)] == [0.0, 0.0, 0.0]
 
 
-def test_what_an_ordered_and_a_disordered_complex_object_need():
+def test_needs_of_an_ordered_and_a_disordered_complex_object():
     plan = [0, 1, 0, 2]
     for ordered, built, needs, priority in [
         (True, [], [1, 0, 0], [1, 1 / 2, 1 / 4]),
@@ -178,12 +178,12 @@ def test_heuristic_robots_follow_table_6_3(name, home):
 
 
 def test_uniform_numbers_are_the_kernels():
-    """So that the two can agree where luck decides."""
+    """The two can therefore agree in random events."""
     u = [splitmix.uniform(5, t, 16, 3) for t in range(4000)]
     assert np.histogram(u, 4, (0, 1))[0] == pytest.approx([1000] * 4, abs=150)
 
 
-def test_what_is_unknown_stays_unknown():
+def test_unknown_objects_stay_unknown():
     w = place([(0.3, 0.3, "A-gatherer")], [(0.301, 0.3, "A")])
     for w.t, detected, gripped in [(3, UNDETECTED, -1), (3, 3, -1), (4, 3, 0)]:
         w.objects[0].detected = detected
@@ -273,7 +273,7 @@ def test_the_comparisons_above_are_not_vacuous():
         tally += compared(number)
     kinds = {name for name in tally.events if "->" in name}
     assert {name for name in MEANT if not tally.events[name]} == set()
-    assert kinds <= MEANT  # and no other transition is possible
+    assert kinds <= MEANT  # no other transition is possible
     assert min(tally.events[name] for name in ("ordered", "disordered")) >= 20
     assert min(tally.events[f"delivered {letter}"] for letter in "ABC") >= 20
 
@@ -289,8 +289,8 @@ def test_a_whole_epoch_of_the_world_as_it_is():
 
 
 @pytest.mark.parametrize("number", [0, 1, 3, 7])
-def test_an_epoch_without_correction_stays_with_the_oracle(number):
-    """As long as the smallest of differences has not grown into other decisions."""
+def test_an_epoch_without_correction_follows_the_oracle(number):
+    """Until the smallest differences have grown into other decisions."""
     a_world, *rest = setup(number)
     seen = Rollout(a_world, n_threads=1).record(*rest)
     w = build(a_world, *rest)

@@ -74,7 +74,7 @@ def copy(p: Params, out: wp.array[float]) -> None:
         ({"n_robot": 2}, "unknown field 'n_robot' of Params; did you mean 'n_robots'?"),
     ],
 )
-def test_what_has_no_source_is_refused(given: dict[str, Any], words: str) -> None:
+def test_a_parameter_without_a_source_is_refused(given: dict[str, Any], words: str) -> None:
     with pytest.raises(conevo.UsageError) as caught:
         kernel_params(Params, WorldParams(), **given)
     assert words in str(caught.value)

@@ -1,4 +1,4 @@
-"""A measure has a unit and a direction, and what ends at a target knows which way is better."""
+"""A measure has a unit and a direction, and targets respect the direction."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ SMALLER = {"first_capture", "collisions", "collided"}
 
 
 def darkness(folder: Path, measure: str) -> str:
-    """Write the example world with a distance for its measure, and return its path."""
+    """Write the example world with a distance as its measure, and return its path."""
     text = EXAMPLE.read_text()
     for old, new in (
         (NEARNESS, DISTANCE.format(measure=measure)),
@@ -68,7 +68,7 @@ def test_a_name_alone_is_a_measure_of_which_larger_is_better() -> None:
         ('"d", Measure("d")', "two measures named 'd'"),
     ],
 )  # fmt: skip
-def test_what_is_not_a_measure_is_refused(measure: str, words: str, tmp_path: Path) -> None:
+def test_a_wrong_measure_is_refused(measure: str, words: str, tmp_path: Path) -> None:
     with pytest.raises(UsageError, match=words):
         conevo.world(darkness(tmp_path, measure))
 

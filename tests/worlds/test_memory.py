@@ -1,4 +1,4 @@
-"""Where a device has too little memory, fewer teams are played at once, with the same results."""
+"""If a device has too little memory, fewer teams are played at once, with the same results."""
 
 import weakref
 from math import prod
@@ -23,7 +23,7 @@ SHRUNK = "device cpu lacks memory for {} at once: it plays {}, with the same res
 
 @pytest.fixture
 def room(monkeypatch):
-    """Return a list of the worlds (or teams) that have room; before a state all others are gone."""
+    """Return a list of the worlds (or teams) with room; a new state replaces all others."""
     limit, alive = [0], []
 
     def allocate(struct, shape_of, n, device):
@@ -40,21 +40,21 @@ def room(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("worlds", "said"),
+    ("worlds", "messages"),
     [(26, []), (25, [("26 worlds", 12)]), (7, [("26 worlds", 6)]), (2, [("26 worlds", 2)])],
 )
-def test_as_many_teams_as_have_room_are_played_at_once(worlds, said, room, caplog):
+def test_the_number_of_teams_at_once_depends_on_memory(worlds, messages, room, caplog):
     room[0] = worlds
     rollout = Rollout(TASK, n_threads=1)
     for _ in range(2):
         shrunk = rollout.evaluate(GENES, TEAMS, SCENARIOS)
-    assert caplog.messages == [SHRUNK.format(*one) for one in said]
+    assert caplog.messages == [SHRUNK.format(*one) for one in messages]
     del rollout
     room[0] = 1000
     assert_same_bits(Rollout(TASK, n_threads=1).evaluate(GENES, TEAMS, SCENARIOS), shrunk)
 
 
-def test_one_team_that_has_no_room_is_the_machines_failure(room, caplog):
+def test_one_team_without_room_is_a_failure_of_the_machine(room, caplog):
     room[0] = 1
     rollout = Rollout(TASK, n_threads=1)
     with pytest.raises(EnvironmentFailure, match=r"^device 'cpu': too little free memory; end"):
@@ -79,7 +79,7 @@ def test_room_for_many_teams_is_given_up_for_one_in_many_scenarios(room, caplog)
     assert caplog.messages == []
 
 
-def test_other_errors_are_not_taken_for_it(room, monkeypatch):
+def test_other_errors_are_not_mistaken_for_it(room, monkeypatch):
     def broken(*_):
         raise RuntimeError("CUDA error 700: an illegal memory access was encountered")
 
@@ -88,7 +88,7 @@ def test_other_errors_are_not_taken_for_it(room, monkeypatch):
         Rollout(TASK, n_threads=1).evaluate(GENES, TEAMS, SCENARIOS)
 
 
-def test_arrays_that_have_no_room_are_the_machines_failure(monkeypatch):
+def test_arrays_without_room_are_a_failure_of_the_machine(monkeypatch):
     def refused(values, **_):
         raise RuntimeError(f"Failed to allocate {values.nbytes} bytes on device 'cpu'")
 
@@ -99,7 +99,7 @@ def test_arrays_that_have_no_room_are_the_machines_failure(monkeypatch):
 
 
 class OnDevice:
-    """An array on a device; notes how many numbers are fetched from there."""
+    """An array on a device; counts the numbers fetched from it."""
 
     device = SimpleNamespace(is_cpu=False)
 
@@ -120,7 +120,7 @@ class OnDevice:
     ("apart", "shape"), [((), (3,)), ((), ()), ((), (3, 4)), ((5,), (3, 5)), ((5,), (3, 2, 5))]
 )
 def test_no_more_is_fetched_from_a_device_than_is_read(apart, shape):
-    """An array holds ``shape`` for each of 7 worlds; a last dimension of its own stays apart."""
+    """An array has ``shape`` for each of 7 worlds; its own last dimension stays separate."""
     whole = np.arange(7 * prod(shape)).reshape(7, *shape)
     flat = whole.reshape(-1, *apart)
     there = OnDevice(flat)
@@ -131,4 +131,4 @@ def test_no_more_is_fetched_from_a_device_than_is_read(apart, shape):
         assert np.array_equal(rolling._first(here, n, shape), whole[:n])
     kept = rolling._first(here, 1, shape)
     here.fill_(-1)
-    assert np.array_equal(kept, whole[:1])  # the next launch does not change what was read
+    assert np.array_equal(kept, whole[:1])  # the next launch does not change the fetched array

@@ -1,4 +1,4 @@
-"""Scenarios of another world, and threads that cannot be: refused before a kernel trusts them."""
+"""Scenarios of another world, and impossible threads: refused before a kernel uses them."""
 
 import re
 from pathlib import Path
@@ -52,7 +52,7 @@ def test_no_scenario_at_all():
 
 
 @pytest.mark.parametrize("threads", [0, -1, 1.5, "two", True, 5000])
-def test_threads_that_cannot_be_leave_no_run(threads, tmp_path):
+def test_impossible_threads_leave_no_run(threads, tmp_path):
     words = re.escape(f"threads = {threads!r}: must be an integer from 1 to 4096")
     for path in ("rover/complex-1", f"{SPREAD}:open-1"):
         with pytest.raises(UsageError, match=words):

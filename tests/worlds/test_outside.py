@@ -1,4 +1,4 @@
-"""A world in a file outside the package: used like any other, and never silently another one."""
+"""A world in a file outside the package: used like any other, and never silently changed."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def written(path: Path, *changes: tuple[str, str]) -> Path:
         assert old in text
         text = text.replace(old, new)
     path.write_text(text)
-    os.utime(path, (0, 0))  # as if all were written in the same moment
+    os.utime(path, (0, 0))  # as if all were written at the same moment
     return path
 
 
@@ -77,7 +77,7 @@ def test_a_preset_serves_a_world_that_it_does_not_know(light: Path) -> None:
     assert config.world_params == config.entry.params_class()
 
 
-def test_a_run_is_known_by_the_text_and_not_by_the_place(light: Path, tmp_path: Path) -> None:
+def test_a_run_is_identified_by_the_text_and_not_by_the_place(light: Path, tmp_path: Path) -> None:
     (tmp_path / "other").mkdir()
     moved = written(tmp_path / "other" / "name.py")
     ids = [resolve(f"{path}:dark-1").run_id for path in (light, moved)]
@@ -97,7 +97,7 @@ def test_a_changed_text_is_another_world_in_the_same_process(tmp_path: Path) -> 
     assert found[0].entry.module != found[1].entry.module
 
 
-def test_its_kernels_are_known_by_their_text_too(tmp_path: Path) -> None:
+def test_its_kernels_are_also_identified_by_their_text(tmp_path: Path) -> None:
     hashes, fresh = [], ("first version", "not loaded before")
     for change in (("", ""), ("1.0 - wp.length", "2.0 - wp.length"), ("three robots", "3 robots")):
         file = written(tmp_path / "light.py", change, fresh)
@@ -105,7 +105,7 @@ def test_its_kernels_are_known_by_their_text_too(tmp_path: Path) -> None:
     assert hashes[0] == hashes[2] != hashes[1]
 
 
-def test_a_world_outside_evolves_and_resumes_after_kills_to_the_bit(
+def test_a_world_outside_evolves_and_resumes_after_kills_bit_for_bit(
     light: Path, tmp_path: Path
 ) -> None:
     task = f"{light}:dark-1"
@@ -155,7 +155,7 @@ def test_a_run_notices_that_its_world_has_changed_before_anything_in_it_runs(
     assert conevo.Run(path).resume(threads=1).status == "finished"
 
 
-def test_a_world_named_anew_is_the_one_that_is_there_now(light: Path, tmp_path: Path) -> None:
+def test_a_world_named_again_is_its_current_version(light: Path, tmp_path: Path) -> None:
     file = tmp_path / "config.toml"
     file.write_text(resolve(f"{light}:dark-1", seed=7).to_toml())
     assert resolve(file=file).run.seed == 7
@@ -168,7 +168,7 @@ def test_a_world_named_anew_is_the_one_that_is_there_now(light: Path, tmp_path: 
         resolve("rover/complex-1", file=file)
 
 
-def test_a_digest_belongs_to_the_world_beside_it(light: Path, tmp_path: Path) -> None:
+def test_a_digest_needs_its_world(light: Path, tmp_path: Path) -> None:
     for given, words in (
         ({"run.world_digest": "0" * 12}, "needs run.world next to it"),
         (
@@ -388,7 +388,7 @@ def test_a_bad_file_is_one_clear_line_and_nothing_is_written(
     monkeypatch.chdir(tmp_path)
     text, words = BAD[name]
     Path("bad.py").write_bytes(text if isinstance(text, bytes) else text.encode())
-    for _ in range(2):  # a file that failed once is not taken for loaded
+    for _ in range(2):  # a file that failed once does not count as loaded
         code, out, err = say(capsys, "run", "bad.py:dark-1")
         assert (code, out) == (2, "")
         assert err.startswith("conevo: error: ")
@@ -429,7 +429,7 @@ def test_a_wrong_name_is_one_clear_line(
     assert sorted(p.name for p in light.parent.iterdir()) == ["folder.py", "light.py"]
 
 
-def test_the_example_is_what_the_registry_finds() -> None:
+def test_the_registry_finds_the_example() -> None:
     entry, environment = resolve_world(f"{EXAMPLE}:dark-1")
     assert (entry.name, environment, entry.file) == ("light-v1", "dark-1", str(EXAMPLE))
     assert len(TEXT.splitlines()) < 200

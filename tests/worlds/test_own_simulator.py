@@ -1,4 +1,4 @@
-"""A world with a simulator of its own: checked, evolved, continued, recorded as any other."""
+"""A world with its own simulator: checked, evolved, continued and recorded like any other."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def test_its_team_is_recorded_as_it_was_tested(tmp_path: Path) -> None:
     assert seen.about["performance"]["gap"] == pytest.approx(gaps[0], abs=0)
 
 
-def test_the_command_line_takes_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_it_works_on_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = str(tmp_path / "run")
     assert (
         code_of("run", TASK, "--preset", "smoke", "--out", out, "--quiet", "--method", "mesp") == 0
@@ -73,7 +73,7 @@ def test_it_plays_on_the_cpu_only_and_with_controllers_that_fit(tmp_path: Path) 
     assert not (tmp_path / "run").exists()
 
 
-def test_the_example_keeps_its_promises(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_example_has_no_faults(capsys: pytest.CaptureFixture[str]) -> None:
     assert code_of("check", TASK) == 0
     assert capsys.readouterr().out.endswith("no problems\n")
 
@@ -112,8 +112,8 @@ def test_each_mistake_is_found(
     assert words in capsys.readouterr().out.replace("\n" + " " * 23, " ")
 
 
-def test_cone_learns_what_clones_cannot(tmp_path: Path) -> None:
-    """The widest gap is 1, an agent in each corner: they must not all do the same."""
+def test_cone_learns_a_task_that_clones_cannot(tmp_path: Path) -> None:
+    """The largest gap is 1, with an agent in each corner: they must not all do the same."""
     settings = {"run.generations": 15, "run.fittest_epochs": 3, "method.genotypes": 20}
     gaps = {}
     for method in ("cone", "homcne"):

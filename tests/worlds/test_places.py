@@ -11,7 +11,7 @@ KEYS = np.array([3, 2**40, 5, 77, 2**63 + 1, 6], np.uint64)
 
 
 def one_after_another(key, n, separation, is_free, is_there):
-    """Return places [n, 2] of one key, and how many candidates were refused for each reason."""
+    """Return places [n, 2] of one key, and the number of refused candidates for each reason."""
     places, refused = np.zeros((n, 2), np.float32), [0, 0]
     for k in range(n):
         attempt = 0
@@ -39,7 +39,7 @@ def test_places_are_the_first_that_fit(separation, half, some):
         is_there = np.random.default_rng(2).random(is_there.shape) < 0.7
 
     def is_free(e, k, xy):
-        """Left of a border that every scenario and place has for itself."""
+        """Left of a border, which differs for every scenario and place."""
         return xy[:, :, 0] < 0.5 + 0.01 * e[:, None] - 0.02 * k[:, None]
 
     found = draw_places(KEYS, n, separation, is_free if half else None, is_there if some else None)
@@ -53,17 +53,17 @@ def test_places_are_the_first_that_fit(separation, half, some):
         assert found[e].tolist() == expected.tolist(), e
         total += refused
     assert (total[0] > 20) == half
-    assert (total[1] > 0) == (separation > 0.1)  # the case is one in which something is refused
+    assert (total[1] > 0) == (separation > 0.1)  # some places are refused in this case
 
 
-def test_what_has_no_room_is_refused_in_one_line():
+def test_places_without_room_are_refused_in_one_line():
     with pytest.raises(UsageError, match=r"the square has no room for 40 places, 0\.3 apart"):
         draw_places(KEYS, 40, 0.3)
     with pytest.raises(UsageError, match="no room for 2 places"):
         draw_places(KEYS, 2, 0.0, lambda e, k, xy: np.zeros(xy.shape[:2], np.bool_))
 
 
-def test_nobody_needs_no_room():
+def test_no_places_need_no_room():
     assert draw_places(KEYS, 0, 0.1).shape == (6, 0, 2)
     assert draw_places(KEYS[:0], 3, 0.1).shape == (0, 3, 2)
     assert not draw_places(KEYS, 3, 2.0, is_there=np.zeros((6, 3), np.bool_)).any()
@@ -72,23 +72,24 @@ def test_nobody_needs_no_room():
 @pytest.mark.parametrize(
     ("x", "y", "sectors_of_3", "sectors_of_4"),
     [
-        # once round the square through each, from the corner below on the left, in eighths
+        # around the square once, from the lower left corner, in eighths
         (0.1, 0.1, 0, 0),  # 0
         (0.5, 0.1, 0, 0),  # 1
         (0.9, 0.1, 0, 1),  # 2
-        (0.9, 0.3, 0, 1),  # 2.5, and a third of the way is 2 2/3
+        (0.9, 0.3, 0, 1),  # 2.5; a third of the round is 2 2/3
         (0.9, 0.4, 1, 1),  # 2.75
         (0.9, 0.9, 1, 2),  # 4
         (0.6, 0.6, 1, 2),  # 4, on a smaller square
-        (0.45, 0.9, 1, 2),  # 5.125, and two thirds of the way are 5 1/3
+        (0.45, 0.9, 1, 2),  # 5.125; two thirds of the round are 5 1/3
         (0.3, 0.9, 2, 2),  # 5.5
         (0.1, 0.9, 2, 3),  # 6
         (0.1, 0.11, 2, 3),  # 7.975
     ],
 )
-def test_sectors_go_round_the_middle(x, y, sectors_of_3, sectors_of_4):
+def test_sectors_go_around_the_middle(x, y, sectors_of_3, sectors_of_4):
     xy = np.array([[x, y], [x, y]], np.float32)
-    xy[0] += np.float32(1e-6) * np.sign([0.5 - y, x - 0.5])  # a little on, off the lines between
+    # A little further, away from the lines between sectors.
+    xy[0] += np.float32(1e-6) * np.sign([0.5 - y, x - 0.5])
     assert sectors(xy, 3)[0] == sectors_of_3
     assert sectors(xy, 4)[0] == sectors_of_4
 

@@ -1,4 +1,4 @@
-"""The pursuit worlds by hand-built situations: capture, motion, sight, heuristics, flight."""
+"""The pursuit worlds in situations built by hand: capture, motion, sight, heuristics, flight."""
 
 import math
 from dataclasses import replace
@@ -34,13 +34,13 @@ from worlds.situations import (
 
 @pytest.mark.parametrize("towards", [0, 60, 120, 180, 240, 300])
 def test_a_prey_in_a_triangle_of_predators_is_captured(towards):
-    """It drives at one of them, or between two, where the gap is too narrow."""
+    """It drives at one of them, or between two, through a gap that is too narrow."""
     robots = around(50, 50, 5.6, [0, 120, -120])
     result, seen = situation(robots, [(50, 50, math.radians(towards), AHEAD)])
     assert split(result) == (hunt(T - 9, 9, 1, 0), [T - 9] * 3)
     assert seen["captured"][:, 0].tolist() == [0] * 9 + [1] * (T - 9)
     assert (seen["fitness"] == np.cumsum(seen["captured"])[:, None]).all()
-    # With one predator less there is a way out.
+    # With one predator less a gap is open.
     result, seen = situation([*robots[:2], (*FAR, IDLE)], [(50, 50, -PI / 3 - PI / 3, AHEAD)])
     assert not seen["collided"][:9].any()
 
@@ -50,7 +50,7 @@ def test_predators_that_press_a_prey_collide_in_every_iteration():
     result, seen = situation(robots, [(50, 50, 0, IDLE)])
     assert split(result) == (hunt(T - 9, 9, 1, 3 * T), [T - 9] * 3)
     assert seen["collided"].tolist() == [[1, 1, 1, 0]] * T
-    # The heuristic ones do the same by themselves.
+    # Heuristic predators do the same.
     pressing, _ = situation(
         [(*r[:3], IDLE) for r in robots], [(50, 50, 0, IDLE)], heuristic=[0, 0, 0]
     )
@@ -88,7 +88,7 @@ def test_a_prey_that_stops_by_itself_is_captured_with_two_near(near):
     ("towards", "wall"), [(0, True), (PI, True), (-PI / 2, True), (PI / 2, False)]
 )
 def test_a_prey_between_a_wall_and_two_predators(towards, wall):
-    """The wall is below; with one predator on either side the only way is up."""
+    """The wall is below; with one predator on either side it can only move up."""
     robots = [(55.6, 2.8, 0, IDLE), (44.4, 2.8, 0, IDLE)]
     result, seen = situation(robots, [(50, 2.8, towards, AHEAD)])
     assert split(result)[0] == (hunt(T - 9, 9, 1, 0) if wall else hunt(0, T, 0, 0))
@@ -137,7 +137,7 @@ def test_a_prey_can_be_captured_again():
     assert np.abs(np.diff(captured.astype(int))).tolist().count(1) == 3  # on, off, on
     assert (seen["captured"][:, 0] == captured).all()
     blocked = int(seen["collided"][:, :3].sum())
-    assert blocked > 60  # the second predator stands at the wall in the end
+    assert blocked > 60  # the second predator ends at the wall
     expected = hunt(captured.sum(), captured.argmax(), 2, blocked)
     assert split(result) == (expected, [captured.sum()] * 3)
 
@@ -188,7 +188,7 @@ def test_wheels_name_the_primitive():
              (-0.5, -0.3): REVERSE, (0.0, 0.4): FORWARD}  # fmt: skip
     for k, (wheels, action) in enumerate(pairs.items()):
         _, seen = situation([(50, 50, k, wheels), (*FAR, IDLE)], [(10, 10, 0, IDLE)], iterations=3)
-        if wheels == (0.0, 0.4):  # on the edge: |w| is not above |f| up to rounding
+        if wheels == (0.0, 0.4):  # at the boundary: |w| is not above |f| up to rounding
             assert set(seen["action"][:, 0].tolist()) <= {FORWARD, LEFT}
         else:
             assert (seen["action"][:, 0] == action).all()
@@ -197,7 +197,7 @@ def test_wheels_name_the_primitive():
 
 @pytest.mark.parametrize("towards", [0.0, PI / 2, -PI, -PI / 2])
 def test_a_wall_refuses_the_whole_move(towards):
-    """Driving in a bend into a wall 2 cm ahead: the last free pose is kept, heading and all."""
+    """Driving in a curve into a wall 2 cm ahead: the last free pose is kept, heading included."""
     x, y = 50 + 45.25 * math.cos(towards), 50 + 45.25 * math.sin(towards)
     _, seen = situation([(x, y, towards, (0.9, 1.0)), (50, 50, 0, IDLE)], [(50, 30, 0, IDLE)])
     pose = np.stack([seen["x"][:, 0], seen["y"][:, 0], seen["heading"][:, 0]], axis=1)
@@ -224,7 +224,7 @@ def test_bodies_and_obstacles_refuse_the_whole_move(kind):
 def test_a_robots_last_place_is_taken_even_if_it_leaves():
     _, seen = situation([(50, 50, 0, AHEAD), (55.6, 50, 0, AHEAD)], [(10, 10, 0, IDLE)])
     assert seen["collided"][:4, :2].tolist() == [[1, 0], [0, 0], [0, 0], [0, 0]]
-    # Turning on the spot never is in anybody's way.
+    # Turning on the spot never obstructs other robots.
     _, seen = situation([(50, 50, 0, (-1, 1)), (55.51, 50, 0, (1, -1))], [(10, 10, 0, IDLE)])
     assert not seen["collided"].any()
 
@@ -247,7 +247,7 @@ def test_two_bodies_that_want_one_place_are_both_refused():
 
 
 def test_three_in_a_row_and_one_that_is_refused_anyway():
-    # 0 and 1 collide ahead, 1 and 2 too, 0 and 2 do not: nobody moves.
+    # 0 and 1 collide ahead, 1 and 2 too, 0 and 2 do not: none of them moves.
     robots = [(43.6, 50, 0, AHEAD), (50, 55.0, -PI / 2, AHEAD), (56.4, 50, PI, AHEAD)]
     _, seen = situation(robots, [(10, 10, 0, IDLE)], iterations=9)
     first = int(seen["collided"][:, :3].any(axis=1).argmax())
@@ -264,7 +264,7 @@ def test_three_in_a_row_and_one_that_is_refused_anyway():
 # --- seeing -------------------------------------------------------------------------------------
 
 
-def test_infrared_sees_everything_and_light_only_prey_behind_others_too():
+def test_infrared_senses_everything_and_light_only_prey_even_behind_others():
     robots = [(50, 50, 0, IDLE), (60, 50, 0, IDLE), (50, 65, 0, IDLE)]
     _, seen = situation(robots, [(70, 50, 0, IDLE)], iterations=2)
     infrared, light = seen["inputs"][0, 0, :8], seen["inputs"][0, 0, 8:16]
@@ -277,7 +277,7 @@ def test_infrared_sees_everything_and_light_only_prey_behind_others_too():
 
 
 def test_a_held_sensor_moves_the_robot_and_the_others_stay_free():
-    """A robot that drives by its first sensor alone, in an empty arena."""
+    """A robot that is controlled by its first sensor alone, in an empty arena."""
     a_world = world("pursuit/team-1", iterations=5, prey="heuristic")
     rollout = Rollout(a_world)
     genes = np.zeros((1, rollout.genome.n_genes), np.float32)
@@ -305,8 +305,8 @@ def test_a_held_sensor_moves_the_robot_and_the_others_stay_free():
 # --- the heuristic predator ---------------------------------------------------------------------
 
 
-def test_heuristic_predators_go_where_the_prey_was_last():
-    """The prey leaves while its pursuer still turns round; that drives to where it saw it last."""
+def test_heuristic_predators_go_to_the_last_known_place_of_the_prey():
+    """The prey leaves while its pursuer still turns; the pursuer drives to its last known place."""
     _, seen = situation(
         [(20, 50, PI, IDLE), (95, 5, 0, IDLE)],
         [(42, 50, PI / 4, AHEAD)],
@@ -323,10 +323,10 @@ def test_heuristic_predators_go_where_the_prey_was_last():
     assert np.abs(bearing - heading[on_the_way]).max() < 0.01
     gap = np.hypot(x - place[0], y - place[1])
     assert gap.min() < 5.5
-    assert gap[-1] > 11  # nothing there: forgotten
+    assert gap[-1] > 11  # it is not there: forgotten
 
 
-def test_heuristic_predators_catch_an_idle_prey_and_walk_where_there_is_none():
+def test_heuristic_predators_catch_an_idle_prey_and_walk_without_one():
     robots = [(35, 50, 2.0, IDLE), (65, 50, 2.0, IDLE), (50, 70, 2.0, IDLE)]
     result, seen = situation(robots, [(50, 50, 0, IDLE)], heuristic=0, iterations=100)
     assert result["capture_time"] == 91
@@ -335,25 +335,25 @@ def test_heuristic_predators_catch_an_idle_prey_and_walk_where_there_is_none():
                         heuristic=0, iterations=400)  # fmt: skip
     way = np.hypot(np.diff(seen["x"][:, :2], axis=0), np.diff(seen["y"][:, :2], axis=0))
     assert (way.sum(axis=0) > 150).all()
-    assert len(set(np.round(seen["heading"][:, 0], 2))) > 15  # it turns now and then
+    assert len(set(np.round(seen["heading"][:, 0], 2))) > 15  # it turns occasionally
 
 
 # --- the prey world -----------------------------------------------------------------------------
 
 
-def test_a_flight_is_as_long_and_straight_as_it_is():
+def test_fitness_of_a_flight_is_its_length_and_straightness():
     result, _ = shaping([(20, 50, 0, AHEAD)])
     assert result["path"] == pytest.approx(T * 0.96, rel=1e-5)
     assert result["collided"] == 0
     result, _ = shaping([(50, 50, 0, (0.5, 1.0))])
     assert result["path"] == pytest.approx(T * 0.72 * (1 - math.sqrt(0.25)), rel=1e-4)
-    result, _ = shaping([(50, 50, 0, (-0.5, -0.5))])  # back is as good as ahead
+    result, _ = shaping([(50, 50, 0, (-0.5, -0.5))])  # backward counts like forward
     assert result["path"] == pytest.approx(T * 0.48, rel=1e-4)
     assert shaping([(50, 50, 0, (-1, 1))])[0]["path"] == 0
 
 
 @pytest.mark.parametrize("what", ["wall", "obstacle", "predator"])
-def test_a_collision_ends_a_flight_with_nothing_and_leaves_the_body(what):
+def test_a_collision_ends_a_flight_with_zero_and_leaves_the_body(what):
     x = 90 if what == "wall" else 50
     result, seen = shaping(
         [(x, 50, 0, AHEAD), (20, 20, 0, AHEAD)],
@@ -373,7 +373,7 @@ def test_a_collision_ends_a_flight_with_nothing_and_leaves_the_body(what):
     assert result["collided"] == 0.5
 
 
-def test_a_predator_that_runs_into_a_prey_is_no_collision_of_the_prey():
+def test_a_predator_that_runs_into_a_prey_is_not_a_collision_of_the_prey():
     result, seen = shaping([(50, 50, 0, (0.02, 0.02))], predators=[(50, 60, 0, IDLE)])
     assert seen["collided"][-10:, 1].all()
     assert not seen["collided"][:, 0].any()

@@ -148,7 +148,7 @@ def test_relabelling_predators_and_prey_relabels_the_outcome_exactly(networks):
     ],
 )
 @pytest.mark.parametrize("seed", [1, 2])
-def test_nobody_ever_leaves_overlaps_or_outruns_its_wheels(path, params, seed):
+def test_no_body_leaves_the_arena_overlaps_or_outruns_its_wheels(path, params, seed):
     a_world = world(path, iterations=300, **params)
     genes, slots = random_team(a_world, seed, 1.0 if seed == 2 else 0.2)
     heuristic = np.full(a_world.n_robots, -1, np.int32)
@@ -233,7 +233,7 @@ def assert_free(scenarios, side):
         ("prey/shaping-6", {"arena_cm": 60.0}, 60.0),
     ],
 )
-def test_scenarios_lie_free_and_everywhere(path, params, side):
+def test_starts_are_free_and_cover_the_arena(path, params, side):
     scenarios = world(path, **params).scenarios(range(300))
     assert_free(scenarios, side)
     b = scenarios.n_bodies.min()
@@ -311,7 +311,7 @@ def prey_file(tmp_path):
 
 
 def refused(**overrides):
-    """The one line in which a configuration is refused."""
+    """The one line with which a configuration is refused."""
     with pytest.raises(UsageError) as caught:
         resolve(
             "pursuit/team-1",
@@ -341,8 +341,8 @@ def test_a_prey_file_is_pinned_by_its_content(prey_file):
 
 @pytest.mark.parametrize("environment", ["team-1", "team-6"])
 @pytest.mark.parametrize("slots", [(5, 5), (3, 6), (6, 3)])
-def test_the_prey_of_a_file_play(tmp_path, environment, slots):
-    """Also where the lone prey and the two have different numbers of slots."""
+def test_the_prey_of_a_file_are_used(tmp_path, environment, slots):
+    """Also if the lone prey and the pair have different numbers of slots."""
     path, prey = tmp_path / "mine.npz", prey_set(3, slots)
     save(path, prey)
     a_world = world(f"pursuit/{environment}", prey=str(path), iterations=2)
@@ -350,7 +350,7 @@ def test_the_prey_of_a_file_play(tmp_path, environment, slots):
     genes, hidden = drivers([IDLE, IDLE], rollout.genome)
     scenarios = a_world.scenarios([1])
     q = scenarios.x.shape[1] - 2
-    poses = [(10, 10, 0), (90, 10, 0), (30, 60, 0), (70, 60, 0)][: 2 + q]  # prey that see nothing
+    poses = [(10, 10, 0), (90, 10, 0), (30, 60, 0), (70, 60, 0)][: 2 + q]  # prey see nothing
     seen = rollout.record(genes, hidden, placed(a_world, poses, ()))
     networks = prey.one if q == 1 else prey.two
     sums = 10 * networks[:, :, 8:].sum(axis=1) * 0.5
@@ -418,14 +418,14 @@ def test_bad_parameters_are_refused_in_one_line(name, value):
     assert name in refused(**{name: value})
 
 
-def test_what_could_never_be_played_is_refused_in_one_line():
+def test_impossible_scenarios_are_refused_in_one_line():
     with pytest.raises(UsageError, match="arena of 10 cm has no room for"):
         draw_scenarios([1], 10.0, 4, (1, 1), (0, 0), n_sensors=16)
     with pytest.raises(UsageError, match=r"capture_predators \(3\) must not be above the 2 pred"):
         world("pursuit/team-1", capture_predators=3)
 
 
-def test_a_file_that_is_no_prey_set_is_refused_without_advice_to_unpickle_it(tmp_path):
+def test_a_file_without_a_prey_set_is_refused_without_advice_to_unpickle_it(tmp_path):
     path = tmp_path / "prey.toml"
     path.write_text("format = 1")
     with pytest.raises(UsageError) as caught:

@@ -1,4 +1,4 @@
-"""Individual behaviours on trajectories written by hand, and just across every boundary."""
+"""Individual behaviours on trajectories written by hand, on both sides of every boundary."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def slow(left, right, n=T):
 
 
 def watch(predator, prey=None, companion=None, rules=None, n_predators=2):
-    """Return what predator 0 does, by name; its companion idles beside it unless given."""
+    """Return the behaviours of predator 0, by name; by default its companion idles next to it."""
     n = len(predator["x"])
     if prey is None:
         prey = body(*PREY, 0.0, [STOP] * n)
@@ -55,7 +55,7 @@ def names(behaviour):
 
 
 def at(bearing, gap, off, script):
-    """Return a predator at a bearing and gap from the prey, heading ``off`` degrees beside it."""
+    """Return a predator at a bearing and gap from the prey, heading ``off`` degrees past it."""
     x, y = around(PREY, bearing, gap)
     return body(x, y, bearing + 180.0 + off, script)
 
@@ -90,7 +90,7 @@ def test_pressing_on_a_prey_without_moving_is_pursuing_it():
 
 @pytest.mark.parametrize(("off", "expected"), [(29, "pursuer"), (31, "none")])
 def test_aim_boundary_at_a_distance(off, expected):
-    # Refused by something else at a gap of 15, so that the geometry stands still.
+    # Refused for another reason at a gap of 15, so that the geometry is constant.
     assert set(watch(at(180, 15, off, [PRESS] * T))[10:]) == {expected}
 
 
@@ -101,7 +101,7 @@ def test_a_line_that_meets_the_prey_is_aimed_at_it(off, expected):
     assert set(watch(at(180, 2, off, [PRESS] * T))[10:]) == {expected}
 
 
-def test_driving_away_from_the_prey_is_none():
+def test_driving_away_from_the_prey_is_not_a_behaviour():
     assert set(watch(at(180, 5, 180, [AHEAD] * T))[10:]) == {"none"}
 
 
@@ -126,7 +126,7 @@ def test_blocker_drives_head_on_at_a_prey_that_comes_towards_it():
     assert set(watch(at(0, 20, 0, [(0.5, 0.5, 0)] * T), prey)[10:]) == {"blocker"}
 
 
-def test_standing_in_front_of_a_prey_without_driving_is_idle_not_blocking():
+def test_staying_in_front_of_a_prey_without_driving_is_idle_not_blocking():
     prey = body(*PREY, 0.0, [(0.5, 0.5, 0)] * T, PREY_SPEED)
     assert set(watch(at(0, 20, 0, [STOP] * T), prey)[10:]) == {"idle"}
 
@@ -160,7 +160,7 @@ def test_turning_on_the_spot_is_idle():
     assert set(watch(at(180, 10, 0, [(-1.0, 1.0, 0)] * T))[10:]) == {"idle"}
 
 
-def test_idle_counts_away_from_everybody_and_pursuing_does_not():
+def test_idle_counts_far_from_all_bodies_and_pursuing_does_not():
     far = body(150.0, 150.0, 225.0, [STOP] * T)
     assert set(watch(far)[10:]) == {"idle"}
     driving = body(150.0, 150.0, 225.0, [AHEAD] * T)
@@ -179,7 +179,7 @@ def test_flanker_bumps_again_and_again_into_the_side_of_the_rear(side):
     assert set(watch(at(side * 120, 1.5, 0, slow(0.15, 0.15)))[10:]) == {"flanker"}
 
 
-def test_flanker_keeps_beside_a_moving_prey():
+def test_flanker_keeps_alongside_a_moving_prey():
     # The prey drives on; the flanker, heading along and a little inwards, bumps and follows.
     prey = body(*PREY, 0.0, [(0.2, 0.2, 0)] * T, PREY_SPEED)
     x, y = around(PREY, 120, 0.8)
@@ -203,11 +203,11 @@ def test_one_bump_in_a_window_is_not_repeated(every, expected):
 
 
 @pytest.mark.parametrize(("gap", "expected"), [(1.79, "flanker"), (4.0, "pursuer")])
-def test_refusals_away_from_the_prey_are_no_collisions_with_it(gap, expected):
+def test_refusals_away_from_the_prey_are_not_collisions_with_it(gap, expected):
     assert watch(at(120, gap, 0, slow(0.14, 0.14)))[12] == expected
 
 
-def test_refusals_while_driving_away_are_no_collisions_with_the_prey():
+def test_refusals_while_driving_away_are_not_collisions_with_the_prey():
     assert set(watch(at(120, 0.5, 180, slow(0.14, 0.14)))[10:]) == {"none"}
 
 
@@ -221,7 +221,7 @@ def test_flanker_stays_close_in_all_iterations(near, expected):
 
 
 def swing(degrees, n=T):
-    """Return slow wheels that turn so much in each iteration that is not refused."""
+    """Return slow wheels that turn by this angle in each iteration that is not refused."""
     half = math.radians(degrees) * 5.3 / 0.8 / 2
     return slow(0.12 - half, 0.12 + half, n)
 
@@ -232,18 +232,18 @@ def test_knocker_bumps_again_and_again_on_an_arc_wherever_it_is(bearing):
 
 
 @pytest.mark.parametrize(("degrees", "expected"), [(8.8, "flanker"), (9.2, "knocker")])
-def test_an_arc_begins_at_45_degrees_in_a_window(degrees, expected):
+def test_an_arc_starts_at_45_degrees_in_a_window(degrees, expected):
     # Five of ten iterations turn: 44 or 46 degrees.
     assert watch(at(120, 1.5, -22, swing(degrees)))[10] == expected
 
 
-def test_an_arc_without_collisions_is_no_knocking():
+def test_an_arc_without_collisions_is_not_knocking():
     half = math.radians(5) * 5.3 / 0.8 / 2
     script = [(0.12 - half, 0.12 + half, 0)] * T
     assert watch(at(120, 1.5, -50, script))[10] == "none"
 
 
-def test_swinging_left_and_right_is_no_arc():
+def test_swinging_left_and_right_is_not_an_arc():
     half = math.radians(10) * 5.3 / 0.8 / 2
     script = [(0.12 + side * half, 0.12 - side * half, k % 2) for k, side in
               enumerate([1, 1, -1, -1] * 5)]  # fmt: skip
@@ -275,7 +275,7 @@ def test_the_behaviour_is_about_the_closest_prey():
     )
     seen = conduct(t, sizes())
     assert set(seen.prey[:, 0].tolist()) == {1}
-    assert names(seen.behaviour[10:, 0]) == ["none"] * 10  # it drives away from that one
+    assert names(seen.behaviour[10:, 0]) == ["none"] * 10  # it drives away from this prey
     alone = {k: v[:, :3] if v.shape[1] == 4 else v for k, v in t.items()}
     assert names(conduct(alone, sizes()).behaviour[10:, 0]) == ["pursuer"] * 10
 
@@ -291,7 +291,7 @@ SCENES = {
 @pytest.mark.parametrize("name", SCENES)
 @pytest.mark.parametrize("quarter", [1, 2, 3])
 @pytest.mark.parametrize("is_mirrored", [False, True])
-def test_behaviours_do_not_depend_on_where_north_is(name, quarter, is_mirrored):
+def test_behaviours_do_not_depend_on_orientation(name, quarter, is_mirrored):
     t = record(SCENES[name], body(100.0, 115.0, 0.0, [STOP] * T), body(*PREY, 0.0, [STOP] * T))
     expected = conduct(t, sizes())
     assert name in names(expected.behaviour[:, 0])
@@ -318,12 +318,12 @@ PURSUER, BLOCKER, FLANKER, KNOCKER, IDLE = range(5)
 
 
 def lifetimes(conducts):
-    """Return what the study makes of what it is told about these epochs."""
+    """Return the study's results for these epochs."""
     return of_executed(executed(conducts), BEHAVIOURS)
 
 
 def life(*windows, start=10, interacts=None):
-    """Return the conduct of one predator that holds each of these behaviours for a window."""
+    """Return the conduct of one predator that shows each of these behaviours for a window."""
     behaviour = np.repeat(np.array([NONE, *windows], dtype=np.int64), start)[:, None]
     with_others = np.ones_like(behaviour, dtype=bool)
     if interacts is not None:
@@ -350,20 +350,20 @@ def test_a_switch_in_every_window_is_the_worst_s():
         ([PURSUER, PURSUER, PURSUER, BLOCKER, BLOCKER, PURSUER], 0.4, "pursuer"),
     ],
 )
-def test_s_of_a_half_is_not_specialized_any_more(windows, s, label):
+def test_s_of_a_half_is_no_longer_specialized(windows, s, label):
     (own,) = lifetimes([life(*windows)])
     assert own.specialization == pytest.approx(s)
     assert own.label == label
 
 
-def test_none_within_an_interaction_counts_and_is_no_specialization():
+def test_none_within_an_interaction_counts_and_is_not_a_specialization():
     (own,) = lifetimes([life(NONE, NONE, NONE, PURSUER)])
     assert own.shares["none"] == 0.75
     assert own.specialization == pytest.approx(1 / 3)
     assert own.label == "non-specialized"
 
 
-def test_what_is_done_away_from_others_does_not_count_unless_it_is_idling():
+def test_behaviour_outside_interactions_counts_only_if_it_is_idling():
     (own,) = lifetimes(
         [life(NONE, PURSUER, IDLE, NONE, PURSUER, interacts=[False, True, False, False, True])]
     )
@@ -378,7 +378,7 @@ def test_epochs_are_one_life():
     assert own.label == "blocker"
 
 
-def test_a_predator_that_never_did_anything_that_counts():
+def test_a_predator_without_any_behaviour_that_counts():
     (own,) = lifetimes([life(NONE, NONE, interacts=[False, False])])
     assert (own.windows, own.specialization, own.label) == (0, 0.0, "non-specialized")
 

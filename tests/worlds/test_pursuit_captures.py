@@ -1,4 +1,4 @@
-"""Collective behaviours: compositions of section 4.6.3 and just beside them; what a capture is."""
+"""Collective behaviours: compositions of section 4.6.3, near misses, and finding captures."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ T = 200
 
 
 def scene(captured, behaviour=None, x=50.0, n_predators=2, prey_of=None, interacts=None):
-    """Return a record of a prey at (x, 50), captured then, and what predators did meanwhile."""
+    """Return a record of a captured prey at (x, 50), and of the predators' behaviours meanwhile."""
     captured = np.asarray(captured)
     captured = captured[:, None] if captured.ndim == 1 else captured
     bodies = n_predators + captured.shape[1]
@@ -121,7 +121,7 @@ def test_a_capture_is_an_interval_and_the_approach_before_it():
     assert (one.start, one.first, one.stop) == (30, 60, 100)
 
 
-def test_an_approach_begins_with_the_epoch_or_after_the_capture_before():
+def test_an_approach_starts_with_the_epoch_or_after_the_previous_capture():
     early, late = scene(during((15, 40), (55, 90)))
     assert (early.start, early.first) == (0, 15)
     assert (late.start, late.first) == (40, 55)
@@ -147,7 +147,7 @@ def test_a_role_lasts_for_a_fifth_of_a_capture(held, expected):
 def test_roles_are_ordered_by_how_long_they_last_and_switches_counted():
     behaviour = np.full((T, 2), NONE)
     behaviour[30:60, 0] = BEHAVIOURS.index("flanker")
-    behaviour[60:65, 0] = BEHAVIOURS.index("pursuer")  # what is between does not count
+    behaviour[60:65, 0] = BEHAVIOURS.index("pursuer")  # behaviours in between do not count
     behaviour[65:70, 0] = BEHAVIOURS.index("flanker")
     behaviour[70:130, 0] = BEHAVIOURS.index("knocker")
     behaviour[30:130, 1] = BEHAVIOURS.index("flanker")
@@ -156,7 +156,7 @@ def test_roles_are_ordered_by_how_long_they_last_and_switches_counted():
     assert (one.switches, one.collective) == (1, "role-switcher")
 
 
-def test_what_is_done_apart_or_about_another_prey_is_no_role():
+def test_distant_behaviour_or_one_about_another_prey_is_not_a_role():
     behaviour = np.zeros((T, 2), dtype=int)
     two = np.stack([during((60, 100)), during()], axis=1)
     prey_of = np.zeros((T, 2), dtype=int)
@@ -183,7 +183,7 @@ def test_each_prey_has_its_own_captures():
 
 
 def test_a_triangle_of_pursuers_and_a_pincer_from_trajectories():
-    """Whole chain: predators that press on a prey from three sides, then one of them in front."""
+    """The whole chain: predators press on a prey from three sides, then one from the front."""
     n = 60
     prey = body(100.0, 100.0, 0.0, [STOP] * n)
     held = np.zeros((n, 1), dtype=np.int32)

@@ -1,4 +1,4 @@
-"""Lanes that share the items of the pursuit worlds' phases give the bits of a single one."""
+"""Lanes that share the items of the pursuit worlds' phases agree with one lane bit for bit."""
 
 import numpy as np
 import pytest
@@ -9,11 +9,11 @@ from conevo.worlds.rollout import Rollout
 from worlds.situations import NAN, random_team
 
 LANES = [32, 64, 96, 128, 256]
-FULL = {"iterations": 25, "arena_cm": 60.0}  # so that everybody sees and meets somebody
+FULL = {"iterations": 25, "arena_cm": 60.0}  # so that all bodies meet others
 
 
 def recorded(a_world, lanes, heuristic):
-    """Everything that is recorded of an epoch in which some sensors are held."""
+    """The record of an epoch in which some sensors are clamped."""
     genes, slots = random_team(a_world, 6)
     scenarios = a_world.scenarios([fold(6, "lanes")])
     scenarios.clamp[:] = np.where(np.arange(scenarios.clamp.size) % 7, NAN, 0.5).reshape(

@@ -1,9 +1,9 @@
-"""The kernels of the pursuit worlds against the slow oracle, phase by phase, and that by hand.
+"""The pursuit worlds' kernels against the slow oracle, phase by phase, and the oracle by hand.
 
-Every iteration starts from the recorded state of the one before, so differences of float32 and
-float64 do not grow. Where a comparison falls within float32's grain of its threshold (a ray that
-grazes a disc, a gap of just the sensor range) the kernel must agree with the oracle for some state
-a hair's breadth away; such iterations are counted, and few.
+Every iteration starts from the previous recorded state, so differences of float32 and float64 do
+not grow. If a comparison is within float32's rounding of its threshold (a ray that grazes a disc, a
+gap that equals the sensor range), the kernel must agree with the oracle for a state within this
+rounding; such iterations are counted, and are rare.
 """
 
 import math
@@ -53,10 +53,10 @@ def test_a_disc_straight_ahead_of_a_side_sensor():
 
 
 def test_a_disc_at_the_side_of_a_cone_is_seen_along_its_edge():
-    """A cone of 10 deg either side that looks along +y past a disc whose centre is outside it."""
+    """A cone of 10 deg on either side, along +y past a disc whose centre is outside the cone."""
     x, y = 50 + 2.75 * math.cos(math.radians(68)), 50 + 2.75 * math.sin(math.radians(68))
     w = place([(50, 50, 0)], [(x + 4.0, y + 10.0)], half_angle=10.0)
-    beta = math.radians(80)  # the edge ray that is nearer
+    beta = math.radians(80)  # the nearer edge ray
     along = 4 * math.cos(beta) + 10 * math.sin(beta)
     aside = 4 * math.sin(beta) - 10 * math.cos(beta)
     d = along - math.sqrt(2.75**2 - aside**2)
@@ -110,7 +110,7 @@ def test_motor_primitives():
     assert names == ["stop", "forward", "right", "left", "reverse", "forward", "forward"]
 
 
-def test_steering_turns_by_what_is_missing_and_no_more():
+def test_steering_turns_by_the_missing_angle_and_no_more():
     for missing in (0.05, -0.2, 0.3018, 2.0, -3.0):
         left, right = oracle.steer(1.0, 1.0 + missing, 0.8)
         turn = (right - left) * 0.8 / 5.3
@@ -122,7 +122,7 @@ def test_a_chaser_remembers_forgets_and_then_walks():
     w = place([(20, 50, 0), (47.4, 50, 0)], prey=[1], minds=[Chaser(), Walker()])
     assert oracle.decide(w, 0, []) == (1.0, 1.0)
     assert w.memory[0] == (47.4, 50.0)
-    w.x[1] = 60.0  # out of sight: on to where it was
+    w.x[1] = 60.0  # out of sight: to its last known place
     w.y[0] = 40.0
     assert oracle.decide(w, 0, [])[0] < 1.0
     assert w.memory[0] == (47.4, 50.0)
@@ -225,14 +225,14 @@ def build(a_world, genes, slots, scenarios, heuristic):
 
 
 def twin(w):
-    """A copy whose minds change apart from the original's."""
+    """A copy whose minds change independently of the original's."""
     other = copy(w)
     other.memory, other.wander, other.context = list(w.memory), list(w.wander), list(w.context)
     return other
 
 
 def nearby(w, n=40):
-    """Copies of a world a hair's breadth away (float32's grain), for near-ties."""
+    """Copies of a world within float32's rounding, for near-ties."""
     rng = stream(0, "nearby")
     for k in range(n):
         other = twin(w)
@@ -245,7 +245,7 @@ def nearby(w, n=40):
 
 @dataclass
 class Tally:
-    """What a comparison met: near-ties and, so that it is not vacuous, events."""
+    """Counts of a comparison: near-ties and, so that it is not vacuous, events."""
 
     near_ties: int = 0
     refused: int = 0
@@ -269,12 +269,12 @@ def check_sensors(w, me, seen, tally):
 
 
 def check_wheels(w, me, seen, inputs, tally):
-    """``inputs``: what a robot of the team was recorded to see, None for another body."""
+    """``inputs``: the recorded inputs of a robot of the team, None for another body."""
     before = twin(w)
     mind = w.minds[me]
     needs_eyes = inputs is None and isinstance(mind, Network | Dodger)
     expected = oracle.decide(w, me, oracle.sense(w, me) if needs_eyes else inputs)
-    # Where the oracle's own eyes feed a network, weights of up to 10 multiply their difference.
+    # If the oracle's own sensors feed a network, weights of up to 10 multiply their difference.
     tolerance = 1e-3 if needs_eyes else 1e-4
     if np.abs(np.array(seen) - expected).max() < tolerance:
         return
@@ -382,7 +382,7 @@ def random_team(a_world, seed, scale):
     genome = genome_of(mind, a_world)
     r, u = a_world.n_robots, genome.max_parts
     genes = rng.uniform(-scale, scale, (r * u, genome.n_genes)).astype(np.float32)
-    genes[:, -2:] += 0.2 * scale  # rather ahead than back
+    genes[:, -2:] += 0.2 * scale  # ahead more than back
     slots = np.arange(r * u, dtype=np.int32).reshape(r, u)
     slots[rng.random((r, u)) < 0.3] = -1
     slots[:, mind.n_hidden + 1 :] = -1
@@ -477,8 +477,8 @@ def test_the_comparisons_above_are_not_vacuous(prey):
 
 
 @pytest.mark.parametrize("case", [HUNTS[0], HUNTS[9], FLIGHTS[4], FLIGHTS[6]])
-def test_an_epoch_without_correction_stays_with_the_oracle(case, prey):
-    """As long as the smallest of differences has not grown into other decisions."""
+def test_an_epoch_without_correction_follows_the_oracle(case, prey):
+    """Until the smallest differences have grown into other decisions."""
     setup = hunt(case, prey, 3) if len(case) == 6 else flight(case, 4)
     seen = Rollout(setup[0]).record(*setup[1:])
     w = build(*setup)

@@ -25,8 +25,8 @@ def test_average_is_over_each_instance_then_over_the_instances():
     sensed = inputs()
     sensed[0:2, 0, 3] = 0.8  # a short instance and a long one weigh the same
     sensed[10:18, 0, 3] = 0.2
-    sensed[:, 0, 16:] = 9.0  # the context is no sensor
-    sensed[:, 1] = 9.0  # nor is another predator
+    sensed[:, 0, 16:] = 9.0  # context inputs are not sensors
+    sensed[:, 1] = 9.0  # another predator's inputs do not count either
     some = [Spell(0, 0, "pursuer", 0, 2), Spell(0, 0, "pursuer", 10, 18)]
     expected = np.zeros(16)
     expected[3] = 0.5
@@ -63,7 +63,7 @@ def test_portions_are_those_of_the_duration_and_of_the_sensors():
     assert seen.proximity.sum() == pytest.approx((sensed[:, 0, :8] > 0).mean())
 
 
-def test_a_sensor_that_sweeps_the_range_is_in_all_segments_alike():
+def test_a_sensor_that_sweeps_the_range_is_in_all_segments_equally():
     sensed = inputs(1000)
     sensed[:, 0, 8:16] = ((np.arange(1000) + 0.5) / 1000)[:, None]
     seen = profile([Spell(0, 0, "pursuer", 0, 1000)], [sensed])

@@ -1,4 +1,4 @@
-"""The configuration files of other readings: they name what they say, and a world plays them."""
+"""The configuration files of other readings: their contents, and worlds that use them."""
 
 from pathlib import Path
 
@@ -21,11 +21,11 @@ def test_gathering_as_the_tables_describe_it():
         robot_range=0.126,
         grip_distance=0.02,
     )
-    assert len(config.build_world().scenarios([1, 2])) == 2  # obstacles and objects find room
+    assert len(config.build_world().scenarios([1, 2])) == 2  # obstacles and objects have room
 
 
 def test_rovers_whose_energy_binds():
-    """Whoever detects with med or hi all the time has spent it before the epoch's end."""
+    """A rover that always detects with med or hi runs out of energy before the epoch ends."""
     config = resolve("rover/complex-5", preset="thesis", file=EXAMPLES / "rover-energy-binds.toml")
     p = config.world_params
     assert p == RoverParams(low_cost=0.25, med_cost=0.5, hi_cost=1.0)

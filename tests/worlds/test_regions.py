@@ -1,4 +1,4 @@
-"""Types and starts with regions of their own in gathering, and starts by robot in pursuit."""
+"""Types and starts with their own regions in gathering, and starts by robot in pursuit."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ KEYS = [7, 2**63 + 5, 19, 20, 21]
 
 
 def third(x, y):
-    """Return which third of the way round the square through a place it lies in."""
+    """Return the third of the square, counted around its centre, in which a place lies."""
     dx, dy = x - 0.5, y - 0.5
     half = max(abs(dx), abs(dy))
     if dy == -half:
@@ -55,10 +55,10 @@ def test_each_robot_starts_in_its_region_outside_the_home_area():
         assert [third(x, y) for x, y in places] == [i % 3 for i in range(11)]
         assert all(max(abs(x - 0.5), abs(y - 0.5)) > 0.35 for x, y in places)
     alone = world.scenarios([KEYS[3]])
-    assert alone.start_x[0].tolist() == drawn.start_x[3].tolist()  # whatever is drawn with it
+    assert alone.start_x[0].tolist() == drawn.start_x[3].tolist()  # whatever else is drawn
 
 
-def test_what_is_drawn_for_other_purposes_stays():
+def test_other_draws_stay_the_same():
     plain = conevo.world("gacc/complex-4").scenarios(KEYS)
     apart = conevo.world("gacc/complex-4", segregation=1.0).scenarios(KEYS)
     by_robot = conevo.world("gacc/complex-4", starts="by_robot").scenarios(KEYS)
@@ -96,7 +96,7 @@ def test_prey_start_anywhere_with_predators_in_their_sectors():
     assert 0.15 < below.mean() < 0.35
 
 
-def test_what_is_not_a_share_or_a_start_is_refused():
+def test_a_wrong_share_or_start_is_refused():
     with pytest.raises(UsageError, match=r"segregation = 1\.5"):
         conevo.world("gacc/complex-3", segregation=1.5)
     for world in ("gacc/complex-3", "pursuit/team-3"):

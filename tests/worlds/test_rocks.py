@@ -1,4 +1,4 @@
-"""The environments of the multi-rover world hold what section 5.1 of the thesis asks for."""
+"""The environments of the multi-rover world are those of section 5.1 of the thesis."""
 
 import pytest
 
@@ -10,13 +10,13 @@ FAMILIES = ("simple", "complex", "extended", "apart")  # the last is ours
 VALUE_SHARES = (0.1, 0.2, 0.3, 0.4)  # of A..D at equal counts
 
 
-def test_there_are_four_sets_of_ten() -> None:
+def test_environments_are_four_sets_of_ten() -> None:
     expected = [f"{s}-{e}" for s in FAMILIES for e in range(1, 11)]
     assert list(ENVIRONMENTS) == expected
 
 
 @pytest.mark.parametrize("environment", ENVIRONMENTS)
-def test_the_value_is_5000_and_every_rock_finds_a_site(environment: str) -> None:
+def test_the_value_is_5000_and_every_rock_has_a_site(environment: str) -> None:
     counts = mix(environment)
     assert sum(n * v for n, v in zip(counts, VALUES, strict=True)) == 5000
     assert min(counts) >= 0

@@ -1,4 +1,4 @@
-"""The rover kernels against the oracle written from the thesis, and by hand-built situations."""
+"""The rover kernels against the oracle written from the thesis, and in situations built by hand."""
 
 from dataclasses import replace
 
@@ -97,7 +97,7 @@ def random_team(a_world, seed, max_slots=20):
 @pytest.mark.parametrize("environment", ["simple-3", "complex-1", "complex-5", "extended-7"])
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_kernel_equals_the_oracle(environment, seed):
-    """Action by action, until float32 decides a near-tie otherwise than float64."""
+    """Action by action, until float32 decides a near-tie differently from float64."""
     kinds = {1: "networks", 2: "heuristics", 3: "both"}
     a_world = world(
         f"rover/{environment}",
@@ -138,7 +138,7 @@ def compare_with_oracle(a_world, environment, seed, kind):
 
     differs = (seen["action"] != expected["action"]).any(axis=1)
     until = int(differs.argmax()) if differs.any() else a_world.params.iterations
-    if until < a_world.params.iterations:  # only a near-tie may part them
+    if until < a_world.params.iterations:  # only a near-tie may cause a difference
         robots = seen["action"][until] != expected["action"][until]
         top = np.sort(expected["outputs"][until][robots], axis=1)
         assert (top[:, -1] - top[:, -2] < 1e-3).all()
@@ -202,7 +202,7 @@ def situation(robots, rocks=(), *, iterations=3, canal=None, **params):
     )
     base = a_world.scenarios([1])
     k = base.rock_x.shape[1]
-    # Rocks that take part; the others lie in a far corner.
+    # Rocks in use; the others lie in a far corner.
     x = np.full(k, 0.999, np.float32)
     y = np.full(k, 0.999, np.float32)
     kind = np.zeros(k, np.int32)
@@ -285,7 +285,7 @@ def test_accuracy_is_the_chance_of_each_rover():
     out, _ = situation(
         [(0.5, 0.49, LOW), (0.5, 0.51, MED)],
         rocks,
-        iterations=2,  # the lander hears of the first only
+        iterations=2,  # the lander receives only the first
         low_accuracy=0.7,
         med_accuracy=0.8,
     )
@@ -294,7 +294,7 @@ def test_accuracy_is_the_chance_of_each_rover():
 
 
 def test_one_rock_per_activation_is_the_same_one_for_both():
-    """Of twenty in reach of both, each activation detects one, until none is left."""
+    """Of twenty in range of both, each activation detects one, until none is left."""
     rocks = [(0.5 + 0.0005 * k, 0.5, "A") for k in range(20)]
     robots = [(0.5, 0.49, LOW), (0.5, 0.51, LOW), (0.1, 0.1, LOW)]
     _, seen = situation(robots, rocks, iterations=25, rocks_per_activation=1)
@@ -305,7 +305,7 @@ def test_one_rock_per_activation_is_the_same_one_for_both():
 
 
 def test_a_third_rover_takes_the_same_rock_or_none():
-    """Three that reach the same rocks take the same one: all are credited, the team counts it."""
+    """Three rovers in range of the same rocks take one of them: each is credited, the team once."""
     rocks = [(0.5, 0.5 + 0.0005 * k, "E") for k in range(6)]
     robots = [(0.5, 0.49, MED), (0.5, 0.515, MED), (0.49, 0.5, MED)]
     out, seen = situation(robots, rocks, iterations=4, rocks_per_activation=1)
@@ -334,7 +334,7 @@ def test_a_range_as_a_share_of_the_area_is_a_disc_of_that_area():
     assert p.rover_sensor_radius == pytest.approx(0.0798, abs=1e-4)
 
 
-def test_the_lander_hears_one_iteration_later():
+def test_the_lander_receives_detections_one_iteration_later():
     robots, rocks = [(0.5, 0.49, LOW), (0.5, 0.51, LOW)], [(0.5, 0.5, "A")]
     assert situation(robots, rocks, iterations=2)[0].performance["value"][0, 0] == 1
     late = [(0.5, 0.49, LOW), (0.5, 0.51, LOW)]
@@ -347,7 +347,7 @@ def test_energy_runs_out_and_the_body_stays():
         [(0.5, 0.49, LOW), (0.5, 0.51, HI)], iterations=12, energy=1.0, hi_cost=0.3
     )
     assert seen["energy"][0] == pytest.approx([1 - 0.05 - 0.1, 1 - 0.05 - 0.3])
-    assert out.counts[0, 0, 0, LOW] == 7  # 0.15 each: the seventh is the last it can begin
+    assert out.counts[0, 0, 0, LOW] == 7  # 0.15 each: the seventh is the last that it can start
     assert out.counts[0, 0, 1, HI] == 3
     assert (seen["action"][3:, 1] == NONE).all()
     assert seen["energy"][2, 1] == seen["energy"][-1, 1]
@@ -368,7 +368,7 @@ def test_the_largest_step_is_d_max_and_edges_canals_and_rovers_refuse_it():
 
     _, seen = situation([(0.004, 0.5, MOVE, -1.0, 0.0), (0.1, 0.1, LOW)], iterations=5)
     assert (seen["x"][:, 0] == np.float32(0.004)).all()
-    assert (seen["action"][:, 0] == MOVE).all()  # refused, but executed and paid
+    assert (seen["action"][:, 0] == MOVE).all()  # refused, but executed and charged
 
     canal = np.zeros((200, 200), np.uint8)
     canal[:, 102] = 1  # x in [0.51, 0.515)
@@ -383,7 +383,7 @@ def test_the_largest_step_is_d_max_and_edges_canals_and_rovers_refuse_it():
     assert seen["x"][0, 0] > 0.507
 
 
-def test_of_two_rovers_with_one_goal_the_lower_number_gets_it():
+def test_two_rovers_with_one_goal_yield_to_the_lower_number():
     _, seen = situation(
         [(0.5, 0.5, MOVE, 1.0, 0.0), (0.5142, 0.5, MOVE, -1.0, 0.0), (0.1, 0.1, LOW)],
         iterations=1 + 1,
@@ -416,7 +416,7 @@ def test_switches_and_counts_of_a_steady_rover():
 
 
 def test_relabelling_the_rovers_relabels_the_outcome():
-    """With sure success and no bodies the numbers of the rovers are without effect."""
+    """With certain success and without bodies the numbers of the rovers have no effect."""
     a_world = world(
         "rover/complex-5",
         n_robots=8,

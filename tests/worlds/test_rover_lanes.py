@@ -1,4 +1,4 @@
-"""The multi-rover world: any number of lanes, and nothing kept, give the same bits."""
+"""The multi-rover world: lanes and cached values do not change a bit."""
 
 import numpy as np
 import pytest
@@ -34,7 +34,7 @@ def serial(epoch):
 
 
 @pytest.mark.parametrize("lanes", [32, 64, 96, 128, 256])
-def test_any_number_of_lanes_gives_the_same_bits(epoch, serial, cpu_blocks, lanes):
+def test_any_number_of_lanes_agrees_bit_for_bit(epoch, serial, cpu_blocks, lanes):
     a_world, played = epoch
     with cpu_blocks():
         seen = Rollout(a_world, n_threads=1, lanes=lanes).record(*played)
@@ -55,8 +55,8 @@ def test_lanes_agree_on_the_one_rock_of_an_activation(cpu_blocks):
 
 
 @pytest.mark.parametrize("options", [{}, ONE_ROCK], ids=["all in range", "one rock"])
-def test_what_is_kept_changes_nothing(options):
-    """Rovers that look at everything again in each iteration end with the same bits."""
+def test_cached_values_change_nothing(options):
+    """Rovers that compute everything again in each iteration agree bit for bit."""
     a_world, (genes, slots, scenarios, heuristic) = meeting(12, 60, **options)
     kept, fresh = (
         Stepper(a_world, genes, slots[None], scenarios, heuristic[None]) for _ in range(2)

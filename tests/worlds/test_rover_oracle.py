@@ -1,4 +1,4 @@
-"""Hand-solved miniatures of the multi-rover world, asserted on its slow oracle."""
+"""Small cases of the multi-rover world, solved by hand and checked on its slow oracle."""
 
 import math
 from collections.abc import Sequence
@@ -143,7 +143,7 @@ def test_both_rovers_must_succeed(setting: str, accuracy: float) -> None:
         assert end["detected"].tolist() == [found]
 
 
-def test_every_rock_is_drawn_for_on_its_own() -> None:
+def test_every_rock_has_its_own_draw() -> None:
     succeeds = {(0, 1), (1, 0)}  # (iteration, rock)
     end = play(
         team("ll"),
@@ -240,7 +240,7 @@ def test_a_rover_out_of_energy_does_nothing_more_but_stays_visible() -> None:
     spent, watcher = Script(activate(HI)), Script(activate(LOW))
     start = [(0.5, 0.5), (0.51, 0.5)]
     end = play([spent, watcher], start, [(*ROCK, "D")], energy=0.4, iterations=5)
-    # 0.4 pays 0.35 twice (0.05 is left, and is enough to begin) and 0.15 three times.
+    # 0.4 pays 0.35 twice (0.05 is left, and is enough to start) and 0.15 three times.
     assert end["action"][:, 0].tolist() == [HI, HI, NONE, NONE, NONE]
     assert end["action"][:, 1].tolist() == [LOW, LOW, LOW, NONE, NONE]
     assert spent.calls == 2
@@ -251,7 +251,7 @@ def test_a_rover_out_of_energy_does_nothing_more_but_stays_visible() -> None:
     assert not end["sensors"][2:, 0].any()
 
 
-def test_dead_bodies_are_in_the_way() -> None:
+def test_dead_bodies_are_obstacles() -> None:
     start = [(0.5, 0.5), (0.511, 0.5)]
     end = play([Script(activate(HI)), Script(activate(LOW), WEST)], start, energy=0.2, iterations=2)
     assert end["action"][1].tolist() == [NONE, MOVE]
@@ -277,7 +277,7 @@ def test_a_step(outputs: Sequence[float], step: tuple[float, float]) -> None:
 
 
 @pytest.mark.parametrize("place", [(0.005, 0.5), (0.995, 0.5), (0.5, 0.995), (0.5, 0.005)])
-def test_the_edge_refuses_a_move_which_costs_all_the_same(place: tuple[float, float]) -> None:
+def test_the_edge_refuses_a_move_which_still_costs_energy(place: tuple[float, float]) -> None:
     outwards = step_towards(math.atan2(place[1] - 0.5, place[0] - 0.5))
     inwards = step_towards(math.atan2(0.5 - place[1], 0.5 - place[0]))
     end = play([Script(outwards, inwards)], [place], iterations=2)
@@ -313,18 +313,18 @@ def test_of_two_proposals_for_one_place_the_lower_index_wins() -> None:
     np.testing.assert_allclose(end["position"][0], [(0.51, 0.5), (0.521, 0.5)])
 
 
-def test_a_proposal_counts_even_if_it_gives_way_itself() -> None:
+def test_a_proposal_counts_even_if_it_yields_itself() -> None:
     # 0 and 1 propose places 0.001 apart, 1 and 2 too, 0 and 2 are 0.0021 apart.
     start = [(0.5, 0.5), (0.511, 0.51), (0.5021, 0.5)]
     south = step_towards(-math.pi / 2)
     end = play([Script(EAST), Script(south), Script(EAST)], start)
     np.testing.assert_allclose(end["position"][0], [(0.51, 0.5), start[1], start[2]])
-    # Without rover 0, rover 1 gets its place and rover 2 still gives way.
+    # Without rover 0, rover 1 gets its place and rover 2 still yields.
     end = play([Script(activate(LOW)), Script(south), Script(EAST)], start)
     np.testing.assert_allclose(end["position"][0], [start[0], (0.511, 0.5), start[2]])
     # A move that is refused for its target alone proposes nothing.
     mask = OPEN.copy()
-    mask[100, 102] = True  # y in [0.500, 0.505): holds rover 1's target only
+    mask[100, 102] = True  # y in [0.500, 0.505): contains rover 1's target only
     lifted = [(0.5, 0.4999), (0.511, 0.51), (0.5021, 0.4999)]
     end = play([Script(activate(LOW)), Script(south), Script(EAST)], lifted, mask=mask)
     np.testing.assert_allclose(end["position"][0], [lifted[0], lifted[1], (0.5121, 0.4999)])
@@ -483,7 +483,7 @@ def test_no_rule_is_broken_in_a_random_run() -> None:
     assert end["sensors"].min() >= 0.0
     assert end["sensors"].max() <= 1.0
     found = end["detected"] >= 0
-    assert found.sum() > 20  # so that the lines below say something
+    assert found.sum() > 20  # so that the lines below are not vacuous
     assert 2 * values[found].sum() <= end["credited"].sum()
     assert end["value"] == values[found & (end["detected"] < 39)].sum()
     price = np.array([0.1, 0.2, 0.3, 0.01])

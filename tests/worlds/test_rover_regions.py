@@ -1,4 +1,4 @@
-"""Types with regions of their own and starts by robot, against one rock after another in Python."""
+"""Types with their own regions and starts by robot, against one rock after another in Python."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ KEYS = [7, 2**63 + 5, 19]
 
 
 def regions(layout):
-    """Return the sites of a layout, and the function that tells the region of a place."""
+    """Return the sites of a layout, and a function that returns the region of a place."""
     xy = canals.sites(canals.load(layout))
     middle = np.median(xy[:, 0])
     left, right = (np.median(xy[side, 1]) for side in (xy[:, 0] <= middle, xy[:, 0] > middle))
@@ -27,7 +27,7 @@ def regions(layout):
 
 
 def in_turn(key, environment, segregation):
-    """Return the type of the rock at each place that has one: rocks anywhere, then in regions."""
+    """Return the type of the rock at each occupied place: rocks anywhere, then in regions."""
     xy, region = regions(rocks.layout(environment))
     cell = (xy * np.float32(40)).astype(int)
     sites = [tuple(xy[k]) for k in np.lexsort((cell[:, 0], cell[:, 1]))]  # the order of grid cells
@@ -52,7 +52,7 @@ def in_turn(key, environment, segregation):
     [("complex-5", 0.0), ("complex-5", 0.3), ("complex-1", 1.0), ("extended-2", 0.777),
      ("extended-5", 1.0), ("extended-10", 0.5), ("simple-2", 1.0)],
 )  # fmt: skip
-def test_rocks_lie_where_one_after_another_puts_them(environment, segregation):
+def test_rocks_lie_as_if_placed_one_after_another(environment, segregation):
     drawn = conevo.world(f"rover/{environment}", segregation=segregation).scenarios(KEYS)
     keys = fold_all(np.array(KEYS, np.uint64), "rover", "rocks")
     for e in (0, 2):
@@ -65,7 +65,7 @@ def test_rocks_lie_where_one_after_another_puts_them(environment, segregation):
 
 
 def test_a_share_of_each_type_lies_in_its_region():
-    """All at 1; at s the share s, and a quarter of the others, which lie anywhere."""
+    """All at segregation 1; at s the share s, and a quarter of the others, which lie anywhere."""
     _, region = regions(5)
     for segregation in (0.0, 0.5, 1.0):
         drawn = conevo.world("rover/complex-5", segregation=segregation).scenarios(range(20))
@@ -82,7 +82,7 @@ def test_a_share_of_each_type_lies_in_its_region():
 
 
 @pytest.mark.parametrize("layout", range(1, 11))
-def test_regions_have_as_many_sites_each(layout):
+def test_regions_have_equal_numbers_of_sites(layout):
     xy, region = regions(layout)
     counts = np.bincount([region(x, y) for x, y in xy], minlength=4)
     assert counts.min() > 1200  # of about 5500: enough for the 1000 of the largest type
@@ -99,10 +99,10 @@ def test_each_rover_starts_in_its_region():
         assert [region(x, y) for x, y in places] == [i % 4 for i in range(11)]
         assert not mask[(places[:, 1] * 200).astype(int), (places[:, 0] * 200).astype(int)].any()
     alone = a_world.scenarios([4])
-    assert alone.start_x[0].tolist() == drawn.start_x[4].tolist()  # whatever is drawn with it
+    assert alone.start_x[0].tolist() == drawn.start_x[4].tolist()  # whatever else is drawn
 
 
-def test_what_is_drawn_for_other_purposes_stays():
+def test_other_draws_stay_the_same():
     plain = conevo.world("rover/complex-3").scenarios(KEYS)
     own = conevo.world("rover/complex-3", segregation=1.0).scenarios(KEYS)
     by_robot = conevo.world("rover/complex-3", starts="by_robot").scenarios(KEYS)
@@ -113,7 +113,7 @@ def test_what_is_drawn_for_other_purposes_stays():
     assert not np.array_equal(plain.start_x, by_robot.start_x)
 
 
-def test_what_is_not_a_share_or_a_start_is_refused():
+def test_a_wrong_share_or_start_is_refused():
     with pytest.raises(UsageError, match=r"segregation = 1\.5"):
         conevo.world("rover/complex-3", segregation=1.5)
     with pytest.raises(UsageError, match="by_robot"):

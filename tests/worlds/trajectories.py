@@ -27,7 +27,7 @@ def sizes(n_predators: int = 2, arena: float = 200.0) -> ArenaSizes:
 def body(
     x: float, y: float, degrees: float, script: Sequence[Step], speed: float = SPEED
 ) -> dict[str, npt.NDArray[Any]]:
-    """Return what a body with this script does from this pose, [T] each."""
+    """Return the trajectory of a body with this script from this pose, [T] each."""
     heading = math.radians(degrees)
     rows = []
     for left, right, refused in script:

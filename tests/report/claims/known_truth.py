@@ -1,6 +1,6 @@
-"""Campaigns whose truth is known: what the thesis claims, and that with single things turned round.
+"""Campaigns with known truth: the thesis' claims, and the same with single facts reversed.
 
-No chance is in them: the runs of a cell are the quantiles of a normal distribution around its mean.
+They contain no chance: a cell's runs are the quantiles of a normal distribution around its mean.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ CASTES = {
 
 @dataclass
 class Cell:
-    """What is true of the runs of one method in one environment.
+    """The truth about the runs of one method in one environment.
 
     Attributes:
         value: mean of the world's main measure.
@@ -44,8 +44,8 @@ class Cell:
         composed: performance of composed teams, as a share of the team's.
         clones: performance of a team of clones of a specialist, as a share of the team's.
         mixed: that of the clones of a non-specialized robot.
-        castes: of the team, a robot each; None: two specialized and the non-specialized.
-        several: share of the runs with all of these; the others have the first alone.
+        castes: of the team, one robot each; None: two specialized ones and the non-specialized.
+        several: share of the runs with all of these; the others have only the first.
         seen: collective behaviour -> share of the runs that show it.
         idle: share of the runs with an idle predator.
         members: collective behaviours with specialized predators; others are non-specialized.
@@ -95,7 +95,7 @@ def of_rovers(method: str, n: int) -> tuple[str, ...]:
 
 
 def rover() -> Truth:
-    """Return what the thesis says of rovers."""
+    """Return the thesis' claims about rovers."""
     complex_value = dict(zip(METHODS, (1500, 1500, 2500, 2500, 3500), strict=True))
     complex_value |= dict.fromkeys(VARIANTS, 2500)
     loss = dict(zip(METHODS, (0.1, 0.1, 0.3, 0.3, 0.5), strict=True))
@@ -104,7 +104,7 @@ def rover() -> Truth:
         best = 1.2 if n == 10 else 1.0
         for method, value in complex_value.items():
             is_cne = method in ("homcne", "hetcne")
-            # Clones of CONE's robots reach what HomCNE and HetCNE do.
+            # Clones of CONE's robots are as good as HomCNE and HetCNE.
             about: dict[str, Any] = {
                 "loss": loss.get(method, 0.3),
                 "several": 0.0 if is_cne else 1.0,
@@ -142,7 +142,7 @@ SEEN: dict[str, dict[str, tuple[float, ...]]] = {
 
 
 def pursuit() -> Truth:
-    """Return what the thesis says of predators."""
+    """Return the thesis' claims about predators."""
     truth: Truth = {}
     loss = dict(zip(METHODS, (0.2, 0.2, 0.35, 0.35, 0.5), strict=True))
     members = {2: dict.fromkeys(("homcne", "hetcne"), ()), 3: {}, 4: {}}
@@ -153,7 +153,7 @@ def pursuit() -> Truth:
         is_better = n in (4, 5, 8, 9, 10)
         for method in (*METHODS, *VARIANTS):
             is_best = method == "cone" and (is_better or n in (2, 3))
-            # Types 2 and 3: above the variants (P4), yet alike to the other methods (P2).
+            # Types 2 and 3: above the variants (P4), yet similar to the other methods (P2).
             is_low = method in VARIANTS and n in (2, 3)
             value = level * (1.5 if is_best and is_better else 0.6 if is_low else 1)
             truth[f"team-{n}", method] = Cell(
@@ -180,7 +180,7 @@ def of_robots(method: str, n: int) -> tuple[str, ...]:
 
 
 def gacc() -> Truth:
-    """Return what the thesis says of gathering; value is the share of what can be delivered.
+    """Return the thesis' claims about gathering; value is the share of all objects delivered.
 
     HomCNE and HetCNE are equal in it: .29 and .32 differ significantly once there are enough runs.
     """
@@ -207,7 +207,7 @@ def gacc() -> Truth:
 
 
 def prey() -> Truth:
-    """Return what the thesis says of prey."""
+    """Return the thesis' claims about prey."""
     return {
         (f"shaping-{n}", method): Cell(600 if method == "cone" else 400, hidden=3.0)
         for n in range(1, 7)
@@ -237,7 +237,7 @@ def write_tables(
     """Write the tables of a campaign and return their folder.
 
     Args:
-        folder: made if it is not there; tables in it are replaced.
+        folder: made if it is missing; tables in it are replaced.
         world: name with version.
         truth: its cells.
         n: runs per cell.
@@ -269,7 +269,7 @@ def write_tables(
 
 
 def _around(share: float, method: str, seed: int) -> float | None:
-    """Return a run's share of pairs that exchange: of CONE's variants it differs by seed."""
+    """Return a run's share of pairs that exchange: for CONE's variants it differs by seed."""
     if method not in EXCHANGING:
         return None
     return share if method == "cone" else share * (1.1 if seed % 2 else 0.9)
@@ -332,7 +332,7 @@ def _results(
     shift = 1 + noise * NormalDist().inv_cdf((seed - 0.5) / n)
     shift_of_loss = 1 + noise * NormalDist().inv_cdf(((3 * seed) % n + 0.5) / n)
     number = int(environment.rpartition("-")[2])
-    parts = 10 * number if world == "gacc-v2" else 1  # what there is to deliver
+    parts = 10 * number if world == "gacc-v2" else 1  # the number of objects to deliver
     value = cell.value * shift * parts
 
     def played(study: str, team: str, share: float = 1) -> Iterator[tuple[str, dict[str, Any]]]:

@@ -37,7 +37,7 @@ def verdict_of(
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Tables in which R9 holds."""
+    """Tables in which R9 is true."""
     return write_tables(tmp_path_factory.mktemp("blind") / "tables", "rover-v2", rover(), 10)
 
 
@@ -54,7 +54,7 @@ def test_with_signal_or_without_a_study_it_is_judged(folder) -> None:
     assert verdict_of(folder, "nobody", 0.0).verdict == "reproduced"
 
 
-def test_what_is_exchanged_is_judged_with_signal_or_without(folder) -> None:
+def test_statements_about_exchange_are_judged_with_signal_or_without(folder) -> None:
     with_it = verdict_of(folder, "cone", 0.9, claim="C1R").alone
     assert verdict_of(folder, "cone", 0.0, claim="C1R").alone == with_it
 

@@ -1,4 +1,4 @@
-"""Claims that plans of their own are needed for: changed settings, direct evolution and shaping."""
+"""Claims that need their own plans: changed settings, direct evolution and shaping."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def merged(folder: Path, parts: list[Path]) -> Path:
 
 
 def judged(folder: Path, identity: str) -> dict[str, Verdict]:
-    """Return the verdicts of a claim by the levels that they are about."""
+    """Return the verdicts of a claim, by the levels concerned."""
     with Tables(folder) as tables:
         return {one.variant: one for one in verdicts(tables, [BY_ID[identity]])}
 
@@ -92,10 +92,10 @@ def test_between_little_and_much_is_undecided(identity: str, tmp_path: Path) -> 
         ("med_range", (0.03, 0.05, 0.07), False),
         ("epochs", (3, 4, 5), True),
         ("epochs", (2, 4, 6), False),
-        ("gst", (0.1, 0.2), False),  # nothing between
+        ("gst", (0.1, 0.2), False),  # nothing in between
     ],
 )
-def test_only_what_the_thesis_changed_is_told(
+def test_only_changes_made_by_the_thesis_are_judged(
     name: str, levels: tuple[float, ...], is_told: bool, tmp_path: Path
 ) -> None:
     found = changed(tmp_path, "R22", name, levels, (1.0,) * len(levels))
@@ -103,7 +103,7 @@ def test_only_what_the_thesis_changed_is_told(
 
 
 @pytest.mark.parametrize("identity", SETTINGS)
-def test_the_plan_named_by_the_claim_is_one_that_it_can_judge(identity: str) -> None:
+def test_the_plan_named_by_a_claim_can_be_judged(identity: str) -> None:
     claim = BY_ID[identity]
     world, plan, name, levels, _ = SETTINGS[identity]
     assert plan in claim.caution
@@ -119,7 +119,7 @@ def place_of(task: str) -> str:
 
 
 def shaping(folder: Path, truth: Truth, direct: Truth) -> Verdict:
-    """Judge runs that learned the environments in turn, and others that learned each by itself."""
+    """Judge runs that learned the environments in turn, and others that learned each separately."""
     parts = [
         write_tables(folder / "shaped", "gacc-v2", truth, n=10, studies=False),
         write_tables(folder / "direct", "gacc-v2", direct, n=10, studies=False),

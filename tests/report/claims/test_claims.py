@@ -1,4 +1,4 @@
-"""Each claim against tables whose truth is known: held, turned round, cut short."""
+"""Each claim against tables with known truth: true, reversed, cut short."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from report.claims.known_truth import METHODS, TRUTHS, Truth, of_robots, write_t
 BY_ID = {claim.id: claim for claim in CLAIMS}
 CONTRADICTORY = {"R6", "R20", "P11", "P16", "P17", "G8", "G15"}  # by the thesis itself
 ALIKE = {"R2", "R4", "R6", "R8", "R20", "R21", "P2", "G3", "G15"}  # claims that something is
-BY_PLAN = {"R22", "P15", "G12", "G14"}  # judged by factors of a plan of its own
+BY_PLAN = {"R22", "P15", "G12", "G14"}  # judged by factors of their own plan
 DECIDED = {"R5", "R18", "G2", "G5"}  # by the world
 CAUTIOUS = {"R1", "R9", "R10", "R21", "R24", "P9", "P10", "P12", "P13", "G6", "G11"}
 Change = Callable[[Truth], None]
@@ -24,7 +24,7 @@ Change = Callable[[Truth], None]
 def change(
     environments: Iterable[str], methods: str | Iterable[str], /, **values: object
 ) -> Change:
-    """Return what sets attributes of the cells of these environments and methods."""
+    """Return a function that sets attributes of the cells of these environments and methods."""
     names = methods.split() if isinstance(methods, str) else list(methods)
     places = list(environments)
 
@@ -45,7 +45,7 @@ ALL_TEAMS = teams(*range(1, 11))
 COMPLEX_9 = [f"complex-{n}" for n in range(1, 10)]
 SIMPLE = [f"simple-{n}" for n in range(1, 11)]
 
-# One change that makes the claim wrong, and what is left to be found in it.
+# One change that makes the claim wrong, and a part of the resulting verdict.
 WRONG: dict[str, tuple[Change, str]] = {
     "R1": (change(["complex-3"], "mesp", value=4000), "complex-3 value, CONE - MESP"),
     "R2": (change(["complex-3", "complex-8"], "mesp", value=3400), "complex-8 value, CCGA - MESP"),
@@ -149,7 +149,7 @@ WRONG: dict[str, tuple[Change, str]] = {
 
 
 def truth_of(claim: Claim) -> tuple[str, Truth]:
-    """Return the world of a claim and the true cells that it is about."""
+    """Return the world of a claim and the true cells concerned."""
     world, make = TRUTHS[claim.world]
     about = {
         (environment, method)
@@ -163,12 +163,12 @@ def truth_of(claim: Claim) -> tuple[str, Truth]:
 
 
 def claims_of(world: str) -> list[Claim]:
-    """Return the claims that are true together where the thesis is: G15 contradicts G8."""
+    """Return the claims that are true together in the thesis: G15 contradicts G8."""
     return [c for c in CLAIMS if c.world == world and c.id not in BY_PLAN | {"G15"}]
 
 
 def marked(identity: str, alone: str) -> str:
-    """Return the verdict of a claim of which the runs say this."""
+    """Return the marked verdict of a claim with this result of the runs."""
     if identity in CONTRADICTORY:
         return "not judged: the thesis contradicts itself"
     return "decided by the world" if identity in DECIDED else alone
@@ -187,7 +187,7 @@ def as_claimed(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPath
     return write_tables(tmp_path_factory.mktemp("claims") / request.param, world, make(), n)
 
 
-def test_every_claim_is_there_once_each_with_its_source() -> None:
+def test_every_claim_is_listed_once_with_its_source() -> None:
     ids = [
         f"{world}{n}"
         for world, last in (("R", 28), ("P", 17), ("G", 16))
@@ -201,7 +201,7 @@ def test_every_claim_is_there_once_each_with_its_source() -> None:
     assert len({claim.text for claim in CLAIMS}) == len(CLAIMS)
 
 
-def test_all_are_reproduced_where_all_are_true(as_claimed: Path) -> None:
+def test_all_are_reproduced_if_all_are_true(as_claimed: Path) -> None:
     with Tables(as_claimed) as tables:
         found = verdicts(tables, claims_of(as_claimed.name))
     assert {one.id: one.alone for one in found} == {one.id: "reproduced" for one in found}
@@ -220,7 +220,7 @@ def test_all_are_reproduced_where_all_are_true(as_claimed: Path) -> None:
 
 
 @pytest.mark.parametrize("identity", WRONG)
-def test_not_reproduced_where_one_thing_is_turned_round(identity: str, tmp_path: Path) -> None:
+def test_a_claim_is_not_reproduced_if_one_fact_is_reversed(identity: str, tmp_path: Path) -> None:
     world, truth = truth_of(BY_ID[identity])
     apply, told = WRONG[identity]
     apply(truth)
@@ -273,15 +273,15 @@ def test_each_part_counts(identity: str, apply: Change, expected: str, tmp_path:
     assert judged(write_tables(tmp_path, world, truth, n), BY_ID[identity]).alone == expected
 
 
-@pytest.mark.parametrize("identity", sorted({*WRONG} - {"P16", "G15"}))  # of one; not true
-def test_undecided_where_environments_are_missing(identity: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("identity", sorted({*WRONG} - {"P16", "G15"}))  # only one cell; not true
+def test_a_claim_is_undecided_if_environments_are_missing(identity: str, tmp_path: Path) -> None:
     claim = BY_ID[identity]
     world, truth = truth_of(claim)
     statement = claim.parts[0].statements[0]
     is_pair = len(statement.samples) == 2 and len({s.environments for s in statement.samples}) == 2
     kept = statement.environments if is_pair else statement.environments[:1]
     all_places = {e for p in claim.parts for s in p.statements for e in s.environments}
-    # One that is compared with others counts when these are there.
+    # An environment that is compared with others counts if these exist.
     pairs = [
         statement.environments
         for part in claim.parts
@@ -298,10 +298,10 @@ def test_undecided_where_environments_are_missing(identity: str, tmp_path: Path)
 
 
 @pytest.mark.parametrize("name", TRUTHS)
-def test_undecided_where_two_runs_scatter_widely(name: str, tmp_path: Path) -> None:
+def test_a_claim_is_undecided_if_two_runs_scatter_widely(name: str, tmp_path: Path) -> None:
     world, truth = TRUTHS[name][0], TRUTHS[name][1]()
     truth = {key: dataclasses.replace(cell, exchange_share=0.05) for key, cell in truth.items()}
-    if name == "pursuit":  # those that pool environments have more runs: so let them differ less
+    if name == "pursuit":  # pooled environments have more runs: make the differences smaller
         change(ALL_TEAMS, METHODS, loss=0.35)(truth)
         change(ALL_TEAMS, METHODS, clones=0.9, composed=0.9)(truth)
     with Tables(write_tables(tmp_path, world, truth, n=2, noise=0.8)) as tables:
@@ -314,7 +314,7 @@ def test_undecided_where_two_runs_scatter_widely(name: str, tmp_path: Path) -> N
     assert len(compared) == {"rover": 19, "pursuit": 6, "prey": 1, "gacc": 8}[name]
 
 
-def test_undecided_without_a_run(tmp_path: Path) -> None:
+def test_a_claim_is_undecided_without_a_run(tmp_path: Path) -> None:
     world, make = TRUTHS["pursuit"]
     write_tables(tmp_path, world, {key: make()[key] for key in [("team-1", "homcne")]}, n=1)
     with Tables(tmp_path) as tables:
@@ -359,7 +359,7 @@ WITHOUT_CONE |= {f"C{n}{world}" for n in (1, 3) for world in "RPG"}
 
 
 @pytest.mark.parametrize("name", TRUTHS)
-def test_not_tested_where_cone_exchanged_next_to_nothing(name: str, tmp_path: Path) -> None:
+def test_a_claim_is_not_tested_if_cone_hardly_exchanged(name: str, tmp_path: Path) -> None:
     world, make = TRUTHS[name]
     truth = {key: dataclasses.replace(cell, exchanges=0.3) for key, cell in make().items()}
     with Tables(write_tables(tmp_path, world, truth, n=20 if name == "pursuit" else 10)) as tables:
@@ -370,7 +370,7 @@ def test_not_tested_where_cone_exchanged_next_to_nothing(name: str, tmp_path: Pa
         assert ("not tested: no exchange between populations" in one.why) != is_free
 
 
-def test_contradicted_without_cone_is_contradicted_without_exchange(tmp_path: Path) -> None:
+def test_a_contradiction_without_cone_stays_one_without_exchange(tmp_path: Path) -> None:
     world, truth = truth_of(BY_ID["R3"])
     truth = {key: dataclasses.replace(cell, exchanges=0.0) for key, cell in truth.items()}
     change(["complex-9"], "hetcne", value=2600)(truth)
@@ -387,7 +387,7 @@ def test_contradicted_without_cone_is_contradicted_without_exchange(tmp_path: Pa
         (99.0, 0.99, True),
     ],
 )
-def test_exchange_hardly_ran_below_one_pair_and_a_tenth(
+def test_exchange_is_rare_below_one_pair_and_a_tenth(
     exchanges: float, share: float, is_tested: bool, tmp_path: Path
 ) -> None:
     world, truth = truth_of(BY_ID["R7"])

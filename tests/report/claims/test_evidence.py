@@ -1,4 +1,4 @@
-"""What is read from the tables, run by run, on rows written by hand."""
+"""Quantities read from the tables, run by run, from rows written by hand."""
 
 from __future__ import annotations
 
@@ -108,15 +108,15 @@ def test_measures_are_means_of_the_champions_test(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("whole", "castes", "lesioned", "loss"),
     [
-        ([100, 300], {"low": [50, 50], "hi": [150, 150]}, 100, 0.5),  # 3/4 and 1/4 are lost
-        ([100, 100], {"low": [400, 400]}, 400, -0.75),  # it gained: at worst -1
+        ([100, 300], {"low": [50, 50], "hi": [150, 150]}, 100, 0.5),  # losses of 3/4 and 1/4
+        ([100, 100], {"low": [400, 400]}, 400, -0.75),  # a gain: -1 at worst
         ([100, 100], {"low": [0, 0]}, 0, 1),
         ([0, 0], {"low": [0, 0]}, 0, None),  # nothing to lose
         ([0, 0], {"low": [0, 0], "hi": [10, 10]}, 5, -1),
         ([100, 100], {}, None, None),
     ],
 )
-def test_loss_is_the_share_that_is_lost(
+def test_loss_is_the_lost_share(
     whole: list[float],
     castes: dict[str, list[float]],
     lesioned: float | None,
@@ -153,7 +153,7 @@ def test_clones_are_the_best_of_a_runs_cloned_teams(tmp_path: Path) -> None:
         (["non-specialized", "low", "hi", "hi"], 0, 1),
         (["non-specialized", "low", "move"], 0, 0),  # moving does not detect (5.5.2)
         (["non-specialized", "low", "low"], 0, 0),
-        (["low", "hi", "med"], 0, 0),  # nobody is non-specialized
+        (["low", "hi", "med"], 0, 0),  # no robot is non-specialized
         (["non-specialized"] * 3, 1, 0),
         (["hi", "hi"], 1, 0),
     ],
@@ -184,7 +184,7 @@ def test_which_castes_a_team_has(castes: list[str], found: set[str], tmp_path: P
     assert {short for name, short in names.items() if read(tmp_path, name)} == found
 
 
-def test_clones_of_one_caste_and_the_area_that_is_lost(tmp_path: Path) -> None:
+def test_clones_of_one_caste_and_the_lost_area(tmp_path: Path) -> None:
     scores = [
         *score("clones", "med", 10, 30),
         *score("clones", "non-specialized", 70, 90),
@@ -203,14 +203,14 @@ def test_clones_of_one_caste_and_the_area_that_is_lost(tmp_path: Path) -> None:
     assert read(tmp_path, "loss") == 0
 
 
-def test_behaviours_that_a_run_shows(tmp_path: Path) -> None:
+def test_behaviours_of_a_run(tmp_path: Path) -> None:
     rows = behaviours("collective", entrapment=0, pursuer_blocker=3, none=1)
     rows += behaviours("individual", pursuer=2, idle=0, entrapment=5)
     rows += behaviours("team", entrapment=4)
     write(tmp_path, runs=[RUN], behaviours=rows)
     assert read(tmp_path, "pursuer-blocker") == 1
     assert read(tmp_path, "entrapment") == 0
-    assert read(tmp_path, "spiders-fly") == 0  # the run was watched, and it was not seen
+    assert read(tmp_path, "spiders-fly") == 0  # the run was studied, and had no such behaviour
     assert read(tmp_path, "idle predators") == 0
 
 
@@ -271,7 +271,7 @@ def test_every_quantity_of_a_claim_is_known() -> None:
     assert named == set(QUANTITIES)
 
 
-def test_world_preset_and_variant_are_judged_apart(tmp_path: Path) -> None:
+def test_world_preset_and_variant_are_judged_separately(tmp_path: Path) -> None:
     runs, scores = [], []
     for k, change in enumerate(
         [{}, {"preset": "desk"}, {"variant": "gst=0.1"}, {"world": "rover-v3"}, {"seed": 2}]
@@ -292,7 +292,7 @@ def test_world_preset_and_variant_are_judged_apart(tmp_path: Path) -> None:
         ("rover-v2", "smoke", "gst=0.1"): [20.0],
         ("rover-v3", "smoke", ""): [30.0],
     }
-    # CONE alone, so there is nothing to compare it with; but it is told which runs there are.
+    # CONE alone: a comparison is impossible, but the verdict names the missing runs.
     assert [(one.budget, one.variant) for one in told] == [
         ("desk", ""),
         ("smoke", ""),
@@ -319,7 +319,7 @@ def test_runs_without_a_factor_are_judged_with_each_of_its_levels(tmp_path: Path
     } == {"gst=0.1": ["conegst=0.1", "homcne"], "gst=0.2": ["conegst=0.2", "homcne"]}
 
 
-def test_the_budget_with_most_runs_of_both_is_taken(tmp_path: Path) -> None:
+def test_the_budget_with_most_runs_of_both_is_used(tmp_path: Path) -> None:
     runs, scores = [], []
     for method, spent in (
         ("cone", [100, 100, 900, 900, 900]),
@@ -346,7 +346,7 @@ def test_the_budget_with_most_runs_of_both_is_taken(tmp_path: Path) -> None:
     assert alone.samples == ([902.0, 903.0, 904.0],)
 
 
-def test_runs_that_nobody_studied(tmp_path: Path) -> None:
+def test_runs_without_studies(tmp_path: Path) -> None:
     truth = {key: cell for key, cell in rover().items() if key[0] == "complex-1"}
     write_tables(tmp_path, "rover-v2", truth, n=2, studies=False)
     with Tables(tmp_path) as tables:
@@ -358,7 +358,7 @@ def test_runs_that_nobody_studied(tmp_path: Path) -> None:
     }
 
 
-def test_numbers_of_a_missing_quantity_are_told(tmp_path: Path) -> None:
+def test_missing_runs_of_a_quantity_are_named(tmp_path: Path) -> None:
     about = {("complex-1", m): Cell(100, several=1.0) for m in ("ccga", "mesp", "cone")}
     write_tables(tmp_path, "rover-v2", about, n=2)
     with Tables(tmp_path) as tables:

@@ -1,4 +1,4 @@
-"""The rules of verdicts, one by one, on a claim with few cells."""
+"""The rules of verdicts, one by one, for a claim with few cells."""
 
 from __future__ import annotations
 
@@ -68,12 +68,12 @@ def test_above_and_alike(cone: list[float], above_mesp: str, alike_to_mesp: str)
     assert judge(CONE_ALIKE, runs).verdict == alike_to_mesp
 
 
-def test_nothing_achieved_is_not_alike() -> None:
+def test_zeros_are_not_alike() -> None:
     assert judge(CONE_ALIKE, two([0.0] * 20, [0.0] * 20)).verdict == "undecided: all values are 0"
     assert judge(CONE_ABOVE, two([0.0] * 20, [0.0] * 20)).verdict == "undecided: all values are 0"
 
 
-def test_where_the_tests_disagree_both_are_told() -> None:
+def test_if_the_tests_disagree_both_are_reported() -> None:
     # One run far below: means differ little, ranks a lot.
     cone, mesp = [*around(110, n=19), -500.0], around(100)
     found = compare(cone, mesp)
@@ -86,7 +86,7 @@ def test_where_the_tests_disagree_both_are_told() -> None:
 
 
 def test_holm_is_over_all_comparisons_of_the_claim() -> None:
-    # p = 0.02 by ranks: enough alone, not among ten of its kind.
+    # p = 0.02 by ranks: enough by itself, not in a family of ten.
     cone, mesp = around(104, 0.05, 20), around(100, 0.05, 20)
     alone = judge(CONE_ABOVE, two(cone, mesp))
     p = compare(cone, mesp).p_mann_whitney
@@ -102,7 +102,7 @@ def test_holm_is_over_all_comparisons_of_the_claim() -> None:
 
 
 def test_a_cell_is_decided_by_its_own_test_alone() -> None:
-    # A difference that Holm corrects away does not forbid "alike"; the t-test still does.
+    # A difference that Holm removes does not rule out "alike"; the t-test still does.
     cone, mesp = around(104, 0.05, 20), around(100, 0.05, 20)
     ten = {(place, name): v for place in PLACES for name, v in (("cone", cone), ("mesp", mesp))}
     found = judge(claim("alike | value | cone : mesp | complex-1..10"), evidence(ten))
@@ -119,7 +119,7 @@ def test_a_cell_is_decided_by_its_own_test_alone() -> None:
         ([100] * 9, "reproduced"),  # whatever the tenth would be
         ([100] * 8, "undecided: 8 of 10 environments"),
         ([100] * 8 + [150], "undecided: 9 of 10 environments"),
-        ([150] * 2, "not reproduced"),  # eight that are missing cannot mend it
+        ([150] * 2, "not reproduced"),  # the eight missing ones cannot change it
     ],
 )
 def test_nine_of_ten_environments(levels: list[float], expected: str) -> None:
@@ -130,7 +130,7 @@ def test_nine_of_ten_environments(levels: list[float], expected: str) -> None:
     assert judge(nine, evidence(samples)).verdict == expected
 
 
-def test_an_environment_holds_only_with_all_its_pairs() -> None:
+def test_an_environment_counts_only_with_all_its_pairs() -> None:
     both = claim("above | value | cone : mesp, ccga | complex-1..2 | need 1")
     samples = {(HERE, name): around(100) for name in ("mesp", "ccga")}
     samples |= {(HERE, "cone"): around(150)}
@@ -141,7 +141,7 @@ def test_an_environment_holds_only_with_all_its_pairs() -> None:
     assert judge(both, evidence(samples)).verdict == "undecided: 1 of 2 environments"
 
 
-def test_all_parts_must_hold() -> None:
+def test_all_parts_must_be_true() -> None:
     samples = {
         (HERE, "cone"): around(150),
         (HERE, "mesp"): around(100),
@@ -192,7 +192,7 @@ def test_a_mean_over_environments_is_taken_seed_by_seed() -> None:
     assert missing.why == "0 of 1 hold; 1 without all their runs; no runs of CONE in complex-2"
 
 
-def test_pooled_runs_say_nothing_until_all_environments_are_there() -> None:
+def test_pooled_runs_are_undecided_until_all_environments_have_runs() -> None:
     samples = {(place, "cone"): [0.0] * 20 for place in PLACES[:9]}
     pooled = claim("within | entrapment | cone | {complex-1..10} | 0.7..0.9")
     assert (
@@ -221,7 +221,7 @@ def test_environments_may_be_compared_across_budgets() -> None:
     assert found.effect.startswith("complex-1 - simple-1: value, CONE = +50 (+33%)")
 
 
-def test_the_effect_is_that_of_the_cell_on_which_the_verdict_hangs() -> None:
+def test_the_effect_is_that_of_the_cell_on_which_the_verdict_depends() -> None:
     samples: Samples = {(place, "mesp"): around(100) for place in PLACES[:3]}
     samples |= {("complex-1", "cone"): around(200), ("complex-3", "cone"): around(120)}
     three = claim("above | value | cone : mesp | complex-1..3")
@@ -234,7 +234,7 @@ def test_the_effect_is_that_of_the_cell_on_which_the_verdict_hangs() -> None:
     assert wrong.why == "2 of 3 hold; 1 contradicted (complex-2 value, CONE - MESP)"
 
 
-def test_with_too_few_runs_it_is_said() -> None:
+def test_too_few_runs_are_reported() -> None:
     def few(n: int) -> str:
         samples = {(HERE, "cone"): around(150, n=n), (HERE, "mesp"): around(100, n=n)}
         return judge(CONE_ABOVE, evidence(samples)).why
@@ -243,11 +243,11 @@ def test_with_too_few_runs_it_is_said() -> None:
     assert "Mann-Whitney" not in few(4)  # 0.029 at best
 
 
-def test_the_weakest_is_told_by_its_interval() -> None:
+def test_the_weakest_cell_is_found_by_its_interval() -> None:
     samples: Samples = {(place, "mesp"): around(100) for place in PLACES[:2]}
     samples |= {(PLACES[0], "cone"): around(120), (PLACES[1], "cone"): around(130, sd=0.25)}
     runs = claim("above | value | cone : mesp | complex-1..2")
-    assert judge(runs, evidence(samples)).effect.startswith("complex-2")  # more, less surely
+    assert judge(runs, evidence(samples)).effect.startswith("complex-2")  # larger, but less certain
     shares: Samples = {(place, "cone"): [1.0] * 20 for place in PLACES[:3]}
     shares[PLACES[1], "cone"] = [1.0] * 17 + [0.0] * 3
     most = claim("has | one caste | cone | complex-1..3")
@@ -258,7 +258,7 @@ def test_the_weakest_is_told_by_its_interval() -> None:
     )
 
 
-def test_a_part_that_holds_does_not_decide_for_an_open_one() -> None:
+def test_a_true_part_does_not_decide_an_open_one() -> None:
     samples = {(HERE, "cone"): around(150), (HERE, "mesp"): around(100, 0.6)}
     samples[HERE, "ccga"] = around(100, 0.6)
     better = "above | value | cone : mesp | complex-1"

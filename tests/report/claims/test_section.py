@@ -1,4 +1,4 @@
-"""Claims in a report: only those that its runs are about, with what a reader must know of each."""
+"""Claims in a report: only those about its runs, each with the reader's necessary cautions."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def test_two_methods_have_the_claims_about_them_and_one_line_for_the_rest(tmp_pa
     assert "by itself: not tested: no exchange" in rows["R5"]["reasons"]
 
 
-def test_the_power_of_the_rule_is_next_to_what_is_to_be_alike(tmp_path: Path) -> None:
+def test_the_power_of_the_rule_is_next_to_claims_of_alike(tmp_path: Path) -> None:
     truth = {key: cell for key, cell in rover().items() if key[1] in ("homcne", "hetcne")}
     with Tables(write_tables(tmp_path, "rover-v2", truth, 20, 0.1)) as tables:
         rows = {row["id"]: row for row in claims(tables).exhibits[0].rows}
@@ -53,7 +53,7 @@ def test_the_power_of_the_rule_is_next_to_what_is_to_be_alike(tmp_path: Path) ->
     assert "power" not in rows["R10"]["reasons"]
 
 
-def test_a_verdict_has_the_levels_that_it_belongs_to(tmp_path: Path) -> None:
+def test_a_verdict_names_its_levels(tmp_path: Path) -> None:
     truth = {key: cell for key, cell in rover().items() if key[1] in ("homcne", "hetcne")}
     folder = write_tables(tmp_path, "rover-v2", truth, 3)
     runs = folder / "runs.parquet"
