@@ -1,8 +1,8 @@
 // Build each page into one self-contained HTML file in the package: PAGE/PAGE.html.
 //
-// A page is a folder with page.html and main.ts. Style (what main.ts imports ending in .css) and
-// script are put where page.html says <!-- conevo:style --> and <!-- conevo:script -->. Its content
-// security policy names the script by its hash, so no other script in a page can run.
+// A page is a folder with page.html and main.ts. Style (the .css files that
+// main.ts imports) and script replace <!-- conevo:style --> and <!-- conevo:script --> in page.html.
+// Its content security policy names the script by its hash, so no other script in a page can run.
 //
 // With --check nothing is written: it fails if the files differ from those of a build. The package's
 // folder may be given.

@@ -46,7 +46,7 @@ export class Clock {
     this.position += seconds * speed;
     const end = this.store.length - 1;
     this.store.set({ t: this.position, playing: this.position < end });
-    this.store.tell();
+    this.store.notify();
     this.drawn.count += 1;
     this.drawn.seconds += seconds;
     if (this.store.now.playing) this.request = requestAnimationFrame((next) => this.frame(next));

@@ -20,19 +20,19 @@ export function makeInterface(store: Store, clock: Clock, teams: readonly Team[]
     },
     seek(t: number): void {
       store.set({ t });
-      store.tell();
+      store.notify();
     },
     play(): void {
       if (!store.now.playing) clock.toggle();
-      store.tell();
+      store.notify();
     },
     pause(): void {
       store.set({ playing: false });
-      store.tell();
+      store.notify();
     },
     select(team: number, robot: number): void {
       store.set({ selected: { team, robot } });
-      store.tell();
+      store.notify();
     },
     /** Return where a body is now, in pixels of the window. */
     place(team: number, body: number): { x: number; y: number } {
@@ -54,7 +54,7 @@ export function makeInterface(store: Store, clock: Clock, teams: readonly Team[]
     drawMilliseconds(n: number): number {
       const times = Array.from({ length: Math.max(n, 1) }, () => {
         const start = performance.now();
-        store.tell();
+        store.notify();
         settle();
         return performance.now() - start;
       });

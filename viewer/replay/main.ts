@@ -37,7 +37,7 @@ async function show(): Promise<void> {
   listenToKeys(store, clock, times);
   find("app", HTMLElement).hidden = false;
   for (const team of teams) team.watch();
-  store.tell();
+  store.notify();
   Object.assign(window.conevo, makeInterface(store, clock, teams));
   document.body.dataset["ready"] = "yes";
 }

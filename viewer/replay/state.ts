@@ -26,12 +26,12 @@ type Listener = (now: State, before: State) => void;
 /** The state of the page. Listeners are called once per animation frame, for any number of changes. */
 export class Store {
   now: State;
-  private told: State;
+  private last: State;
   private readonly listeners: Listener[] = [];
   private asked = 0;
 
   constructor(readonly playbacks: readonly Playback[]) {
-    this.now = this.told = {
+    this.now = this.last = {
       t: 0,
       playing: false,
       speed: SPEED,
@@ -78,7 +78,7 @@ export class Store {
     let { look } = next;
     if (look !== this.now.look) look = look.zoom > 1 ? this.within(look) : this.whole;
     this.now = { ...next, t, look, selected: isThere ? selected : null };
-    this.asked ||= requestAnimationFrame(() => this.tell());
+    this.asked ||= requestAnimationFrame(() => this.notify());
   }
 
   /** Return a view that does not leave the world. */
@@ -92,11 +92,11 @@ export class Store {
   }
 
   /** Call all listeners now. */
-  tell(): void {
+  notify(): void {
     cancelAnimationFrame(this.asked);
     this.asked = 0;
-    const [now, before] = [this.now, this.told];
-    this.told = now;
+    const [now, before] = [this.now, this.last];
+    this.last = now;
     for (const listener of this.listeners) listener(now, before);
   }
 }

@@ -99,7 +99,7 @@ export class PanelView {
       cursor: { focus: { prox: 14 }, points: { show: false }, drag: { x: false, y: false } },
       hooks: {
         setSeries: [(_, at) => this.aim(at ?? -1)],
-        setCursor: [(plot) => this.tell(plot, xLabel)],
+        setCursor: [(plot) => this.describe(plot, xLabel)],
       },
       series: [
         {},
@@ -121,7 +121,7 @@ export class PanelView {
   }
 
   /** Show the line at the pointer, and its value there. */
-  private tell(plot: uPlot, xLabel: string): void {
+  private describe(plot: uPlot, xLabel: string): void {
     const index = plot.cursor.idx;
     const name = this.focus > 0 ? this.names[this.focus - 1] : undefined;
     if (name === undefined || index === null || index === undefined) {
