@@ -30,6 +30,7 @@ CHECKED = (
     "src/conevo/cli/*.py",
     "src/conevo/controllers/*.py",
     "src/conevo/evolution/**/*.py",
+    "src/conevo/export/*.py",
     "src/conevo/kernels/*.py",
     "src/conevo/playback/*.py",
     "src/conevo/replay/**/*.py",

@@ -32,6 +32,7 @@ VERBS = {
     "replay": "See a run's fittest team in the browser.",
     "film": "Make a film of a run's fittest team (GIF, MP4).",
     "watch": "Follow runs live in the browser.",
+    "export": "Export a run's fittest team to a file that runs without conevo.",
     "behaviours": "Classify what robots do, each and together.",
     "signal": "Measure how well trials distinguish genotypes.",
     "campaign": "Start, monitor, stop and retry campaigns of many runs.",

@@ -53,8 +53,12 @@ def replace_file(path: Path, data: bytes) -> None:
         sync_directory(path.parent)
 
 
-def write_new(files: Mapping[Path, bytes]) -> None:
+def write_new(files: Mapping[Path, bytes], option: str = "--out") -> None:
     """Write files, each all at once; one that is there already is left as it is.
+
+    Args:
+        files: their contents.
+        option: the name of the option that gives another place.
 
     Raises:
         UsageError: something else is in the place of one; none was written.
@@ -62,7 +66,7 @@ def write_new(files: Mapping[Path, bytes]) -> None:
     """
     missing = {p: data for p, data in files.items() if not (p.is_file() and read_bytes(p) == data)}
     for path in missing:
-        refuse_file(path)
+        refuse_file(path, option)
     for path, data in missing.items():
         with appearing_file(path) as draft:
             draft.write_bytes(data)
@@ -92,11 +96,14 @@ def is_there(path: Path) -> bool:
     return path.exists() or path.is_symlink()
 
 
-def refuse_file(path: Path) -> None:
-    """Raise UsageError if there is something at ``path`` already, or it is inside a file."""
+def refuse_file(path: Path, option: str = "--out") -> None:
+    """Raise UsageError if there is something at ``path`` already, or it is inside a file.
+
+    The message names the option that gives another place.
+    """
     refuse_inside_file(path)
     if is_there(path):
-        raise UsageError(f"{path} exists already; choose another place with --out, or remove it")
+        raise UsageError(f"{path} exists already; choose another place with {option}, or remove it")
 
 
 def refuse_inside_file(path: Path) -> None:

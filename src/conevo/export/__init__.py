@@ -1,0 +1,1 @@
+"""Export: an evolved team as a file that runs without conevo."""

@@ -1,0 +1,190 @@
+"""A C header of a team, for microcontrollers: one struct, one function, float32, no libraries.
+
+Its results are those of the kernels, bit for bit, if the compiler does not fuse a product and a sum
+(``-ffp-contract=off``; GCC fuses by default where the processor can) and does not reorder sums
+(``-ffast-math``, which the header refuses).
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from conevo.export.arithmetic import DENOMINATOR, NUMERATOR, sigmoid_limit
+from conevo.export.team import EvolvedTeam
+
+__all__ = ["to_c"]
+
+TEMPLATE = """\
+/* {title}
+
+{about}
+
+   NAME_state state = {{0}};                        once per epoch
+   NAME_step(&state, observations, outputs);    once per iteration
+
+   An output is any real number; NAME_sigmoid(output) lies between 0 and 1. Compile with
+   -ffp-contract=off: then the results are those of the simulator, bit for bit. */
+#ifndef CONEVO_NAME_H
+#define CONEVO_NAME_H
+#include <float.h>
+#if FLT_EVAL_METHOD != 0 && FLT_EVAL_METHOD != 16
+#error "floats must be rounded to float: on 32-bit x86 compile with -msse2 -mfpmath=sse"
+#endif
+#ifdef __FAST_MATH__
+#error "compile without -ffast-math: the order of additions matters"
+#endif
+#ifdef __clang__
+#pragma STDC FP_CONTRACT OFF
+#endif
+
+enum {{ NAME_robots = {r}, NAME_sensors = {s}, NAME_outputs = {o} }};
+
+/* The memory of the robots; zeros at the start of an epoch. */
+typedef struct {{
+    float context[{r}][{room}];
+}} NAME_state;
+
+{weights}
+
+/* The logistic function by a rational approximation, error below 1e-6. */
+static inline float NAME_sigmoid(float a) {{
+    float h = a * 0.5f;
+    h = h < -{limit} ? -{limit} : h > {limit} ? {limit} : h;
+    float q = h * h;
+    float p = {numerator};
+    float d = {denominator};
+    return 0.5f + 0.5f * ((h * p) / d);
+}}
+
+/* From observations [{r}][{s}] to outputs [{r}][{o}], row by row; the state moves on. */
+static inline void NAME_step(NAME_state *state, const float *observations, float *outputs) {{
+    for (int r = 0; r < {r}; r++, observations += {s}, outputs += {o}) {{
+{lines}
+    }}
+}}
+
+#endif
+"""
+
+
+class CValue(NamedTuple):
+    """Text of a pointer to columns, or of a number if there are none."""
+
+    text: str
+    columns: int
+
+    @property
+    def at_u(self) -> str:
+        """The text of column u."""
+        return f"{self.text}[u]" if self.columns else self.text
+
+
+class CLines:
+    """Writes a loop for each operation; names of weights have the shapes of these arrays."""
+
+    def __init__(self, weights: dict[str, Any]) -> None:
+        self._weights = weights
+        self.lines: list[str] = []
+
+    def loop(self, columns: int, text: str) -> None:
+        """Write a loop over columns u."""
+        self.lines.append(f"for (int u = 0; u < {columns}; u++) {text};")
+
+    def _array(self, name: str, columns: int, text: str) -> CValue:
+        self.lines.append(f"float {name}_[{columns}];")
+        self.loop(columns, f"{name}_[u] = {text}")
+        return CValue(f"{name}_", columns)
+
+    def weight(self, name: str) -> CValue:
+        """Return weights."""
+        return CValue(f"NAME_{name}[r]", self._weights[name].shape[-1])
+
+    def number(self, value: float) -> CValue:
+        """Return a number."""
+        return CValue(_literal(value), 0)
+
+    def join(self, name: str, first: CValue, second: CValue) -> CValue:
+        """Write the columns of both."""
+        n, text = first.columns, f"u < {first.columns} ? {first.at_u} : {second.text}[u - {{}}]"
+        return self._array(name, n + second.columns, text.format(n))
+
+    def columns(self, name: str, values: CValue, first: int, last: int) -> CValue:
+        """Return some columns."""
+        return CValue(f"({values.text} + {first})" if first else values.text, last - first)
+
+    def weighted(self, name: str, weights: str, values: CValue, start: CValue) -> CValue:
+        """Write the sum."""
+        _, n, columns = self._weights[weights].shape
+        total = self._array(name, columns, start.at_u)
+        self.lines.append(f"for (int j = 0; j < {n}; j++) {{")
+        self.loop(columns, f"{total.at_u} += NAME_{weights}[r][j][u] * {values.text}[j]")
+        self.lines.append("}")
+        return total
+
+    def sigmoid(self, name: str, values: CValue) -> CValue:
+        """Write the sigmoid."""
+        return self._array(name, values.columns, f"NAME_sigmoid({values.at_u})")
+
+    def each(self, name: str, first: CValue, sign: str, second: CValue) -> CValue:
+        """Write the sum, difference or product."""
+        columns = max(first.columns, second.columns)
+        return self._array(name, columns, f"{first.at_u} {sign} {second.at_u}")
+
+
+def to_c(team: EvolvedTeam, stem: str) -> bytes:
+    """Return the content of a ``.h`` file.
+
+    Args:
+        team: to be exported.
+        stem: of the file's name, with which all names in the file begin.
+    """
+    net = team.network
+    ops = CLines(net.weights)
+    ops.lines.append("float *context = state->context[r];" if net.n_context else "(void)state;")
+    context = CValue("context", net.n_context)
+    outputs, after = net.equations(ops, CValue("observations", net.n_inputs), context)
+    ops.loop(net.n_outputs, f"outputs[u] = {outputs.at_u}")
+    if after is not context:
+        ops.loop(net.n_context, f"context[u] = {after.at_u}")
+    name = re.sub(r"\W", "_", stem, flags=re.ASCII)
+    name = f"_{name}" if name[:1].isdigit() else name
+    arrays = [
+        f"static const float NAME_{key}{''.join(f'[{n}]' for n in values.shape)} =\n"
+        f"{_nested(values)};"
+        for key, values in net.weights.items()
+    ]
+    about = "\n".join(f"   {key}: {json.dumps(value)}" for key, value in team.about.items())
+    text = TEMPLATE.replace("NAME", name).format(
+        title=team.title.replace("*/", "* /"),
+        about=about.replace("*/", "* /"),
+        r=net.n_robots,
+        s=net.n_inputs,
+        o=net.n_outputs,
+        room=max(net.n_context, 1),
+        weights="\n".join(arrays).replace("NAME", name),
+        limit=_literal(sigmoid_limit),
+        numerator=_polynomial(NUMERATOR),
+        denominator=_polynomial(DENOMINATOR),
+        lines="\n".join(f"        {line}" for line in ops.lines).replace("NAME", name),
+    )
+    return text.encode()
+
+
+def _literal(value: float) -> str:
+    """Return the shortest decimal that a compiler reads as this float32."""
+    return f"{np.float32(value)!s}f"
+
+
+def _nested(values: Any) -> str:
+    if values.ndim == 1:
+        return "{" + ", ".join(map(_literal, values)) + "}"
+    return "{" + ",\n".join(map(_nested, values)) + "}"
+
+
+def _polynomial(coefficients: tuple[float, ...]) -> str:
+    first, *rest = map(_literal, coefficients)
+    return first if not rest else f"{first} + q * ({_polynomial(coefficients[1:])})"
