@@ -23,7 +23,10 @@ from conevo.worlds.simulators import simulator
 ROOT = Path(__file__).resolve().parent.parent
 EXECUTED = (
     "README.md",
-    *(f"docs/{name}.md" for name in ("quickstart", "python", "worlds", "campaigns", "replay")),
+    *(
+        f"docs/{name}.md"
+        for name in ("quickstart", "python", "worlds", "campaigns", "replay", "export")
+    ),
 )
 LINKED = (
     *EXECUTED,
@@ -83,7 +86,9 @@ def test_every_parameter_of_a_world_is_explained(entry):
     assert [one.name for one in declared(entry.params_class) if not one.meaning] == []
 
 
-SLOW = {f"docs/{name}.md": pytest.mark.slow for name in ("quickstart", "python", "replay")}
+SLOW = {
+    f"docs/{name}.md": pytest.mark.slow for name in ("quickstart", "python", "replay", "export")
+}
 
 
 @pytest.mark.parametrize("page", [pytest.param(one, marks=SLOW.get(one, ())) for one in EXECUTED])

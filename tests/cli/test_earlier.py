@@ -56,6 +56,7 @@ def test_a_run_of_an_earlier_version_is_shown_but_not_played(earlier: Path, say:
         ("test", "old", "--on", "complex-2"),
         ("replay", "old", "--out", "new.html"),
         ("film", "old", "--out", "new.gif"),
+        ("export", "old", "--to", "new.py"),
         ("resume", "old", "--generations", "9"),
         ("run", "rover/complex-1", "--preset", "smoke", "--from", "old"),
         ("run", "rover/complex-1", "--preset", "smoke", "--from-champion", "old"),

@@ -106,6 +106,7 @@ def test_a_mounted_archive_is_read(archive, tmp_path):
         ["test", run, "--scenarios", "2"],
         ["replay", run, "--no-browser", "--out", "page.html"],
         ["film", run, "--gif", "--size", "200", "--out", "film.gif"],
+        ["export", run, "--to", "team.py"],
     ]
     (tmp_path / "all.py").write_text(ALL.format(commands))
     script = f"{MOUNT.format(archive)} exec {sys.executable} all.py"
@@ -118,7 +119,7 @@ def test_a_mounted_archive_is_read(archive, tmp_path):
     )
     assert done.returncode == 0, done.stderr
     made = {path.name for path in tmp_path.iterdir()}
-    assert made == {"all.py", "archive", "report", "page.html", "film.gif"}
+    assert made == {"all.py", "archive", "report", "page.html", "film.gif", "team.py"}
 
 
 def test_a_report_is_silent_about_folders_for_fonts(finished, tmp_path):

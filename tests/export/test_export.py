@@ -170,8 +170,8 @@ def test_a_run_without_a_team_and_a_controller_without_equations(run, say, monke
     monkeypatch.setattr("conevo.controllers.srn.Srn.name", "own")
     said = say("export", str(run.path), "--to", "team.py")
     assert said.err == (
-        "conevo: error: controller 'own' cannot be exported, only srn and ctrnn and gru: a file "
-        "needs its equations in conevo/export/networks.py\n"
+        "conevo: error: controller 'own' cannot be exported: its equations are not in "
+        "conevo/export/networks.py (known: srn, ctrnn, gru)\n"
     )
     assert said.code == 2
     monkeypatch.undo()

@@ -1,4 +1,4 @@
-"""The exported Python file runs where nothing but Python and numpy can be imported."""
+"""The exported Python file runs where only Python and numpy can be imported."""
 
 import importlib.util
 import os
@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 import conevo
-from conevo.controllers.registry import CONTROLLERS, controller
+from conevo.controllers.registry import controller
 from conevo.export.files import export
+from conevo.export.networks import KINDS
 from export.replayed import recorded
 
 LIGHT = Path(__file__).resolve().parents[2] / "examples" / "light.py"
@@ -51,7 +52,7 @@ print(json.dumps(found))
 """
 
 
-@pytest.mark.parametrize("name", CONTROLLERS)
+@pytest.mark.parametrize("name", KINDS)
 def test_it_runs_with_numpy_alone_bit_for_bit(name, tmp_path):
     world = conevo.world(f"{LIGHT}:dark-1", iterations=100)
     team, observations, outputs = recorded(world, controller(name, world=world))

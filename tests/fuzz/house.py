@@ -19,6 +19,7 @@ RUN = (
     "show run", "show run --json", "test run --scenarios 1 --threads 1", "list runs .",
     "resume run --threads 1", "replay run --out page.html --threads 1",
     "film run --poster 1 --size 200 --out poster.png --threads 1", "WATCH run",
+    "export run --to team.py",
     "resume run --generations 3 --threads 1 --quiet",
 )  # fmt: skip
 HALF = ("resume half --threads 1 --quiet", "show half", "list runs .", "WATCH half")

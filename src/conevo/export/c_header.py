@@ -14,61 +14,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from conevo.export.arithmetic import DENOMINATOR, NUMERATOR, sigmoid_limit
+from conevo.export.c_template import TEMPLATE
 from conevo.export.team import EvolvedTeam
 
 __all__ = ["to_c"]
-
-TEMPLATE = """\
-/* {title}
-
-{about}
-
-   NAME_state state = {{0}};                        once per epoch
-   NAME_step(&state, observations, outputs);    once per iteration
-
-   An output is any real number; NAME_sigmoid(output) lies between 0 and 1. Compile with
-   -ffp-contract=off: then the results are those of the simulator, bit for bit. */
-#ifndef CONEVO_NAME_H
-#define CONEVO_NAME_H
-#include <float.h>
-#if FLT_EVAL_METHOD != 0 && FLT_EVAL_METHOD != 16
-#error "floats must be rounded to float: on 32-bit x86 compile with -msse2 -mfpmath=sse"
-#endif
-#ifdef __FAST_MATH__
-#error "compile without -ffast-math: the order of additions matters"
-#endif
-#ifdef __clang__
-#pragma STDC FP_CONTRACT OFF
-#endif
-
-enum {{ NAME_robots = {r}, NAME_sensors = {s}, NAME_outputs = {o} }};
-
-/* The memory of the robots; zeros at the start of an epoch. */
-typedef struct {{
-    float context[{r}][{room}];
-}} NAME_state;
-
-{weights}
-
-/* The logistic function by a rational approximation, error below 1e-6. */
-static inline float NAME_sigmoid(float a) {{
-    float h = a * 0.5f;
-    h = h < -{limit} ? -{limit} : h > {limit} ? {limit} : h;
-    float q = h * h;
-    float p = {numerator};
-    float d = {denominator};
-    return 0.5f + 0.5f * ((h * p) / d);
-}}
-
-/* From observations [{r}][{s}] to outputs [{r}][{o}], row by row; the state moves on. */
-static inline void NAME_step(NAME_state *state, const float *observations, float *outputs) {{
-    for (int r = 0; r < {r}; r++, observations += {s}, outputs += {o}) {{
-{lines}
-    }}
-}}
-
-#endif
-"""
 
 
 class CValue(NamedTuple):
@@ -159,8 +108,8 @@ def to_c(team: EvolvedTeam, stem: str) -> bytes:
     ]
     about = "\n".join(f"   {key}: {json.dumps(value)}" for key, value in team.about.items())
     text = TEMPLATE.replace("NAME", name).format(
-        title=team.title.replace("*/", "* /"),
-        about=about.replace("*/", "* /"),
+        title=_commented(team.title),
+        about=_commented(about),
         r=net.n_robots,
         s=net.n_inputs,
         o=net.n_outputs,
@@ -172,6 +121,11 @@ def to_c(team: EvolvedTeam, stem: str) -> bytes:
         lines="\n".join(f"        {line}" for line in ops.lines).replace("NAME", name),
     )
     return text.encode()
+
+
+def _commented(text: str) -> str:
+    """Return a text that neither begins nor ends a comment."""
+    return text.replace("*/", "* /").replace("/*", "/ *")
 
 
 def _literal(value: float) -> str:

@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 
 from conevo.controllers.protocol import Bools, Controller
-from conevo.controllers.registry import CONTROLLERS
 from conevo.errors import UsageError
 from conevo.export.arithmetic import Arithmetic, Floats
 
@@ -64,10 +63,9 @@ def network_of(
         UsageError: a kind of controller without equations here.
     """
     if controller.name not in KINDS:
-        known = " and ".join(name for name in CONTROLLERS if name in KINDS)
         raise UsageError(
-            f"controller {controller.name!r} cannot be exported, only {known}: a file needs its "
-            f"equations in conevo/export/networks.py"
+            f"controller {controller.name!r} cannot be exported: its equations are not in "
+            f"conevo/export/networks.py (known: {', '.join(KINDS)})"
         )
     settings: Any = controller
     filled = np.flatnonzero(active.any(axis=0))
