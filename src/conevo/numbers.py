@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
-__all__ = ["decimals", "duration", "number", "plus_minus", "short"]
+__all__ = ["decimals", "duration", "enumerated", "finite", "number", "plus_minus", "short"]
 
 
 def number(value: float | None, digits: int | None = None, nothing: str = "-") -> str:
@@ -23,6 +24,11 @@ def number(value: float | None, digits: int | None = None, nothing: str = "-") -
         return f"{value:,.0f}" if 1000 <= abs(value) < 1e7 else f"{value:.4g}"
     text = f"{value:,.{digits}f}"
     return text.removeprefix("-") if not text.strip("-0.,") else text
+
+
+def finite(value: float) -> float | None:
+    """Return a number as JSON has it: None if it is NaN or infinite."""
+    return float(value) if math.isfinite(value) else None
 
 
 def decimals(value: float) -> int:
@@ -58,3 +64,10 @@ def duration(seconds: float) -> str:
     if whole < 3600:
         return f"{whole // 60} min {whole % 60:02d} s"
     return f"{whole // 3600} h {whole % 3600 // 60:02d} min"
+
+
+def enumerated(name: str, robots: Sequence[int]) -> str:
+    """Return robots by their numbers: "rover 3", "rovers 3 and 7"."""
+    words = [str(i) for i in robots]
+    listed = [", ".join(words[:-1]), words[-1]] if len(words) > 1 else words
+    return f"{name}{'s' * (len(words) != 1)} {' and '.join(listed)}"

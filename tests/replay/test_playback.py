@@ -12,10 +12,9 @@ import pytest
 from conevo import palette
 from conevo.errors import UsageError
 from conevo.kernels import khepera
-from conevo.numbers import number
+from conevo.numbers import enumerated, number
 from conevo.playback.check import checked
 from conevo.playback.schema import Kind, Pool
-from conevo.playback.words import enumerated
 from conevo.replay.playback import playback_of
 from conevo.worlds.gacc import drawn as gacc
 from conevo.worlds.gacc import drawn_building as building

@@ -6,7 +6,7 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from conevo.playback.words import enumerated
+from conevo.numbers import enumerated
 from conevo.replay.playback import playback_of
 from conevo.replay.recording import record_epoch
 from conevo.replay.trajectory import Trajectory

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import json
-import math
 import sys
 
 import click
@@ -28,6 +27,7 @@ def query(arguments: tuple[str, ...], as_csv: bool, as_json: bool) -> None:
     from conevo.cli.format import table
     from conevo.cli.lookup import find_campaign, only_campaign, sealed
     from conevo.errors import UsageError
+    from conevo.numbers import finite
 
     if as_csv and as_json:
         raise UsageError("--csv and --json are mutually exclusive: give one of them")
@@ -38,7 +38,7 @@ def query(arguments: tuple[str, ...], as_csv: bool, as_json: bool) -> None:
         columns, rows = tables.ask(arguments[-1])
     if as_json:
         for row in rows:
-            values = [None if _is_no_json(value) else value for value in row]
+            values = [finite(value) if isinstance(value, float) else value for value in row]
             click.echo(json.dumps(dict(zip(columns, values, strict=True)), default=str))
     elif as_csv:
         writer = csv.writer(sys.stdout, lineterminator="\n")
@@ -47,11 +47,6 @@ def query(arguments: tuple[str, ...], as_csv: bool, as_json: bool) -> None:
     else:
         texts = [["-" if value is None else _text(value) for value in row] for row in rows]
         click.echo(table(columns, texts))
-
-
-def _is_no_json(value: object) -> bool:
-    """Whether a value is a number that JSON does not have: not-a-number or infinite."""
-    return isinstance(value, float) and not math.isfinite(value)
 
 
 def _text(value: object) -> str:

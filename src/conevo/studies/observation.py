@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import asdict, dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -141,27 +141,7 @@ def observe(
     Raises:
         UsageError: another world, no generation has finished yet, or made with other kernels.
     """
-    study = _studied(run)
-    team, lab = equip(run, threads, device)
-    return _watched(
-        study, team, lab, scenarios, run.config.run.seed if seed is None else seed, rules
-    )
-
-
-def watch(team: Team, lab: Lab, scenarios: int, seed: int) -> Observed | None:
-    """Watch a team in the scenarios of the testing phase; None if its world has no study."""
-    study = study_of(lab.config.entry)
-    return _watched(study, team, lab, scenarios, seed) if study is not None else None
-
-
-def _studied(run: Run) -> WorldStudy:
-    """Return the study of a run's world.
-
-    Raises:
-        UsageError: it has none.
-    """
-    found = study_of(run.config.entry)
-    if found is None:
+    if study_of(run.config.entry) is None:
         there = [(WORLDS[name], one.WORDS.robots) for name, one in studies().items()]
         whose = " or ".join(f"the {robots} of {entry.name}" for entry, robots in there)
         first = there[0][0]
@@ -169,12 +149,22 @@ def _studied(run: Run) -> WorldStudy:
             f"{run.path} is a run of {run.config.task}: behaviours are those of {whose}, or of a "
             f"world that inherits it, as in conevo run {first.short_name}/{first.environments[0]}"
         )
-    return found
+    team, lab = equip(run, threads, device)
+    root = run.config.run.seed if seed is None else seed
+    return cast("Observed", watch(team, lab, scenarios, root, rules))  # its world has a study
 
 
-def _watched(
-    study: WorldStudy, team: Team, lab: Lab, scenarios: int, seed: int, rules: Any = None
-) -> Observed:
+def watch(team: Team, lab: Lab, scenarios: int, seed: int, rules: Any = None) -> Observed | None:
+    """Watch a team in the scenarios of the testing phase; None if its world has no study.
+
+    Args:
+        team, lab: of the run.
+        scenarios: how many.
+        seed: their root.
+        rules: as for ``observe``.
+    """
+    if (study := study_of(lab.config.entry)) is None:
+        return None
     genes, (rows,) = team.as_trial()
     keys = tuple(fold(seed, "test", k) for k in range(scenarios))
     seen = study.observe(lab.simulator, genes, rows, keys, seed, rules)

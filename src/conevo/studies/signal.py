@@ -300,8 +300,7 @@ def _play(lab: Lab, asked: list[Trials], numbers: range) -> list[Scores]:
 
 def _rows_of(scores: Scores, teams: slice) -> Scores:
     """Return the scores of some of the teams."""
-    values = {field.name: getattr(scores, field.name) for field in dataclasses.fields(scores)}
     some: dict[str, Any] = {
-        n: v[teams] if isinstance(v, np.ndarray) else v for n, v in values.items()
+        n: v[teams] for n, v in vars(scores).items() if isinstance(v, np.ndarray)
     }
-    return Scores(**some)
+    return dataclasses.replace(scores, **some)

@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from conevo.numbers import finite
 from conevo.rng import fold
 from conevo.runs.champions import Team
 from conevo.runs.evaluation import describe
@@ -56,11 +57,6 @@ class _Portrait:
     names: Sequence[str]
     fitness: npt.NDArray[np.float64]
     castes: list[str]
-
-    @property
-    def labels(self) -> Sequence[str]:
-        """Caste of each robot."""
-        return self.activity.labels
 
 
 def study(
@@ -102,7 +98,7 @@ def study(
         altered = [caste for caste in altered if caste != NON_SPECIALIZED]
     clones = [fold(seed, "clones", k) for k in range(scenarios)]
     others = lab.world.scenarios([fold(seed, "lesion", k) for k in range(scenarios)])
-    original = Original(lab.simulator, team, portrait.labels, portrait.fitness)
+    original = Original(lab.simulator, team, portrait.activity.labels, portrait.fitness)
     lesioned = original.lesion(altered, others)
     moved = [original.rotate(others)] if len(team.genes) > 1 else []
     cloned = original.clone(
@@ -156,15 +152,11 @@ def _counts(outcome: Outcome) -> npt.NDArray[np.int64]:
 def _rows(study: str, compared: Compared) -> list[Record]:
     """Return the values of each team and measure as rows; one that is not finite is None."""
     return [
-        {"study": study, "team": team, "measure": measure, "scenario": k, "value": _finite(value)}
+        {"study": study, "team": team, "measure": measure, "scenario": k, "value": finite(value)}
         for n, team in enumerate(compared.teams)
         for measure, values in compared.performance.items()
         for k, value in enumerate(values[n])
     ]
-
-
-def _finite(value: Any) -> float | None:
-    return float(value) if np.isfinite(value) else None
 
 
 def _robots(team: Team, portrait: _Portrait) -> list[Record]:
@@ -173,13 +165,13 @@ def _robots(team: Team, portrait: _Portrait) -> list[Record]:
     columns = {
         "caste": of.labels,
         "specialization": [float(s) for s in of.specialization],
-        "fitness": [_finite(fitness) for fitness in portrait.fitness],
+        "fitness": [finite(fitness) for fitness in portrait.fitness],
         "hidden": [int(n_hidden) for n_hidden in team.active.sum(axis=1)],
         "favourite_setting": [favourite(robot, settings) for robot in of.work],
-        "setting_share": [_finite(share) for share in favourite_share(of.work)],
-        "affinity": [_finite(value) for value in affinity(of.work)],
+        "setting_share": [finite(share) for share in favourite_share(of.work)],
+        "affinity": [finite(value) for value in affinity(of.work)],
         "favourite_action": [favourite(robot, names) for robot in of.counts],
-        "action_share": [_finite(share) for share in favourite_share(of.counts)],
+        "action_share": [finite(share) for share in favourite_share(of.counts)],
         "independent": [float(s) for s in of.independent],
         "relative": [float(s) for s in relative_degree(of.specialization, of.independent)],
     }

@@ -97,21 +97,17 @@ class CurvePanel:
         grid = np.arange(top + 1) if whole else np.linspace(0.0, top, points)
         found: dict[str, Any] = {"x": [float(f"{x:.6g}") for x in grid]}
         lines = {q: [_steps(x, y, grid) for x, y in curves[q]] for q in QUANTITIES}
+        begun = [(k, one) for k, one in enumerate(runs) if len(curves["fitness"][k][0])]
         found["lines"] = [
             {"label": one.label, "series": self._series[one]}
-            | {q: _plain(_until_end(lines[q][k], curves[q][k][0], grid)) for q in QUANTITIES}
-            for k, one in enumerate(runs)
-            if len(curves["fitness"][k][0])
+            | {q: _plain(lines[q][k]) for q in QUANTITIES}
+            for k, one in begun
         ]
         found["medians"] = []
         for name in dict.fromkeys(self._series.values()):
             found["medians"].append({"series": name})
             for q in QUANTITIES:
-                mine = [
-                    _until_end(lines[q][k], curves[q][k][0], grid)
-                    for k, one in enumerate(runs)
-                    if self._series[one] == name and len(curves[q][k][0])
-                ]
+                mine = [lines[q][k] for k, one in begun if self._series[one] == name]
                 values, n = _median(mine, len(grid))
                 found["medians"][-1] |= {q: _plain(values), f"{q}_runs": n.tolist()}
         return found
@@ -149,16 +145,14 @@ def panels_of(subjects: Sequence[Subject], group: str) -> list[CurvePanel]:
 
 
 def _steps(x: Floats, y: Floats, grid: Floats) -> Floats:
-    """Return y [G] at each point of a grid: that of the last x up to it; NaN before the first."""
+    """Return y [G] at each point of a grid: that of the last x up to it.
+
+    NaN before the first x, and after the first point at or after the last x.
+    """
     at = np.searchsorted(x, grid, side="right") - 1
-    values = np.append(y, np.nan)
-    return np.where(at >= 0, values[at], np.nan)
-
-
-def _until_end(values: Floats, x: Floats, grid: Floats) -> Floats:
-    """Return values up to the first point of the grid at or after the last x, then NaN."""
     last = int(np.searchsorted(grid, x[-1])) if len(x) else -1
-    return np.where(np.arange(len(grid)) <= last, values, np.nan)
+    is_within = (at >= 0) & (np.arange(len(grid)) <= last)
+    return np.where(is_within, np.append(y, np.nan)[at], np.nan)
 
 
 def _median(rows: Sequence[Floats], size: int) -> tuple[Floats, npt.NDArray[np.int64]]:

@@ -15,6 +15,7 @@ import numpy.typing as npt
 from conevo.campaigns.ledger import Entry
 from conevo.campaigns.plan import levels_of
 from conevo.errors import UsageError
+from conevo.numbers import finite
 from conevo.runs import locks
 from conevo.runs.directory import CONFIG, LOCK, SEAL, SHAPING, kind_of
 from conevo.runs.outline import Outline, budget_of, flattened, span
@@ -249,11 +250,11 @@ class Subject:
         return {
             "champion": generation,
             "champion_stage": number + 1 if self._shaping else 0,
-            "performance": {name: _plain(c[-1]) for name, c in last.performance.items()},
+            "performance": {name: finite(c[-1]) for name, c in last.performance.items()},
             "declared": {name: one.about for name, one in self.measures.items()},
             "castes": {name: int(c[-1]) for name, c in last.castes.items() if c[-1] > 0},
             "favourites": {name: int(c[-1]) for name, c in last.favourites.items() if c[-1] > 0},
-            **{name: _plain(last.numbers[COLUMN.get(name, name)][-1]) for name in LAST},
+            **{name: finite(last.numbers[COLUMN.get(name, name)][-1]) for name in LAST},
         }
 
     def _prospects(self) -> dict[str, Any]:
@@ -394,9 +395,5 @@ class Subject:
         for name in dict.fromkeys(name for log in logs for name in getattr(log, kind)):
             parts = [getattr(log, kind).get(name, [none] * len(log)) for log in logs]
             values = np.concatenate([np.array(part, np.float64) for part in parts])[rows]
-            columns[name] = [_plain(float(f"{value:.6g}")) for value in values.tolist()]
+            columns[name] = [finite(float(f"{value:.6g}")) for value in values.tolist()]
         return columns
-
-
-def _plain(value: float) -> float | None:
-    return value if math.isfinite(value) else None

@@ -7,10 +7,10 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
+from conevo.numbers import enumerated
 from conevo.palette import BLUE, FAINT, GREEN, INK, ORANGE, VERMILION
 from conevo.playback.reading import Parts
 from conevo.playback.schema import Event, Kind
-from conevo.playback.words import enumerated
 from conevo.terms import counted
 from conevo.worlds.gacc.plans import TYPES
 

@@ -7,6 +7,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
+from conevo.numbers import enumerated
 from conevo.palette import (
     BLUE,
     FAINT,
@@ -32,7 +33,6 @@ from conevo.playback.schema import (
     SensorGroup,
     Things,
 )
-from conevo.playback.words import enumerated
 from conevo.terms import counted
 
 __all__ = ["CASTES", "playback"]

@@ -7,11 +7,11 @@ from collections import Counter
 
 import numpy as np
 
+from conevo.numbers import enumerated
 from conevo.palette import BLUE, INK, MOVE, SKY, YELLOW
 from conevo.playback.quantized import Channel
 from conevo.playback.reading import Parts, begun, octants
 from conevo.playback.schema import Backdrop, BodyKind, Curve, Event, Kind, Playback, Ring, Things
-from conevo.playback.words import enumerated
 from conevo.worlds.rover import rocks
 
 __all__ = ["CASTES", "playback"]
