@@ -212,8 +212,8 @@ def test_a_model_names_the_field_and_what_is_allowed(tmp_path: Path) -> None:
         (b'{"n": 1}', "parts is missing"),
         (b'{"n": true, "parts": []}', "n = True: must be a valid integer"),
         (b'{"n": 1.0, "parts": []}', "n = 1.0: must be a valid integer"),
-        (b'{"n": 1, "parts": [{"mean": "2"}]}', "parts.0.mean = '2': must be a valid number"),
-        (b'{"n": 1, "parts": [[]]}', "parts.0 = []: must be a valid dictionary"),
+        (b'{"n": 1, "parts": [{"mean": "2"}]}', "parts[0].mean = '2': must be a valid number"),
+        (b'{"n": 1, "parts": [[]]}', "parts[0] = []: must be a valid dictionary"),
     ):
         assert words in refused(lambda p: read_json(p, Outer), path, content)
     with pytest.raises(DamagedFile, match="here: n = nan: must be a finite number"):

@@ -23,9 +23,10 @@ import tomllib
 import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import is_dataclass
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO
+from typing import TYPE_CHECKING, Any, BinaryIO, Literal
 
 from conevo.errors import EnvironmentFailure, UsageError, shown
 
@@ -56,6 +57,11 @@ MOST_LOG = 512 * MIB
 MOST_ARRAYS = 1024 * MIB  # bytes of an archive when it is unpacked
 MEMBERS = 1000  # of an archive
 DEPTH = 32  # nested lists and tables; conevo's own files have six levels
+ABOUT_KEYS = {  # pydantic's errors, in words
+    "missing": "is missing",
+    "extra_forbidden": "is not a known key",
+    "unexpected_keyword_argument": "is not a known key",
+}
 # A key of that number of parts. The same in a quoted text is not a valid setting, either.
 DOTTED = re.compile(rf"""(?<![\w"'.-])(?:[\w"'-]+[ \t]*\.[ \t]*){{{DEPTH}}}""")
 KINDS = {
@@ -304,24 +310,31 @@ def parse_toml(text: str, name: str) -> dict[str, Any]:
     return found
 
 
-def check(value: object, model: type, problem: str) -> None:
-    """Raise DamagedFile if a value does not match a model.
+def check(value: object, model: type, problem: str, *, is_closed: bool = False) -> Any:
+    """Return a value that matches a model: as it is, or as a dataclass with tuples for lists.
 
     Args:
         value: plain data.
-        model: a TypedDict or another type that pydantic knows. Types are strict, numbers finite.
-            Keys that it does not have are ignored, as a later version may write them.
+        model: a TypedDict, or a dataclass. Types are strict, numbers finite.
         problem: start of the message; the field and the allowed values follow.
+        is_closed: whether keys that the model does not have are refused; else they are ignored, as
+            a later version may write them.
+
+    Raises:
+        DamagedFile: it does not match.
     """
     from pydantic import ValidationError
 
     try:
-        _adapter(model).validate_python(value)
+        if is_dataclass(model):
+            return _adapter(model, is_closed).validate_json(json.dumps(value))
+        return _adapter(model, is_closed).validate_python(value)
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
-        field = ".".join(map(str, first["loc"]))
-        if first["type"] == "missing":
-            raise DamagedFile(f"{problem}: {field} is missing") from error
+        parts = (f"[{part}]" if isinstance(part, int) else f".{part}" for part in first["loc"])
+        field = "".join(parts).removeprefix(".")
+        if words := ABOUT_KEYS.get(first["type"]):
+            raise DamagedFile(f"{problem}: {field} {words}") from error
         message = first["msg"].replace("Input should", "must")
         raise DamagedFile(f"{problem}: {field} = {shown(first['input'])}: {message}") from error
     except RecursionError:
@@ -329,10 +342,12 @@ def check(value: object, model: type, problem: str) -> None:
 
 
 @cache
-def _adapter(model: type) -> Any:
+def _adapter(model: type, is_closed: bool) -> Any:
     from pydantic import ConfigDict, TypeAdapter, with_config
 
-    return TypeAdapter(with_config(ConfigDict(strict=True, allow_inf_nan=False))(model))
+    extra: Literal["forbid", "ignore"] = "forbid" if is_closed else "ignore"
+    config = ConfigDict(strict=True, allow_inf_nan=False, extra=extra)
+    return TypeAdapter(with_config(config)(model))
 
 
 def _refuse_deep(value: object) -> None:

@@ -1,6 +1,7 @@
 """Trajectories with changes made by hand, and the contents of their playbacks."""
 
 import json
+import tempfile
 from dataclasses import replace
 from pathlib import Path
 
@@ -36,7 +37,10 @@ def opened(trajectory):
     about = json.dumps(trajectory.about | {"channels": kept})
     arrays = {name: channel.codes for name, channel in trajectory.channels.items()}
     arrays["about"] = np.frombuffer(about.encode(), np.uint8)
-    return playback_of(Trajectory.of_arrays(arrays, Path("epoch.npz")))
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "epoch.npz")
+        np.savez(path, **arrays)
+        return playback_of(Trajectory.load(path))
 
 
 def events_of(playback, kind=None):

@@ -124,8 +124,8 @@ def test_a_subclass_is_drawn_like_the_world_it_inherits(tmp_path):
             Drawn(objects=(Objects("a", "x", "y", state="action", states=("a",)),)),
             "0 to 1, for 1 names",
         ),
-        ({"object": []}, "drawn.object: "),
-        ({"unit": 3}, "drawn.unit: "),
+        ({"object": []}, "drawn: object is not a known key"),
+        ({"unit": 3}, "drawn: unit = 3: must be a valid string"),
     ],
 )
 def test_a_wrong_drawing_is_one_line(drawn, words):

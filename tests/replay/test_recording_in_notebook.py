@@ -99,7 +99,7 @@ def test_the_replay_works_in_its_sandbox(recording: Trajectory, tab: Page, tmp_p
 def test_a_page_that_is_too_large_is_named_instead(
     recording: Trajectory, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("conevo.replay.html.MOST_BYTES", 2**14)
+    monkeypatch.setattr("conevo.replay.page.CARD_BYTES", 2**14)
     card = recording._repr_html_()
     assert "iframe" not in card
     assert "conevo replay FILE" in card

@@ -44,8 +44,11 @@ def playback(parts: Parts, drawn: Drawn) -> Playback:
     side = max(bounds[2] - bounds[0], bounds[3] - bounds[1])
     actions, castes = _colours(about["actions"], about["castes"], drawn.colours)
     n_outputs = parts.channel("outputs", t, r, -1).codes.shape[2]
+    outputs = about.get("outputs", [])
+    if len(outputs) != n_outputs:  # of conevo 0.1.0, which recorded no names
+        outputs = [f"output {k}" for k in range(n_outputs)]
     return Playback(
-        **begun(parts, actions, castes, _outputs(about.get("outputs", []), n_outputs)),
+        **begun(parts, actions, castes, outputs),
         unit=drawn.unit,
         seconds=drawn.seconds,
         bounds=bounds,
@@ -69,11 +72,6 @@ def _bounds(x: npt.NDArray[Any], y: npt.NDArray[Any]) -> tuple[float, float, flo
     margin = 0.05 * float((high - low).max()) or 0.5
     (x0, y0), (x1, y1) = (low - margin).tolist(), (high + margin).tolist()
     return (x0, y0, x1, y1)
-
-
-def _outputs(names: list[str], n: int) -> list[str]:
-    """Return the names of n outputs; trajectories of conevo 0.1.0 have none."""
-    return names if len(names) == n else [f"output {k}" for k in range(n)]
 
 
 def _colours(

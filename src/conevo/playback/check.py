@@ -1,7 +1,7 @@
 """Checks that a playback's parts fit together, and the error for a damaged recording.
 
 Numbers, names and texts of a file are checked once, where it is loaded
-(``conevo.replay.validation``); every channel where it is read (``conevo.playback.reading``).
+(``conevo.replay.trajectory``); every channel where it is read (``conevo.playback.reading``).
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from collections import Counter
 from dataclasses import replace
 
 from conevo.errors import UsageError
-from conevo.playback.schema import Event, Playback
+from conevo.playback.schema import Playback
 
 __all__ = ["DAMAGE", "DAMAGED", "MOST_EVENTS", "checked", "one_line", "refusal"]
 
@@ -49,8 +49,7 @@ def checked(playback: Playback) -> Playback:
         return replace(playback, events=tuple(events))
     counts = Counter(event.kind for event in events)
     by_rarity = sorted(events, key=lambda event: (counts[event.kind], event.kind))
-    kept: set[int] = {id(event) for event in by_rarity[:MOST_EVENTS]}
-    shown: list[Event] = [event for event in events if id(event) in kept]
+    shown = sorted(by_rarity[:MOST_EVENTS], key=lambda event: (event.t, event.kind))
     note = ("events", f"{MOST_EVENTS:,} of {len(events):,} shown, the rarest kinds first")
     return replace(playback, events=tuple(shown), facts=(*playback.facts, note))
 

@@ -85,10 +85,8 @@ class _Places:
         elif key in params:
             found = np.asarray(self._parts.param(key))
         else:
-            try:
-                raise unknown_name("array or value", key, sorted({*recorded, *scene, *params}))
-            except UsageError as error:
-                raise self._refuse(name, str(error)) from None
+            known = {*recorded, *scene, *params}
+            raise self._refuse(name, str(unknown_name("array or value", key, known)))
         if parsed[2] is None:
             return found
         try:
@@ -110,20 +108,23 @@ class _Places:
             raise self._refuse(of.name, f"x is {list(x.shape)}, y {list(y.shape)}")
         k = x.shape[-1]
         names = of.kinds or (of.name,)
-        kind = np.zeros(k, np.int64)
+        kind = Channel.of(np.zeros(k, np.int64))
         if of.kind:
             kind = self._index(of, of.kind, (k,), len(names))
+        t = self._parts.t
+        gone = Channel.of(self._whole(of, of.gone, (k,)).clip(0, t)) if of.gone else None
+        state = self._index(of, of.state, (t, k), len(of.states)) if of.state else None
         colours = (*of.colours, *several(8)[1 + number :], *several(8))[: len(names)]
         return Things(
             of.name,
             tuple(Kind(*one) for one in zip(names, colours, strict=False)),
-            Channel.of(kind),
+            kind,
             Channel.of(x),
             Channel.of(y),
             size=of.size,
             shape=of.shape,
-            gone=self._gone(of, k) if of.gone else None,
-            state=self._state(of, k) if of.state else None,
+            gone=gone,
+            state=state,
             states=tuple(Kind(*one) for one in zip(of.states, ("", *several(8) * 2), strict=False)),
         )
 
@@ -141,22 +142,14 @@ class _Places:
             raise self._refuse(of.name, f"{text!r} is {list(found.shape)}, not {list(shape)}")
         return found.astype(np.int64).reshape(shape)
 
-    def _index(
-        self, of: Objects, text: str, shape: tuple[int, ...], n: int
-    ) -> npt.NDArray[np.int64]:
-        """Return whole numbers from 0 to n - 1, indices of n names."""
+    def _index(self, of: Objects, text: str, shape: tuple[int, ...], n: int) -> Channel:
+        """Return whole numbers from 0 to n - 1, indices of n names, as a channel."""
         found = self._whole(of, text, shape)
         if found.size and not (found.min() >= 0 and found.max() < n):
             raise self._refuse(
                 of.name, f"{text!r} is {found.min()} to {found.max()}, for {n} names"
             )
-        return found
-
-    def _gone(self, of: Objects, k: int) -> Channel:
-        return Channel.of(np.clip(self._whole(of, of.gone, (k,)), 0, self._parts.t))
-
-    def _state(self, of: Objects, k: int) -> Channel:
-        return Channel.of(self._index(of, of.state, (self._parts.t, k), len(of.states)))
+        return Channel.of(found)
 
     def area(self, of: Area, number: int) -> Backdrop:
         """Return an area as a part of the backdrop."""

@@ -19,12 +19,12 @@ import json
 import re
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
-from functools import cache
 from typing import Annotated, Any, Literal
 
 from annotated_types import Ge, Gt
 
 from conevo.errors import UsageError
+from conevo.reading import check
 
 __all__ = ["Area", "Drawn", "Objects", "Signal"]
 
@@ -122,14 +122,7 @@ class Drawn:
         Raises:
             UsageError: it is not one.
         """
-        from pydantic import ValidationError
-
-        try:
-            found: Drawn = _checker().validate_json(json.dumps(plain), strict=True)
-        except ValidationError as error:
-            first = error.errors()[0]
-            place = "".join(f"[{p}]" if isinstance(p, int) else f".{p}" for p in first["loc"])
-            raise UsageError(f"world {world}: drawn{place}: {first['msg']}") from error
+        found: Drawn = check(plain, Drawn, f"world {world}: drawn", is_closed=True)
         if wrong := found._wrong():
             raise UsageError(f"world {world}: drawn: {wrong}")
         return found
@@ -144,11 +137,3 @@ class Drawn:
         colours += [signal.colour for signal in self.signals if signal.colour]
         odd = [colour for colour in colours if not _COLOUR.fullmatch(colour)]
         return f"{odd[0]!r} is not a colour, as in '#d55e00'" if odd else ""
-
-
-@cache
-def _checker() -> Any:
-    from pydantic import ConfigDict, TypeAdapter, with_config
-
-    config = ConfigDict(extra="forbid", allow_inf_nan=False)
-    return TypeAdapter(with_config(config)(Drawn))

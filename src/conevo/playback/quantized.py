@@ -42,7 +42,10 @@ class Channel:
             whole = array.astype(np.int64)
             low = int(whole.min()) if whole.size else 0
             most = int(whole.max()) - low if whole.size else 0
-            return Channel(np.asarray(whole - low, dtype=_smallest(most)), low, 1)
+            kind = np.min_scalar_type(most)
+            if kind.itemsize > 4:
+                raise ValueError("whole numbers further apart than 2**32 cannot be kept")
+            return Channel(np.asarray(whole - low, kind), low, 1)
         numbers = array.astype(np.float64)
         if not np.isfinite(numbers).all():
             raise ValueError("only finite numbers can be kept")
@@ -58,11 +61,3 @@ class Channel:
         if self.step == 1 and float(self.low).is_integer():
             return np.asarray(self.codes.astype(np.int64) + int(self.low))
         return np.asarray(self.low + self.step * self.codes.astype(np.float64))
-
-
-def _smallest(largest: int) -> type[np.unsignedinteger[Any]]:
-    """Return the smallest type of code for numbers up to the largest."""
-    for kind in (np.uint8, np.uint16, np.uint32):
-        if largest <= np.iinfo(kind).max:
-            return kind
-    raise ValueError("whole numbers further apart than 2**32 cannot be kept")

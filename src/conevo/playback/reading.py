@@ -42,8 +42,12 @@ class Parts:
 
     def has(self, name: str, *shape: int) -> bool:
         """Return whether it has a channel of this name and shape; -1 is any length."""
-        found = self._channels.get(name)
-        return found is not None and _fits(found.codes.shape, shape)
+        if name not in self._channels:
+            return False
+        actual = self._channels[name].codes.shape
+        return len(actual) == len(shape) and all(
+            wanted in (-1, n) for n, wanted in zip(actual, shape, strict=True)
+        )
 
     def channel(self, name: str, *shape: int) -> Channel:
         """Return a channel.
@@ -136,12 +140,6 @@ class Parts:
     def measures(self, *names: str) -> tuple[Curve, ...]:
         """Return every task performance measure as if the epoch ended in each iteration."""
         return tuple(Curve(n, self.channel(f"performance/{n}", self.t)) for n in names)
-
-
-def _fits(actual: Sequence[int], shape: Sequence[int]) -> bool:
-    return len(actual) == len(shape) and all(
-        wanted in (-1, n) for n, wanted in zip(actual, shape, strict=True)
-    )
 
 
 def columns(channel: Channel) -> list[Channel]:

@@ -238,32 +238,27 @@ class Pool:
 
     Time runs fastest: value [t, i, j] of a channel [T, I, J] is number t + T * (i + I * j). Every
     channel starts at a multiple of four bytes; little-endian.
+
+    Attributes:
+        data: all channels.
     """
 
     def __init__(self) -> None:
-        self._parts: list[bytes] = []
-        self._size = 0
+        self.data = bytearray()
 
     def add(self, channel: Channel) -> dict[str, Any]:
         """Add a channel; return its place: at, bytes (each), shape, low, step."""
         codes = channel.codes
         data = codes.astype(codes.dtype.newbyteorder("<")).tobytes(order="F")
         place = {
-            "at": self._size,
+            "at": len(self.data),
             "bytes": codes.dtype.itemsize,
             "shape": list(codes.shape),
             "low": channel.low,
             "step": channel.step,
         }
-        padded = data + bytes(-len(data) % 4)
-        self._parts.append(padded)
-        self._size += len(padded)
+        self.data += data + bytes(-len(data) % 4)
         return place
-
-    @property
-    def data(self) -> bytes:
-        """All channels."""
-        return b"".join(self._parts)
 
     def plain(self, thing: Any) -> Any:
         """Return a playback, or a part of one, as JSON has it; adds its channels to the pool."""

@@ -155,18 +155,14 @@ def write_poster(painter: Painter, path: Path, t: int) -> None:
 
 def find_ffmpeg() -> str | None:
     """Return ffmpeg on this machine, else that of the package imageio-ffmpeg, else None."""
-    found = shutil.which("ffmpeg")
-    if found:
+    if found := shutil.which("ffmpeg"):
         return found
     try:
         from imageio_ffmpeg import get_ffmpeg_exe
-    except ImportError:
+
+        return str(get_ffmpeg_exe())
+    except (ImportError, RuntimeError):  # no such package, or one without an ffmpeg
         return None
-    try:
-        exe: str = get_ffmpeg_exe()
-    except RuntimeError:  # the package is installed, without an ffmpeg
-        return None
-    return exe
 
 
 # --- MP4 ------------------------------------------------------------------------------------------

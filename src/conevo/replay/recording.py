@@ -99,10 +99,7 @@ def record_epoch(
     """Record any team in one scenario.
 
     Args:
-        simulator: of the world.
-        genes: pool of genotypes [K, G].
-        team: pool rows [R, U], -1 for an empty slot.
-        scenario: its key.
+        simulator, genes, team, scenario: as for ``worlds.recorded.recorded``.
         heuristic: [R] index of a heuristic controller, -1 for the network; None for networks only.
 
     Returns:
