@@ -11,7 +11,7 @@ import conevo
 from campaigns.plans import tiny_campaign
 from conevo.campaigns import devices, slurm, worker
 from conevo.campaigns.devices import devices_here, next_device, parse_devices
-from conevo.campaigns.executors.process import worker_command
+from conevo.campaigns.executors.local import worker_command
 from conevo.campaigns.executors.protocol import Ending, RunJob
 from conevo.campaigns.executors.registry import make_executor
 from conevo.cli.campaign_run import ready

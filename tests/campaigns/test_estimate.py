@@ -4,8 +4,8 @@ import pytest
 import tomli_w
 
 from campaigns.plans import tiny_campaign
-from conevo.campaigns.estimate import remaining_seconds
 from conevo.campaigns.ledger import Entry
+from conevo.campaigns.progress import remaining_seconds
 from watch.followed import record, tables
 
 

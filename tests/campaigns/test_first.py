@@ -86,7 +86,7 @@ def test_the_first_stage_has_the_settings_of_its_method_and_its_share(tmp_path: 
     assert config.method_config.mutation_scale == 0.03
     assert [one.run.budget_evaluations for one in (before, config)] == [30, 30]
     assert [one.run.generations for one in (before, config)] == [25, 25]
-    assert first.names == [first.label]
+    assert list(first.courses) == [first.label]
     assert first.courses == {first.label: [f"{first.label}/stage-{k}" for k in (1, 2)]}
     again = tmp_path / "again.toml"
     again.write_text(plan_of(tmp_path).to_toml())

@@ -180,7 +180,7 @@ def test_a_shaping_is_one_run_with_a_configuration_for_every_stage(tmp_path):
     path.write_text(path.read_text().replace("complex-1", "complex-3"))
     run = read_plan(path).write_out()[0]
     assert [config.environment for config in run.configs()] == [f"complex-{k}" for k in (1, 2, 3)]
-    assert run.names == [f"{run.label}/stage-{k}" for k in (1, 2, 3)]
+    assert list(run.courses) == [f"{run.label}/stage-{k}" for k in (1, 2, 3)]
 
 
 def test_some_runs_of_a_plan_may_be_shapings(tmp_path):

@@ -1,5 +1,6 @@
 """The script of a job array, run by bash as SLURM would, without SLURM."""
 
+import json
 import os
 import signal
 import subprocess
@@ -129,9 +130,10 @@ def test_a_finished_run_that_is_extended_is_not_skipped(tmp_path):
     campaign = tiny_campaign(tmp_path)
     ended = campaign.paths.ended("a")
     ended.parent.mkdir()
-    ended.write_text('{"status": "finished"}')
+    about = {"status": "finished", "origin": "", "message": "", "core_seconds": 1.0}
+    ended.write_text(json.dumps(about))
     failed = campaign.paths.ended("b")
-    failed.write_text('{"status": "failed"}')
+    failed.write_text(json.dumps(about | {"status": "failed", "origin": "machine"}))
     slurm.write_array(campaign.path, ["a", "b"])
     assert (ended.exists(), failed.exists()) == (False, True)
 

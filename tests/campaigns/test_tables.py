@@ -13,7 +13,7 @@ from conevo.campaigns.campaign import Campaign
 from conevo.campaigns.executors.local import Serial
 from conevo.campaigns.paths import Paths
 from conevo.campaigns.schema import SCHEMA
-from conevo.campaigns.sealing import seal_tables
+from conevo.campaigns.sealing import is_sealed, seal_tables
 from conevo.campaigns.tables import Tables
 from conevo.report.files import write_report
 from conevo.runs.directory import read_json
@@ -201,7 +201,7 @@ def test_a_table_that_is_lost_is_made_again(campaign, table):
     with Tables(campaign.paths.tables) as opened:
         before = opened.query(f"SELECT count(*) FROM {table}")
     path.unlink()
-    assert not campaign.is_sealed
+    assert not is_sealed(campaign.paths, campaign.finished)
     campaign.seal()
     with Tables(campaign.paths.tables) as opened:
         assert opened.query(f"SELECT count(*) FROM {table}") == before

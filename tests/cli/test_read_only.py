@@ -65,7 +65,7 @@ def test_a_campaign_is_queried_and_reported_where_nothing_can_be_written(
     asked = "SELECT method, count(*) FROM runs GROUP BY ALL ORDER BY ALL"
     said = say("query", "archive/tiny", asked, "--csv")
     assert (said.code, said.out.split()[1:]) == (0, ["cone,2", "homcne,2"])
-    note = "Read-only file system; its tables are made for this command only\n"
+    note = "Read-only file system; its tables are made for this one use\n"
     assert said.err.endswith(note) if lost else said.err == ""
     said = say("report", "archive/tiny", "--out", "report")
     assert (said.code, (tmp_path / "report" / "index.html").is_file()) == (0, True), said.err

@@ -9,14 +9,22 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable
 
+from typing_extensions import TypedDict
+
 from conevo.campaigns.paths import Paths
 from conevo.errors import UsageError
-from conevo.reading import DamagedFile, read_json
+from conevo.reading import read_json
 from conevo.runs.code import current_code, last_code
 from conevo.runs.durable import replace_file
 from conevo.terms import quoted
 
-__all__ = ["admit_code", "admitted_codes"]
+__all__ = ["admit_code"]
+
+
+class Codes(TypedDict):
+    """``code.json``: the versions, each with its code, that may continue a campaign."""
+
+    codes: list[str]
 
 
 def admit_code(paths: Paths, labels: Iterable[str], accept: bool = False) -> None:
@@ -28,10 +36,12 @@ def admit_code(paths: Paths, labels: Iterable[str], accept: bool = False) -> Non
         accept: admit it although others have begun the campaign.
 
     Raises:
-        UsageError: other code has begun it, and this one is not accepted.
-        EnvironmentFailure: ``code.json`` cannot be written.
+        UsageError: other code has begun it, and this one is not accepted; or ``code.json`` is
+            damaged.
+        EnvironmentFailure: it cannot be written.
     """
-    here, codes = current_code(), admitted_codes(paths)
+    here = current_code()
+    codes = read_json(paths.code, Codes)["codes"] if paths.code.is_file() else []
     if here in codes:
         return
     if not codes:  # not begun, or by conevo 0.1.0
@@ -45,17 +55,3 @@ def admit_code(paths: Paths, labels: Iterable[str], accept: bool = False) -> Non
             f"{quoted(paths.root)} --accept-other-code'"
         )
     replace_file(paths.code, json.dumps({"codes": [*codes, here]}, indent=1).encode() + b"\n")
-
-
-def admitted_codes(paths: Paths) -> list[str]:
-    """Return the versions, each with its code, that may continue a campaign; none if not begun.
-
-    Raises:
-        UsageError: the list is damaged.
-    """
-    if not paths.code.is_file():
-        return []
-    codes = read_json(paths.code).get("codes")
-    if not isinstance(codes, list) or not all(isinstance(code, str) for code in codes):
-        raise DamagedFile(f"{paths.code} is damaged: codes must be a list of texts")
-    return codes

@@ -22,7 +22,6 @@ missing, and a finished run is never executed twice.
 from __future__ import annotations
 
 import dataclasses
-import logging
 import time
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
@@ -34,17 +33,17 @@ from conevo.campaigns.admission import admit_code
 from conevo.campaigns.devices import next_device
 from conevo.campaigns.ended import read_ended
 from conevo.campaigns.executors.protocol import Ending, Executor, RunJob
-from conevo.campaigns.extension import check_plan, settle, texts_of, write_plan
+from conevo.campaigns.extension import check_plan, settle, texts_of
 from conevo.campaigns.inputs import located
 from conevo.campaigns.ledger import Entry, Ledger
 from conevo.campaigns.paths import Paths
 from conevo.campaigns.plan import Plan, PlannedRun
 from conevo.campaigns.plan_file import read_plan
-from conevo.campaigns.progress import is_held
 from conevo.campaigns.worker import planned_runs
 from conevo.errors import UsageError, unknown_name
 from conevo.reading import read_json
-from conevo.runs.directory import Directory, appearing
+from conevo.runs import locks
+from conevo.runs.directory import LOCK, Directory, appearing, as_json
 from conevo.runs.durable import is_there, replace_file
 from conevo.runs.time_limit import TimeLimit
 from conevo.terms import quoted
@@ -55,7 +54,6 @@ if TYPE_CHECKING:
 
 __all__ = ["ATTEMPTS", "CAMPAIGNS", "Campaign", "Stopped", "check", "create"]
 
-log = logging.getLogger("conevo")
 CAMPAIGNS = Path("campaigns")  # default folder, of new campaigns and for names
 ATTEMPTS = 3  # of a run whose worker is lost, or whose machine failed
 SEAL_EVERY = 60.0  # seconds at least from one update of the tables to the next
@@ -111,8 +109,8 @@ def create(plan: Plan, path: Path, accept_other_code: bool = False) -> Campaign:
         campaign.settle()
         check_plan(campaign, {run.label: run for run in runs})
         campaign.admit_code(accept_other_code)
-        write_plan(campaign, plan, runs)
-        campaign.settle()
+        replace_file(campaign.paths.extension, as_json(texts_of(plan, runs, campaign.path)))
+        campaign.settle()  # the new plan replaces the old one in one step
     return campaign
 
 
@@ -195,10 +193,7 @@ class Campaign:
         from conevo.campaigns.sealing import sealed_tables
         from conevo.campaigns.tables import Tables
 
-        def note(why: str) -> None:
-            log.warning("%s; its tables are made for this query only", why)
-
-        with sealed_tables(self, note) as folder, Tables(folder, may_be_empty=True) as tables:
+        with sealed_tables(self) as folder, Tables(folder, may_be_empty=True) as tables:
             return tables.frame(sql)
 
     @property
@@ -225,7 +220,7 @@ class Campaign:
         planned = self.planned[label]
         return all(
             self.paths.study(name, kind).is_file()
-            for name in planned.names
+            for name in planned.courses
             for kind in planned.studies
         )
 
@@ -243,21 +238,20 @@ class Campaign:
             entry = known.get(label, Entry(label))
             if self.is_finished(label):
                 entry = dataclasses.replace(entry, state="finished")
-            elif is_held(self.paths, label):
+            elif self._is_held(label):
                 entry = dataclasses.replace(entry, state="running")
             elif entry.state == "finished" or (entry.state == "running" and not is_coordinated):
                 entry = dataclasses.replace(entry, state="pending")
             if entry.state == "pending" and entry.attempts == 0:
-                entry = self._ended_alone(entry)
+                ended = read_ended(self.paths.ended(label))  # without a coordinator
+                if ended is not None and ended["status"] == "failed":
+                    entry = dataclasses.replace(entry, state="failed", reason=ended["message"])
             found[label] = entry
         return found
 
-    def _ended_alone(self, entry: Entry) -> Entry:
-        """Return the state of a run that may have ended without a coordinator."""
-        ended = read_ended(self.paths.ended(entry.label))
-        if ended is None or ended["status"] != "failed":
-            return entry
-        return dataclasses.replace(entry, state="failed", reason=ended["message"])
+    def _is_held(self, label: str) -> bool:
+        """Whether a process, as far as this machine knows, holds a run."""
+        return locks.is_held(self.paths.run(label) / LOCK)
 
     def admit_code(self, accept: bool = False) -> None:
         """Let this version of conevo continue the campaign; see ``admission``.
@@ -342,14 +336,8 @@ class Campaign:
         return self.standings()
 
     @property
-    def is_sealed(self) -> bool:
-        """Whether its tables are those of all finished runs."""
-        from conevo.campaigns.sealing import is_sealed
-
-        return is_sealed(self.paths, self._finished)
-
-    @property
-    def _finished(self) -> list[PlannedRun]:
+    def finished(self) -> list[PlannedRun]:
+        """The finished runs, in the order of the plan."""
         return [run for label, run in self.planned.items() if self.is_finished(label)]
 
     def seal(self, into: Path | None = None) -> None:
@@ -358,7 +346,7 @@ class Campaign:
         Args:
             into: a folder to make them in, if not the campaign's own.
         """
-        if finished := self._finished:
+        if finished := self.finished:
             from conevo.campaigns.sealing import seal_tables  # loads numpy
 
             spent = {entry.label: entry.core_seconds for entry in self.ledger.entries()}
@@ -433,7 +421,7 @@ class Campaign:
             if self.is_finished(label):
                 waiting.remove(label)
                 self.ledger.put([label], "finished", "found finished")
-            elif not is_held(self.paths, label):
+            elif not self._is_held(label):
                 free.append(label)
         return free
 

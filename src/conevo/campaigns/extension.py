@@ -18,7 +18,6 @@ from conevo.campaigns.plan import Plan, PlannedRun
 from conevo.errors import UsageError
 from conevo.reading import read_json
 from conevo.runs.config import RunConfig
-from conevo.runs.directory import as_json
 from conevo.runs.durable import replace_file, writing
 from conevo.runs.inputs import INPUTS
 from conevo.terms import quoted
@@ -26,7 +25,7 @@ from conevo.terms import quoted
 if TYPE_CHECKING:
     from conevo.campaigns.campaign import Campaign
 
-__all__ = ["check_plan", "settle", "texts_of", "write_plan"]
+__all__ = ["check_plan", "settle", "texts_of"]
 
 
 def texts_of(plan: Plan, runs: Iterable[PlannedRun], directory: Path) -> dict[str, str]:
@@ -80,14 +79,8 @@ def check_plan(campaign: Campaign, runs: Mapping[str, PlannedRun]) -> None:
             )
 
 
-def write_plan(campaign: Campaign, plan: Plan, runs: list[PlannedRun]) -> None:
-    """Replace the campaign's plan in one step; its lock is held."""
-    replace_file(campaign.paths.extension, as_json(texts_of(plan, runs, campaign.path)))
-    settle(campaign.paths)
-
-
 def settle(paths: Paths) -> None:
-    """Finish an interrupted ``write_plan``; the campaign's lock is held."""
+    """Put the plan in ``extension.json``, if any, in place; the campaign's lock is held."""
     if paths.extension.is_file():
         extension = read_json(paths.extension)
         replace_file(paths.runs, extension["runs"].encode())

@@ -65,9 +65,7 @@ def keep_files(values: Iterable[Any], directory: Path) -> dict[str, str]:
         file = Path(value.rpartition(":")[0] if ".py:" in value else value)
         if str(file) in names or not (file.is_absolute() and file.is_file()):
             continue
-        files = [file]
-        if ".py:" in value:
-            files = files_of(file)
+        files = files_of(file) if ".py:" in value else [file]
         kept = [copy_input(one, directory / INPUTS) for one in files]
         names[str(file)] = kept[0].relative_to(directory).as_posix()
     return names

@@ -85,7 +85,9 @@ class Ledger:
             "SELECT label, state, attempts, reason, threads, began, core_seconds "
             "FROM runs ORDER BY place"
         )
-        with self._reading() as db:
+        # A transaction of a killed writer is undone first, which a reader may not do.
+        is_torn = self.path.with_name(f"{self.path.name}-journal").exists()
+        with self._open("rw" if is_torn else "ro") as db:
             return [Entry(*row) for row in db.execute(query)]
 
     def begin(self, label: str, threads: int, at: float) -> None:
@@ -126,13 +128,6 @@ class Ledger:
     def _writing(self) -> Iterator[sqlite3.Connection]:
         with self._open("rwc") as db:
             db.executescript(SCHEMA)
-            yield db
-
-    @contextmanager
-    def _reading(self) -> Iterator[sqlite3.Connection]:
-        # A transaction of a killed writer is undone first, which a reader may not do.
-        is_torn = self.path.with_name(f"{self.path.name}-journal").exists()
-        with self._open("rw" if is_torn else "ro") as db:
             yield db
 
     @contextmanager

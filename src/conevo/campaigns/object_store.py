@@ -185,6 +185,6 @@ def _rank(path: Path) -> int:
 def _beside(root: Path, label: str) -> list[Path]:
     """Return the paths of a run's studies, its log and its last end, in this order."""
     paths = Paths(root)
-    names = planned_runs(root)[label].names
+    names = planned_runs(root)[label].courses
     studies = [paths.study(name, kind) for name in names for kind in STUDIES]
     return [*studies, paths.log(label), paths.ended(label)]

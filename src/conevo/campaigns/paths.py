@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 
 from conevo.runs.directory import CAMPAIGN
@@ -10,51 +9,19 @@ from conevo.runs.directory import CAMPAIGN
 __all__ = ["Paths"]
 
 
-@dataclass(frozen=True)
 class Paths:
     """Paths in the directory of a campaign."""
 
-    root: Path
-
-    @property
-    def plan(self) -> Path:
-        """The plan, resolved."""
-        return self.root / CAMPAIGN
-
-    @property
-    def runs(self) -> Path:
-        """The list of runs, one JSON object per line."""
-        return self.root / "runs.jsonl"
-
-    @property
-    def code(self) -> Path:
-        """The versions of the code that may continue the campaign."""
-        return self.root / "code.json"
-
-    @property
-    def extension(self) -> Path:
-        """Another plan, while it replaces the old one."""
-        return self.root / "extension.json"
-
-    @property
-    def ledger(self) -> Path:
-        """The state of every run, as the coordinator knows it."""
-        return self.root / "ledger.sqlite"
-
-    @property
-    def stop(self) -> Path:
-        """Makes the coordinator stop, which removes it."""
-        return self.root / "STOP"
-
-    @property
-    def tables(self) -> Path:
-        """Parquet files for queries and reports."""
-        return self.root / "tables"
-
-    @property
-    def report(self) -> Path:
-        """Pages, figures and numbers."""
-        return self.root / "report"
+    def __init__(self, root: Path) -> None:
+        self.root = root
+        self.plan = root / CAMPAIGN
+        self.runs = root / "runs.jsonl"
+        self.code = root / "code.json"
+        self.extension = root / "extension.json"  # another plan, while it replaces the old one
+        self.ledger = root / "ledger.sqlite"
+        self.stop = root / "STOP"  # makes the coordinator stop, which removes it
+        self.tables = root / "tables"
+        self.report = root / "report"  # pages, figures and numbers
 
     def run(self, name: str) -> Path:
         """The directory of a run, a shaping or, "LABEL/stage-1", a stage of one."""

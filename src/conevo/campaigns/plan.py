@@ -14,9 +14,11 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import tomli_w
+from annotated_types import Ge, Le, MinLen
+from pydantic import StringConstraints
 
 from conevo.campaigns.inputs import located, shown_as
 from conevo.errors import UsageError, unknown_name
@@ -26,6 +28,7 @@ from conevo.evolution.methods.registry import resolve as resolve_method
 from conevo.runs.config import RunConfig
 from conevo.runs.first import FIRST, SHARE, resolve_stages, take_first, without_method
 from conevo.runs.layers import PRESETS, overridden, spelt_otherwise, split_keys
+from conevo.runs.records import RunId
 from conevo.runs.shaping import tasks_up_to
 from conevo.worlds.registry import WorldEntry
 from conevo.worlds.registry import resolve as resolve_world
@@ -36,6 +39,7 @@ MOST_RUNS = 100_000
 MOST_SEEDS = 10_000
 HEAD = ("name", "title", "produces", "seeds", "preset", "shape", "studies")
 EFFECTS = ("shape", "settings", "factors")
+Settings = dict[str, bool | int | float | str]
 NAMING = ("world", "method", "overrides", "of_first")  # parts of a run that may name files
 
 
@@ -47,7 +51,7 @@ def levels_of(variant: str) -> dict[str, str]:
 
 @dataclass(frozen=True)
 class PlannedRun:
-    """One run of a campaign, or one shaping.
+    """One run of a campaign, or one shaping: a line of ``runs.jsonl``.
 
     Attributes:
         label: its name in the campaign, and the name of its directory.
@@ -63,17 +67,17 @@ class PlannedRun:
         of_first: settings of the first stage, if another method evolves it (``runs.first``).
     """
 
-    label: str
+    label: Annotated[str, StringConstraints(pattern=r"^[^/.\x00-\x1f][^/\x00-\x1f]*$")]
     world: str
     method: str
     preset: str
-    seed: int
+    seed: Annotated[int, Ge(0), Le(2**63 - 1)]
     variant: str
-    overrides: dict[str, Any]
+    overrides: Settings
     shape: bool
     studies: tuple[str, ...]
-    run_ids: tuple[str, ...]
-    of_first: dict[str, Any] = field(default_factory=dict)
+    run_ids: Annotated[tuple[RunId, ...], MinLen(1)]
+    of_first: Settings = field(default_factory=dict)  # missing before conevo 0.2
 
     @property
     def values(self) -> list[Any]:
@@ -100,11 +104,6 @@ class PlannedRun:
             return {self.label: [self.label]}
         stages = [f"{self.label}/stage-{k}" for k in range(1, len(self.run_ids) + 1)]
         return {stage: [stage] for stage in stages} if self.shape else {self.label: stages}
-
-    @property
-    def names(self) -> list[str]:
-        """The name in tables of the run, or of every stage."""
-        return list(self.courses)
 
     @property
     def tasks(self) -> list[str]:
@@ -249,8 +248,9 @@ class Plan:
             UsageError: an unknown name or a value that is not allowed in any run.
         """
         cells = self._cells()
-        self._refuse_namesakes("world", (resolve_world(w)[0] for w in _levels(cells, "world")))
-        self._refuse_namesakes("method", map(resolve_method, _levels(cells, "method")))
+        worlds, methods = ({levels[name] for levels in cells} for name in ("world", "method"))
+        self._refuse_namesakes("world", (resolve_world(one)[0] for one in sorted(worlds)))
+        self._refuse_namesakes("method", map(resolve_method, sorted(methods)))
         written = [self._write_cell(levels) for levels in cells]
         runs = [run for same_seed in zip(*written, strict=True) for run in same_seed]
         labels = [run.label for run in runs]
@@ -383,11 +383,6 @@ def _values_in(part: Any) -> list[Any]:
     found: list[Any] = []
     _changed(part, found.append)
     return found
-
-
-def _levels(cells: Iterable[Mapping[str, Any]], factor: str) -> list[str]:
-    """Return the different levels that a factor has."""
-    return sorted({levels[factor] for levels in cells})
 
 
 def _combinations(factors: Mapping[str, tuple[Any, ...]]) -> list[dict[str, Any]]:

@@ -44,7 +44,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from conevo.campaigns.inputs import located
 from conevo.campaigns.plan import EFFECTS, HEAD, MOST_SEEDS, Plan, Where
@@ -60,6 +60,8 @@ __all__ = ["STUDIES", "preset_names", "read_plan", "read_preset"]
 STUDIES = ("teams", "signal")
 TABLES = ("campaign", "factors", "levels", "settings", "where")
 CONDITIONS = ("world", "method", "preset")
+KINDS = {str: "text", bool: "true or false", list: "a list of texts"}
+T = TypeVar("T")
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
 RANGE = re.compile(r"(.*-)(\d+)\.\.(\d+)")
 
@@ -106,10 +108,10 @@ def _parse(tables: Mapping[str, Any], place: str, name: str) -> Plan:
     for key in head:
         if key not in HEAD:
             raise unknown_name("key", f"campaign.{key}", [f"campaign.{k}" for k in HEAD], place)
-    preset = _text(head.get("preset", "desk"), "campaign.preset", place)
+    preset = _checked(head.get("preset", "desk"), str, "campaign.preset", place)
     if preset not in PRESETS:
         raise unknown_name("preset", preset, PRESETS, place)
-    shape = _truth(head.get("shape", False), "campaign.shape", place)
+    shape = _checked(head.get("shape", False), bool, "campaign.shape", place)
     studies = _texts(head.get("studies", ["teams"]), "campaign.studies", place)
     for study in studies:
         if study not in STUDIES:
@@ -123,7 +125,7 @@ def _parse(tables: Mapping[str, Any], place: str, name: str) -> Plan:
     where = tuple(_where(one, factors, firsts, place) for one in wheres)
     return Plan(
         name=_name(head.get("name", name), place),
-        title=_text(head.get("title", ""), "campaign.title", place),
+        title=_checked(head.get("title", ""), str, "campaign.title", place),
         produces=_texts(head.get("produces", []), "campaign.produces", place),
         seeds=_seeds(head.get("seeds", 20), place),
         preset=preset,
@@ -145,7 +147,7 @@ def _table(tables: Mapping[str, Any], key: str, place: str, named: str = "") -> 
 
 
 def _name(value: Any, place: str) -> str:
-    name = _text(value, "campaign.name", place)
+    name = _checked(value, str, "campaign.name", place)
     if not NAME.fullmatch(name):
         raise UsageError(
             f"campaign.name = {shown(name)} {place}: "
@@ -154,22 +156,14 @@ def _name(value: Any, place: str) -> str:
     return name
 
 
-def _text(value: Any, key: str, place: str) -> str:
-    if not isinstance(value, str):
-        raise UsageError(f"{key} = {shown(value)} {place}: must be text")
-    return value
-
-
-def _truth(value: Any, key: str, place: str) -> bool:
-    if not isinstance(value, bool):
-        raise UsageError(f"{key} = {shown(value)} {place}: must be true or false")
+def _checked(value: Any, kind: type[T], key: str, place: str) -> T:
+    if not isinstance(value, kind):
+        raise UsageError(f"{key} = {shown(value)} {place}: must be {KINDS[kind]}")
     return value
 
 
 def _texts(value: Any, key: str, place: str) -> tuple[str, ...]:
-    if not isinstance(value, list):
-        raise UsageError(f"{key} = {shown(value)} {place}: must be a list of texts")
-    return tuple(_text(one, key, place) for one in value)
+    return tuple(_checked(one, str, key, place) for one in _checked(value, list, key, place))
 
 
 def _seeds(value: Any, place: str) -> tuple[int, ...]:
@@ -282,7 +276,7 @@ def _where(table: Any, of_all: Mapping[str, Any], firsts: Sequence[str], place: 
                 f"where.{key} = {shown(list(names))} {place} matches no run: factors.{key} is "
                 f"{', '.join(of_all[key])}"
             )
-    shape = _truth(table["shape"], "where.shape", place) if "shape" in table else None
+    shape = _checked(table["shape"], bool, "where.shape", place) if "shape" in table else None
     factors = _factors(_table(table, "factors", place), "where.factors", place)
     if twice := sorted(factors.keys() & of_all.keys()):
         raise UsageError(f"where.factors.{twice[0]} {place}: [factors] has {twice[0]} for all runs")

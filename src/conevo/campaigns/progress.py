@@ -1,4 +1,4 @@
-"""The progress of a campaign's runs, from their files alone, whichever process executes them.
+"""The progress of a campaign's runs, from their files alone, and the time until all are finished.
 
 A coordinator knows its own workers only. A SLURM task or a ``conevo resume`` holds the lock of the
 run's directory, and every worker writes a line per generation. Some network file systems do not
@@ -7,11 +7,13 @@ pass locks on to other machines; then the time of the last line is the only sign
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from statistics import fmean
+from typing import TYPE_CHECKING
 
 from conevo.campaigns.inputs import shown_as
 from conevo.campaigns.ledger import Entry
@@ -20,14 +22,16 @@ from conevo.campaigns.plan import PlannedRun
 from conevo.errors import ConevoError
 from conevo.evolution.methods.registry import name_in
 from conevo.reading import parse_json, read_last_line, read_toml
-from conevo.runs import locks
-from conevo.runs.directory import CONFIG, LOCK, SHAPING
+from conevo.runs.directory import CONFIG, SHAPING
 from conevo.runs.outline import Outline, budget_of, outline_of
 from conevo.runs.progress import Done, share_of
 from conevo.runs.records import Generation
 from conevo.runs.store import GENERATIONS
 
-__all__ = ["RunProgress", "cell_text", "cells", "is_held", "last_written", "progress_of"]
+if TYPE_CHECKING:
+    from conevo.campaigns.campaign import Campaign
+
+__all__ = ["RunProgress", "cell_text", "cells", "last_written", "progress_of", "remaining_seconds"]
 
 
 @dataclass(frozen=True)
@@ -71,11 +75,6 @@ def cell_text(entries: Sequence[Entry]) -> str:
     more = f" +{found['running']}" if found["running"] else ""
     failed = f" !{found['failed']}" if found["failed"] else ""
     return f"{found['finished']}/{len(entries)}{more}{failed}"
-
-
-def is_held(paths: Paths, label: str) -> bool:
-    """Whether a process, as far as this machine knows, holds a run."""
-    return locks.is_held(paths.run(label) / LOCK)
 
 
 def last_written(paths: Paths, label: str) -> float | None:
@@ -132,3 +131,52 @@ def _last_generation(path: Path) -> tuple[int, int, float | None]:
         return record["generation"] + 1, record["team_evaluations"], path.stat().st_mtime
     except (ConevoError, OSError):
         return 0, 0, None
+
+
+def remaining_seconds(
+    campaign: Campaign, entries: Mapping[str, Entry], cores: int, at: float
+) -> float | None:
+    """Return the seconds until the last run is finished; None if that cannot be estimated yet.
+
+    A run is expected to take the mean core seconds of the finished runs of its cell, else of its
+    world, else of all; while none is finished, of the running ones, judged by their progress.
+
+    Args:
+        campaign: that the runs are of.
+        entries: their states.
+        cores: that execute them together.
+        at: the present time, seconds since 1970.
+    """
+    planned = campaign.planned
+    spent = {k: one.core_seconds for k, one in entries.items() if one.state == "finished"}
+    if not any(spent.values()):
+        for label, entry in entries.items():
+            if entry.state == "running" and (passed := _passed(entry, at)) > 0:
+                share = progress_of(campaign.paths, planned[label]).share
+                spent[label] = passed / share if share > 0 else 0.0
+    known: dict[tuple[str, ...], list[float]] = defaultdict(list)
+    for label, seconds in spent.items():
+        for key in _keys(campaign, label) if seconds > 0 else ():
+            known[key].append(seconds)
+    left = 0.0
+    for label, entry in entries.items():
+        if label not in planned or entry.state not in ("pending", "running"):
+            continue
+        costs = next((known[key] for key in _keys(campaign, label) if key in known), None)
+        if costs is None:
+            return None
+        passed = _passed(entry, at) if entry.state == "running" else 0.0
+        left += max(fmean(costs) - passed, 0.0)
+    longest = max((e.threads for e in entries.values() if e.state == "running"), default=1)
+    return left / max(cores, longest, 1)
+
+
+def _keys(campaign: Campaign, label: str) -> list[tuple[str, ...]]:
+    """Return the groups of similar runs that a run belongs to, the most similar first."""
+    run = campaign.planned[label]
+    return [(run.world, run.method, run.variant), (run.world.partition("/")[0],), ()]
+
+
+def _passed(entry: Entry, at: float) -> float:
+    """Return the core seconds that an attempt has used."""
+    return max(at - (entry.began or at), 0.0) * entry.threads

@@ -7,8 +7,9 @@ studies. Their columns are ``campaigns.schema.SCHEMA``. All are made again when 
 from __future__ import annotations
 
 import json
+import logging
 import shutil
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -39,6 +40,7 @@ if TYPE_CHECKING:
 
 __all__ = ["is_sealed", "left_out", "seal_tables", "sealed_tables"]
 
+log = logging.getLogger("conevo")
 MANIFEST = "tables.json"
 PROVENANCE = ("stopped_by", "run_id", "conevo", "numpy", "warp", "kernel_hash")  # in table runs
 
@@ -55,15 +57,12 @@ def is_sealed(paths: Paths, finished: Sequence[PlannedRun]) -> bool:
 
 
 @contextmanager
-def sealed_tables(campaign: Campaign, note: Callable[[str], None]) -> Iterator[Path]:
+def sealed_tables(campaign: Campaign) -> Iterator[Path]:
     """Yield the folder with the tables of all finished runs; it is empty if there are none.
 
     While the campaign runs they are as its coordinator last made them. If they are out of date and
-    cannot be written, as on a read-only file system, they are made in a temporary folder.
-
-    Args:
-        campaign: that they are of.
-        note: called with the reason for a temporary folder.
+    cannot be written, as on a read-only file system, they are made in a temporary folder, and the
+    reason is logged.
 
     Raises:
         UsageError: every run is damaged.
@@ -71,7 +70,7 @@ def sealed_tables(campaign: Campaign, note: Callable[[str], None]) -> Iterator[P
     """
     with ExitStack() as stack:
         tables = campaign.paths.tables
-        if not (campaign.is_running or campaign.is_sealed):
+        if not (campaign.is_running or is_sealed(campaign.paths, campaign.finished)):
             try:
                 with campaign.locked():
                     campaign.seal()
@@ -80,7 +79,7 @@ def sealed_tables(campaign: Campaign, note: Callable[[str], None]) -> Iterator[P
                 tables = Path(folder) / "tables"
                 campaign.seal(tables)
                 if tables.is_dir():
-                    note(str(error))
+                    log.warning("%s; its tables are made for this one use", error)
         yield tables
 
 
@@ -116,7 +115,8 @@ def seal_tables(
         files = {name: (draft / f"{name}.jsonl").open("w", encoding="utf-8") for name in SCHEMA}
         damaged: dict[str, str] = {}
         for planned in finished:
-            cost = max(spent.get(planned.label, 0.0), _last_cost(paths, planned.label))
+            ended = read_ended(paths.ended(planned.label))  # of a worker without a coordinator, too
+            cost = max(spent.get(planned.label, 0.0), ended["core_seconds"] if ended else 0.0)
             try:
                 rows = list(_rows(paths, planned, cost))
             except ConevoError as error:
@@ -158,12 +158,6 @@ def _manifest(finished: Sequence[PlannedRun]) -> Record:
 
 def _quoted(path: Path) -> str:
     return "'" + str(path).replace("'", "''") + "'"
-
-
-def _last_cost(paths: Paths, label: str) -> float:
-    """Return the core seconds of a run's last worker, which may have had no coordinator."""
-    ended = read_ended(paths.ended(label))
-    return ended["core_seconds"] if ended is not None else 0.0
 
 
 def _rows(paths: Paths, planned: PlannedRun, cost: float) -> Iterator[tuple[str, Record]]:

@@ -15,10 +15,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from conevo.campaigns.devices import AUTO, CPU, parse_devices
-from conevo.campaigns.executors.process import ONE_THREAD
+from conevo.campaigns.ended import read_ended
+from conevo.campaigns.executors.local import ONE_THREAD
 from conevo.campaigns.paths import Paths
 from conevo.errors import UsageError, shown
-from conevo.reading import DamagedFile, read_json
 from conevo.runs.durable import replace_file
 
 __all__ = ["check_request", "write_array"]
@@ -134,7 +134,9 @@ def write_array(
         check="" if device in (None, AUTO, CPU) else check,
     )
     for label in labels:  # the script would skip a run that was finished before it was extended
-        _forget_finished(Paths(root).ended(label))
+        ended = Paths(root).ended(label)
+        if (found := read_ended(ended)) is None or found["status"] == "finished":
+            ended.unlink(missing_ok=True)
     replace_file(path, text.encode())
     return path
 
@@ -169,12 +171,3 @@ def check_request(hours: float, options: Sequence[str], device: str | None = Non
         if name in seen:
             raise UsageError(f"--{name} for sbatch is given twice")
         seen.add(name)
-
-
-def _forget_finished(ended: Path) -> None:
-    """Remove the record of a run's end if it is "finished"."""
-    try:
-        if ended.is_file() and read_json(ended).get("status") == "finished":
-            ended.unlink()
-    except DamagedFile:
-        ended.unlink()

@@ -18,11 +18,7 @@ import time
 import traceback
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any, NotRequired
-
-from annotated_types import Ge, Le, MinLen
-from pydantic import StringConstraints
-from typing_extensions import TypedDict
+from typing import Any
 
 from conevo.campaigns.admission import admit_code
 from conevo.campaigns.devices import CPU
@@ -32,10 +28,9 @@ from conevo.campaigns.plan import PlannedRun
 from conevo.campaigns.plan_file import STUDIES
 from conevo.errors import ConevoError, EnvironmentFailure, UsageError
 from conevo.outside import line_of
-from conevo.reading import read_json_lines
+from conevo.reading import check, read_json_lines
 from conevo.runs.directory import as_json, kind_of
 from conevo.runs.durable import replace_file
-from conevo.runs.records import RunId
 from conevo.runs.run import Run
 from conevo.runs.shaping import Shaping, start_stages
 from conevo.runs.start import start
@@ -44,25 +39,6 @@ from conevo.runs.time_limit import TimeLimit
 __all__ = ["carry_out", "core_seconds", "main", "planned_runs"]
 
 PATIENCE = 600.0  # seconds to wait for another worker that is just about to leave a run
-
-
-Label = Annotated[str, StringConstraints(pattern=r"^[^/.\x00-\x1f][^/\x00-\x1f]*$")]
-
-
-class PlannedLine(TypedDict):
-    """A line of ``runs.jsonl``, see ``PlannedRun``."""
-
-    label: Label
-    world: str
-    method: str
-    preset: str
-    seed: Annotated[int, Ge(0), Le(2**63 - 1)]
-    variant: str
-    overrides: dict[str, bool | int | float | str]
-    shape: bool
-    studies: list[str]
-    run_ids: Annotated[list[RunId], MinLen(1)]
-    of_first: NotRequired[dict[str, bool | int | float | str]]  # missing before conevo 0.2
 
 
 class _InUse(Exception):
@@ -77,9 +53,9 @@ def planned_runs(root: Path) -> dict[str, PlannedRun]:
         EnvironmentFailure: it cannot be read.
     """
     path = Paths(root).runs
-    runs = [
-        PlannedRun(**{k: _frozen(line[k]) for k in PlannedLine.__annotations__ if k in line})
-        for line in read_json_lines(path, PlannedLine)
+    runs: list[PlannedRun] = [
+        check(line, PlannedRun, f"{path} is damaged in line {number}")
+        for number, line in enumerate(read_json_lines(path), 1)
     ]
     if not runs:
         raise UsageError(f"{path} is damaged: it lists no runs")
@@ -204,17 +180,13 @@ def _study(paths: Paths, planned: PlannedRun, found: Run | Shaping, threads: int
     from conevo.studies.team_study import study
 
     make: dict[str, Callable[..., Any]] = {"teams": study, "signal": signal_study}
-    runs = [found] if isinstance(found, Run) else found.stages[-len(planned.names) :]
-    for name, run in zip(planned.names, runs, strict=True):
+    runs = [found] if isinstance(found, Run) else found.stages[-len(planned.courses) :]
+    for name, run in zip(planned.courses, runs, strict=True):
         for kind in planned.studies:
             path = paths.study(name, kind)
             if not path.is_file():
                 path.parent.mkdir(parents=True, exist_ok=True)
                 replace_file(path, as_json(make[kind](run, threads=threads)))
-
-
-def _frozen(value: Any) -> Any:
-    return tuple(value) if isinstance(value, list) else value
 
 
 def main() -> None:

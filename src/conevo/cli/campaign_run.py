@@ -13,10 +13,10 @@ import click
 
 from conevo.campaigns.campaign import Campaign, Stopped
 from conevo.campaigns.devices import CPU, devices_here, parse_devices
-from conevo.campaigns.estimate import remaining_seconds
 from conevo.campaigns.executors.protocol import Ending, Executor
 from conevo.campaigns.executors.registry import make_executor
 from conevo.campaigns.ledger import Entry
+from conevo.campaigns.progress import remaining_seconds
 from conevo.cli.campaign_text import counts, grid, heading, print_failed
 from conevo.cli.run_to_end import drop_output, style_of
 from conevo.errors import EnvironmentFailure, UsageError
@@ -45,11 +45,11 @@ def ready(
     cores: int | None,
     threads: int,
     device: str | None,
-    address: str | None,
-    store: str | None,
     limit: TimeLimit | None,
     as_json: bool,
     quiet: bool,
+    address: str | None = None,
+    store: str | None = None,
 ) -> Execution:
     """Return the execution that the options select, before anything is written.
 

@@ -13,12 +13,17 @@ from typing import Any
 import click
 
 from conevo.campaigns.campaign import CAMPAIGNS, Campaign
-from conevo.campaigns.estimate import remaining_seconds
 from conevo.campaigns.ledger import Entry
 from conevo.campaigns.plan import Plan, PlannedRun
 from conevo.campaigns.plan_file import preset_names, read_preset
-from conevo.campaigns.progress import cell_text, cells, last_written, progress_of
-from conevo.cli.format import table
+from conevo.campaigns.progress import (
+    cell_text,
+    cells,
+    last_written,
+    progress_of,
+    remaining_seconds,
+)
+from conevo.cli.format import progress, table
 from conevo.cli.lookup import directories
 from conevo.errors import ConevoError
 from conevo.kernels.threads import usable_cores
@@ -168,13 +173,11 @@ def _progress(campaign: Campaign, entry: Entry) -> tuple[str, str]:
     found = progress_of(campaign.paths, campaign.planned[entry.label])
     if found.written is None:
         return "", ""
-    done = f"{found.generations}"
+    done = counted(found.generations, "generation")
     if entry.state == "finished":
-        return counted(found.generations, "generation"), ""
-    if found.budget:
-        done = f"{found.evaluations:,} of {found.budget:,} evaluations"
-    elif found.of:
-        done = f"{done} of {counted(found.of, 'generation')}"
+        return done, ""
+    if found.of:
+        done = progress(found.generations, found.of, found.evaluations, found.budget)
     return done, _ago(found.written)
 
 

@@ -80,8 +80,6 @@ def compare(order: Order, plan: Plan, dry_run: bool) -> int:
         cores=order.threads,
         threads=1,
         device=order.device,
-        address=None,
-        store=None,
         limit=order.limit,
         as_json=order.as_json,
         quiet=order.quiet,

@@ -7,10 +7,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import click
-
 from conevo.errors import UsageError, unknown_name, without_team
-from conevo.runs.directory import CAMPAIGN, kind_of
+from conevo.runs.directory import CAMPAIGN, kind_of, kinds_in
 from conevo.runs.durable import is_there
 from conevo.runs.run import RUNS, Run
 from conevo.runs.shaping import Shaping
@@ -26,7 +24,6 @@ __all__ = [
     "find_campaign",
     "find_last",
     "find_run",
-    "find_shaping",
     "only_campaign",
     "open_directory",
     "sealed",
@@ -82,27 +79,9 @@ def find_last(text: str) -> Run:
     return found.stages[-1]
 
 
-def find_shaping(text: str) -> Shaping:
-    """Return a shaping by name or path.
-
-    Raises:
-        UsageError: no such shaping, more than one, or it is a run.
-    """
-    found = find(text)
-    if isinstance(found, Run):
-        raise UsageError(f"{found.path} is a run; only a shaping has stages")
-    return found
-
-
 def directories(folder: Path, *kinds: str) -> list[Path]:
     """Return the directories of these kinds (``kind_of``) in ``folder``, sorted by name."""
-    if not folder.is_dir():
-        return []
-    return sorted(
-        path
-        for path in folder.iterdir()
-        if not path.name.startswith(".") and kind_of(path) in kinds
-    )
+    return [path for path, kind in kinds_in(folder).items() if kind in kinds]
 
 
 def campaign_at(text: str) -> Campaign | None:
@@ -157,10 +136,7 @@ def sealed(campaign: Campaign) -> Iterator[Path]:
     """
     from conevo.campaigns.sealing import sealed_tables
 
-    def note(why: str) -> None:
-        click.echo(f"conevo: note: {why}; its tables are made for this command only", err=True)
-
-    with sealed_tables(campaign, note) as folder:
+    with sealed_tables(campaign) as folder:
         if not (folder / "runs.parquet").is_file():
             raise UsageError(
                 f"{campaign.path} has no finished run yet, so there is nothing to show"

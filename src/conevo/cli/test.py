@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from conevo.cli.run_to_end import device_option, threads_option
+from conevo.cli.run_to_end import device_option, seed_option, threads_option
 from conevo.errors import UsageError
 
 if TYPE_CHECKING:
@@ -23,11 +23,7 @@ __all__ = ["test"]
     type=click.IntRange(1, 10_000),
     help="Number of scenarios (default: that of the run's own test).",
 )
-@click.option(
-    "--seed",
-    type=click.IntRange(0, 2**63 - 1),
-    help="Seed of other scenarios (default: those of the run's own test).",
-)
+@seed_option
 @threads_option
 @device_option
 @click.option("--stages", is_flag=True, help="For a shaping: test in every stage's environment.")
@@ -69,8 +65,9 @@ def test(
 
     Try: conevo test runs/first --set world.iterations=500 --robots 10
     """
-    from conevo.cli.lookup import find_run, find_shaping
+    from conevo.cli.lookup import find, find_run
     from conevo.cli.testing_text import conditions_text, stages_test_text, test_text
+    from conevo.runs.run import Run
 
     is_changed = on is not None or bool(settings) or robots is not None or rotate is not None
     if stages:
@@ -78,7 +75,9 @@ def test(
             raise UsageError(
                 "--stages and --on, --set, --robots or --rotate exclude each other: leave one out"
             )
-        shaping = find_shaping(run)
+        shaping = find(run)
+        if isinstance(shaping, Run):
+            raise UsageError(f"{shaping.path} is a run; only a shaping has stages")
         for stage in shaping.stages[-1:]:
             note_other_code(stage)
         results = shaping.test(scenarios, seed, threads=threads, device=device)

@@ -40,6 +40,7 @@ __all__ = [
     "appearing",
     "as_json",
     "kind_of",
+    "kinds_in",
     "refuse_existing",
 ]
 
@@ -54,6 +55,15 @@ def kind_of(path: Path) -> str:
     Only the name of its file counts; readers report damage.
     """
     return next((kind for name, kind in KINDS.items() if is_there(path / name)), "")
+
+
+def kinds_in(folder: Path) -> dict[Path, str]:
+    """Return the runs, shapings and campaigns in a folder by name, each with its kind."""
+    try:
+        paths = sorted(folder.iterdir())
+    except OSError:  # it does not exist yet, or was just removed
+        return {}
+    return {p: kind for p in paths if not p.name.startswith(".") and (kind := kind_of(p))}
 
 
 @contextmanager

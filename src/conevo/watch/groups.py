@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import time
 from collections import Counter
 from collections.abc import Callable, Hashable, Sequence
@@ -10,20 +9,19 @@ from pathlib import Path
 from typing import Any
 
 from conevo.campaigns.campaign import Campaign
-from conevo.campaigns.estimate import remaining_seconds
 from conevo.campaigns.inputs import shown_as
 from conevo.campaigns.ledger import Entry
+from conevo.campaigns.progress import remaining_seconds
 from conevo.errors import UsageError
 from conevo.evolution.methods.registry import name_in
 from conevo.kernels.threads import usable_cores
-from conevo.runs.directory import kind_of
 from conevo.runs.outline import span
 from conevo.watch.comparisons import CurvePanel, panels_of
 from conevo.watch.settings import free_label
 from conevo.watch.subjects import Subject
 from conevo.watch.tail import Stamp, problem_of, readable, stamp
 
-__all__ = ["Experiment", "Followed", "Names", "FollowedRuns", "children"]
+__all__ = ["Experiment", "Followed", "Names", "FollowedRuns"]
 
 GoOn = Callable[[], bool]
 PLACES = ("task", "preset", "method", "variant")  # these decide in which panel a run is
@@ -63,8 +61,8 @@ class Followed:
             "kind": kind,
             "path": readable(str(path or "")),
             "name": readable(name),
+            "title": readable(name),
         }
-        self._about["title"] = self._about["name"]
         self.subjects: list[Subject] = []
         self.panels: list[CurvePanel] = []
         self.is_running = False
@@ -166,7 +164,12 @@ class Experiment(Followed):
         if ledger != self._ledger:
             self._entries = self._campaign.standings()
             self._ledger = ledger
-            self.ends_at = self._judge(self._campaign) if self.is_running else None
+            self.ends_at = None
+            if self.is_running:  # judged by the cores in use now: runs may be on other machines
+                cores = sum(one.threads for one in self._entries.values() if one.state == "running")
+                at, cores = time.time(), cores or usable_cores()
+                left = remaining_seconds(self._campaign, self._entries, cores, at)
+                self.ends_at = None if left is None else round(at + left, 1)
 
     def _open(self) -> None:
         """Read the plan.
@@ -194,29 +197,3 @@ class Experiment(Followed):
                 self._names.of(path, name), path, about
             )
         self.subjects = list(self._by_label.values())
-
-    def _judge(self, campaign: Campaign) -> float | None:
-        """Return when the campaign will be finished, seconds since 1970; None if unknown.
-
-        Judged by the cores in use now: runs may be on other machines.
-        """
-        at = time.time()
-        cores = sum(one.threads for one in self._entries.values() if one.state == "running")
-        left = remaining_seconds(campaign, self._entries, cores or usable_cores(), at)
-        return None if left is None else round(at + left, 1)
-
-
-def children(folder: Path) -> list[tuple[Path, str]]:
-    """Return a folder's directories by name, each with its kind; "" for links."""
-    found = []
-    try:
-        with os.scandir(folder) as entries:
-            for entry in entries:
-                if entry.name.startswith(".") or not entry.is_dir():
-                    continue
-                path = Path(entry.path)
-                if kind := kind_of(path):
-                    found.append((path, "" if entry.is_symlink() else kind))
-    except OSError:
-        return []  # it does not exist yet, or was just removed
-    return sorted(found)

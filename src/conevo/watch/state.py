@@ -15,8 +15,8 @@ from typing import Any
 from conevo.errors import UsageError
 from conevo.evolution.methods.registry import METHODS, title_of
 from conevo.palette import caste_colours, method_looks, several
-from conevo.runs.directory import kind_of
-from conevo.watch.groups import Experiment, Followed, FollowedRuns, Names, children
+from conevo.runs.directory import kind_of, kinds_in
+from conevo.watch.groups import Experiment, Followed, FollowedRuns, Names
 from conevo.watch.subjects import Subject
 from conevo.watch.tail import readable
 from conevo.worlds.registry import colours_of
@@ -128,7 +128,9 @@ class Watched:
 
     def _list(self, folder: Path) -> None:
         """Find the runs and campaigns that are in a folder now."""
-        kinds = dict(children(folder))
+        kinds = {
+            path: "" if path.is_symlink() else kind for path, kind in kinds_in(folder).items()
+        }  # links have no kind
         group = self._groups.setdefault(folder, FollowedRuns(folder, folder.name, self._names))
         assert isinstance(group, FollowedRuns)
         group.listing = [path for path, kind in kinds.items() if kind != "campaign"]

@@ -1,22 +1,23 @@
-"""Executors on this machine."""
+"""Executors on this machine, and the process that executes one run."""
 
 from __future__ import annotations
 
+import os
 import subprocess
+import sys
 import time
-from typing import ClassVar
 
-from conevo.campaigns.executors.process import spawn, why_lost
 from conevo.campaigns.executors.protocol import Ending, RunJob
+from conevo.campaigns.paths import Paths
 from conevo.campaigns.worker import carry_out, core_seconds
 
-__all__ = ["Processes", "Serial"]
+__all__ = ["ONE_THREAD", "Processes", "Serial", "spawn", "why_lost", "worker_command"]
+
+ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 class Serial:
     """One run after the other, in this process: for debugging."""
-
-    name: ClassVar[str] = "serial"
 
     def __init__(self, cores: int) -> None:
         self.cores = cores
@@ -45,8 +46,6 @@ class Serial:
 
 class Processes:
     """One spawned process per run, so that the failure of one does not affect others."""
-
-    name: ClassVar[str] = "processes"
 
     def __init__(self, cores: int) -> None:
         self.cores = cores
@@ -82,3 +81,32 @@ class Processes:
         worker = self._workers.pop(label)
         if worker.stdin is not None and not worker.stdin.closed:
             worker.stdin.close()
+
+
+def spawn(job: RunJob) -> subprocess.Popen[bytes]:
+    """Start a worker, which leaves when its stdin ends; its output goes to the run's log."""
+    log = Paths(job.root).log(job.label)
+    log.parent.mkdir(exist_ok=True)
+    with log.open("ab") as file:
+        return subprocess.Popen(
+            worker_command(job),
+            stdin=subprocess.PIPE,
+            stdout=file,
+            stderr=file,
+            start_new_session=True,  # Ctrl-C is for the coordinator, which ends its workers
+            env=os.environ | dict.fromkeys(ONE_THREAD, "1"),
+        )
+
+
+def worker_command(job: RunJob) -> list[str]:
+    """Return the command that executes a job."""
+    arguments = [str(job.root.resolve()), job.label, str(job.threads)]
+    arguments += [job.device] if job.device else []
+    return [sys.executable, "-m", "conevo.campaigns.worker", *arguments]
+
+
+def why_lost(code: int) -> str:
+    """Return why a worker with this exit code could not record how it ended; "" if it could."""
+    if code in (0, 1):
+        return ""
+    return f"killed by signal {-code}" if code < 0 else f"ended with exit code {code}"

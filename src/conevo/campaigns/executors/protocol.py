@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import ClassVar, Protocol
+from typing import Protocol
 
 from conevo.runs.time_limit import TimeLimit
 
@@ -46,11 +46,9 @@ class Executor(Protocol):
     """Executes jobs.
 
     Attributes:
-        name: as on the command line.
         cores: CPU cores that jobs may use together.
     """
 
-    name: ClassVar[str]
     cores: int
 
     def submit(self, job: RunJob) -> None:

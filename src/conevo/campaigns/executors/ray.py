@@ -17,10 +17,10 @@ from contextlib import suppress
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 from conevo.campaigns.devices import AUTO, CPU
-from conevo.campaigns.executors.process import spawn, why_lost
+from conevo.campaigns.executors.local import spawn, why_lost
 from conevo.campaigns.executors.protocol import Ending, RunJob
 from conevo.campaigns.object_store import ObjectStore
 from conevo.campaigns.paths import Paths
@@ -49,8 +49,6 @@ class RayCluster:
         UsageError: Ray is not installed, a wrong address of the object store, or other devices.
         EnvironmentFailure: no cluster at the address, or it has no GPU.
     """
-
-    name: ClassVar[str] = "ray"
 
     def __init__(
         self,

@@ -12,7 +12,8 @@ from conevo.kernels.threads import usable_cores
 
 __all__ = ["EXECUTORS", "make_executor"]
 
-EXECUTORS = (Processes.name, Serial.name, "ray")
+LOCAL: dict[str, Callable[[int], Executor]] = {"processes": Processes, "serial": Serial}
+EXECUTORS = (*LOCAL, "ray")
 
 
 def make_executor(
@@ -27,9 +28,7 @@ def make_executor(
     Args:
         name: of ``EXECUTORS``.
         cores: that its jobs may use together; by default all usable ones, or all of a cluster.
-        address: of an existing Ray cluster, or "auto"; by default Ray is started here.
-        store: address of an object store ("s3://BUCKET/PATH") for Ray's nodes, if they do not see
-            the campaign's directory.
+        address, store: as for ``RayCluster``; other executors have none.
         devices: of its jobs.
 
     Raises:
@@ -47,5 +46,4 @@ def make_executor(
         if value is not None:
             raise UsageError(f"{option} {value}: only the executor ray has one, not {name}")
     devices_here(devices)
-    kinds: dict[str, Callable[[int], Executor]] = {k.name: k for k in (Serial, Processes)}
-    return kinds[name](cores or usable_cores())
+    return LOCAL[name](cores or usable_cores())
