@@ -7,7 +7,8 @@ import time
 import pytest
 
 from campaigns.plans import tiny_campaign, write_plan
-from conevo.campaigns.campaign import ATTEMPTS, Campaign, Stopped, create
+from conevo.campaigns.campaign import Campaign, create
+from conevo.campaigns.coordinator import ATTEMPTS, Stopped
 from conevo.campaigns.executors.local import Serial
 from conevo.campaigns.executors.protocol import Ending, RunJob
 from conevo.campaigns.plan_file import read_plan

@@ -12,7 +12,8 @@ import pytest
 
 from campaigns.plans import tiny_campaign
 from campaigns.test_campaign import Scripted
-from conevo.campaigns.campaign import Campaign, Stopped, create
+from conevo.campaigns.campaign import Campaign, create
+from conevo.campaigns.coordinator import Stopped
 from conevo.campaigns.executors.local import Serial
 from conevo.campaigns.worker import carry_out
 from conevo.errors import UsageError

@@ -1,4 +1,4 @@
-"""A campaign on disk, and the coordinator that carries it out.
+"""A campaign on disk.
 
 ::
 
@@ -22,17 +22,15 @@ missing, and a finished run is never executed twice.
 from __future__ import annotations
 
 import dataclasses
-import time
-from collections import deque
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from conevo.campaigns.admission import admit_code
-from conevo.campaigns.devices import next_device
+from conevo.campaigns.coordinator import Coordinator, Watch
 from conevo.campaigns.ended import read_ended
-from conevo.campaigns.executors.protocol import Ending, Executor, RunJob
+from conevo.campaigns.executors.protocol import Executor
 from conevo.campaigns.extension import check_plan, settle, texts_of
 from conevo.campaigns.inputs import located
 from conevo.campaigns.ledger import Entry, Ledger
@@ -52,19 +50,9 @@ from conevo.worlds.registry import resolve as resolve_world
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-__all__ = ["ATTEMPTS", "CAMPAIGNS", "Campaign", "Stopped", "check", "create"]
+__all__ = ["CAMPAIGNS", "Campaign", "check", "create"]
 
 CAMPAIGNS = Path("campaigns")  # default folder, of new campaigns and for names
-ATTEMPTS = 3  # of a run whose worker is lost, or whose machine failed
-SEAL_EVERY = 60.0  # seconds at least from one update of the tables to the next
-LOOK = 0.25  # seconds between two looks at workers and the order to stop
-
-
-class Stopped(Exception):
-    """The campaign was stopped by ``Campaign.stop``, or its time is over."""
-
-
-Watch = Callable[["Campaign", "Ending | None"], None]
 
 
 def check(plan: Plan, path: Path) -> list[PlannedRun]:
@@ -238,7 +226,7 @@ class Campaign:
             entry = known.get(label, Entry(label))
             if self.is_finished(label):
                 entry = dataclasses.replace(entry, state="finished")
-            elif self._is_held(label):
+            elif self.is_held(label):
                 entry = dataclasses.replace(entry, state="running")
             elif entry.state == "finished" or (entry.state == "running" and not is_coordinated):
                 entry = dataclasses.replace(entry, state="pending")
@@ -249,7 +237,7 @@ class Campaign:
             found[label] = entry
         return found
 
-    def _is_held(self, label: str) -> bool:
+    def is_held(self, label: str) -> bool:
         """Whether a process, as far as this machine knows, holds a run."""
         return locks.is_held(self.paths.run(label) / LOCK)
 
@@ -326,7 +314,7 @@ class Campaign:
             self._reconcile()
             try:
                 least = min(threads, executor.cores)
-                self._carry_on(executor, least, devices, watch, limit)
+                Coordinator(self, executor, least, devices, watch, limit).carry_on()
             finally:
                 executor.stop()
                 self.ledger.release()
@@ -361,81 +349,3 @@ class Campaign:
         was = {label for label, state in entries.items() if state == "finished"}
         self.ledger.put(sorted(done - was), "finished", "found finished")
         self.ledger.put(sorted((was & set(self.planned)) - done), "pending", "found unfinished")
-
-    def _carry_on(
-        self,
-        executor: Executor,
-        threads: int,
-        devices: Sequence[str],
-        watch: Watch | None,
-        limit: TimeLimit,
-    ) -> None:
-        waiting = deque(
-            entry.label
-            for entry in self.ledger.entries()
-            if entry.state == "pending" and entry.label in self.planned
-        )
-        at_work: dict[str, RunJob] = {}
-        next_seal = time.monotonic() + SEAL_EVERY
-        while waiting or at_work:
-            free = executor.cores - sum(job.threads for job in at_work.values())
-            ready = self._ready(waiting, free) if waiting and free >= threads else deque()
-            while ready and free >= threads:
-                share = max(threads, free // len(ready))
-                device = next_device(devices, (job.device for job in at_work.values()))
-                job = RunJob(self.path, ready.popleft(), share, device, limit)
-                waiting.remove(job.label)
-                at_work[job.label] = job
-                free -= share
-                self.paths.ended(job.label).unlink(missing_ok=True)
-                self.ledger.begin(job.label, share, time.time())
-                executor.submit(job)
-            if waiting and not at_work:
-                time.sleep(LOOK)  # other processes have the runs that are left
-            for ending in executor.wait(LOOK) if at_work else ():
-                del at_work[ending.label]
-                if limit.is_over and not (self.paths.ended(ending.label).is_file() or ending.lost):
-                    waiting.appendleft(ending.label)  # it stopped in time
-                    continue
-                if self._settle(ending) == "pending":
-                    waiting.appendleft(ending.label)
-                if watch is not None:
-                    watch(self, ending)
-            if self.paths.stop.is_file():
-                raise Stopped("stopped")
-            if limit.is_over and (waiting or at_work):
-                raise Stopped("time limit reached")
-            if (began := time.monotonic()) >= next_seal:
-                self.seal()
-                ended = time.monotonic()
-                next_seal = ended + max(SEAL_EVERY, 20 * (ended - began))
-            if watch is not None:
-                watch(self, None)
-
-    def _ready(self, waiting: deque[str], most: int) -> deque[str]:
-        """Return runs that no process has; those that others have finished leave the queue."""
-        free: deque[str] = deque()
-        for label in list(waiting):
-            if len(free) == most:
-                break
-            if self.is_finished(label):
-                waiting.remove(label)
-                self.ledger.put([label], "finished", "found finished")
-            elif not self._is_held(label):
-                free.append(label)
-        return free
-
-    def _settle(self, ending: Ending) -> str:
-        """Record how a worker ended, and return the state of its run."""
-        label, path = ending.label, self.paths.ended(ending.label)
-        attempts = 1 + next(e.attempts for e in self.ledger.entries() if e.label == label)
-        if (ended := read_ended(path)) is None:
-            lost = ending.lost or f"worker exited without reporting; see {self.paths.log(label)}"
-            state = "pending" if attempts < ATTEMPTS else "failed"
-            self.ledger.end(label, state, f"{lost} (attempt {attempts} of {ATTEMPTS})")
-            return state
-        state = str(ended["status"])
-        if state == "failed" and ended["origin"] == "machine" and attempts < ATTEMPTS:
-            state = "pending"
-        self.ledger.end(label, state, ended["message"], ended["core_seconds"])
-        return state

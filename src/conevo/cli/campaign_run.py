@@ -11,7 +11,8 @@ from typing import Any
 
 import click
 
-from conevo.campaigns.campaign import Campaign, Stopped
+from conevo.campaigns.campaign import Campaign
+from conevo.campaigns.coordinator import Stopped
 from conevo.campaigns.devices import CPU, devices_here, parse_devices
 from conevo.campaigns.executors.protocol import Ending, Executor
 from conevo.campaigns.executors.registry import make_executor
