@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from conevo.cli.run_to_end import device_option, threads_option
+from conevo.cli.run_to_end import device_option, seed_option, threads_option
 from conevo.worlds.registry import WORLDS
 
 if TYPE_CHECKING:
@@ -33,11 +33,7 @@ Try: conevo behaviours runs/hunt
     show_default=True,
     help="Number of scenarios.",
 )
-@click.option(
-    "--seed",
-    type=click.IntRange(0, 2**63 - 1),
-    help="Seed of other scenarios (default: those of the run's own test).",
-)
+@seed_option
 @threads_option
 @device_option
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")

@@ -18,6 +18,10 @@ if TYPE_CHECKING:
 __all__ = ["campaign"]
 
 FAILED = 1  # exit code when runs of a campaign have failed
+threads_option = click.option(
+    "--threads", type=click.IntRange(1, 4096), default=1, show_default=True,
+    help="CPU threads per run; does not change results.",
+)  # fmt: skip
 execution_options = all_of(
     click.option(
         "--executor", default="processes", show_default=True, metavar="NAME",
@@ -26,10 +30,7 @@ execution_options = all_of(
     click.option(
         "--cores", type=click.IntRange(1, 4096), help="CPU cores for all runs (default: all)."
     ),
-    click.option(
-        "--threads", type=click.IntRange(1, 4096), default=1, show_default=True,
-        help="CPU threads per run; does not change results.",
-    ),
+    threads_option,
     click.option(
         "--device", metavar="DEVICES",
         help="cpu, cuda, several that workers use in turn (cuda:0,cuda:1), or auto: all CUDA "
@@ -119,10 +120,7 @@ def start(
 
 @campaign.command(short_help="Write a campaign's runs as a SLURM job array.")
 @plan_options
-@click.option(
-    "--threads", type=click.IntRange(1, 4096), default=1, show_default=True,
-    help="CPU threads per run; does not change results.",
-)  # fmt: skip
+@threads_option
 @click.option(
     "--hours", type=float, default=24.0, show_default=True,
     help="Time limit per task; unfinished runs are requeued.",

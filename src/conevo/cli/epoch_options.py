@@ -49,20 +49,23 @@ def trajectories(
     generation: int | None,
     beside_generation: int | None,
     epoch: int | None,
-    threads: int | None,
-    device: str | None,
+    **how: Any,
 ) -> list[Trajectory]:
     """Return the trajectory that the options select, or both of two teams.
+
+    Args:
+        what, beside, generation, beside_generation, epoch: the argument and options of these names.
+        how: the options threads and device.
 
     Raises:
         UsageError: no such run or file, no team in it, or two of different tasks or scenarios.
     """
     if beside is None and beside_generation is not None:
         raise UsageError("--beside-generation needs --beside RUN")
-    first = _trajectory(what, generation, epoch, threads, device, None)
+    first = _trajectory(what, generation, epoch, None, how)
     if beside is None:
         return [first]
-    second = _trajectory(beside, beside_generation, None, threads, device, first)
+    second = _trajectory(beside, beside_generation, None, first, how)
     for key in ("task", "scenario", "params"):
         if first.about[key] != second.about[key]:
             raise UsageError(f"{what} and {beside} cannot be shown side by side: different {key}s")
@@ -73,9 +76,8 @@ def _trajectory(
     text: str,
     generation: int | None,
     epoch: int | None,
-    threads: int | None,
-    device: str | None,
     like: Trajectory | None,
+    how: dict[str, Any],
 ) -> Trajectory:
     from conevo.cli.lookup import find_run
     from conevo.replay.recording import record
@@ -88,7 +90,6 @@ def _trajectory(
         return Trajectory.load(Path(text))
     run = find_run(text)
     with bar(f"evolving {run.path.name} again") as progress:
-        how: dict[str, Any] = {"threads": threads, "device": device}
         return record(run, generation, epoch or 0, **how, like=like, progress=progress)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -47,7 +47,7 @@ def listing(
     """
     from conevo.cli.format import table
 
-    if subject is not None and what in TABLES:
+    if subject is not None and what in ("worlds", "controllers", "methods"):
         raise UsageError(f"'conevo list {what}' takes no further argument, got {subject!r}")
     if method is not None and what not in ("presets", "settings"):
         raise UsageError(f"'conevo list {what}' takes no --method")
@@ -61,8 +61,10 @@ def listing(
             print_settings(setting_rows(subject, method, preset, controller), as_json)
             return
         rows = preset_rows(subject, method)
+    elif what == "runs":
+        rows = _runs(subject)
     else:
-        rows = TABLES[what]() if what in TABLES else _runs(subject)
+        rows = _worlds() if what == "worlds" else _entries(what)
     if as_json:
         click.echo(json.dumps(rows))
     elif rows:
@@ -100,26 +102,16 @@ def _own_defaults(rows: Rows) -> Iterator[str]:
             yield f"{row['world']}, by default in {_ranges(tuple(names))}: {text}"
 
 
-def _controllers() -> Rows:
+def _entries(what: str) -> Rows:
+    """Return a row for each of the controllers or methods."""
     from conevo.controllers.registry import CONTROLLERS
-
-    return _entries("controller", CONTROLLERS.values())
-
-
-def _methods() -> Rows:
     from conevo.evolution.methods.registry import METHODS
 
-    return _entries("method", METHODS.values())
-
-
-def _entries(what: str, entries: Iterable[Any]) -> Rows:
-    """Return a row for each entry of a registry."""
+    name = what.removesuffix("s")
     return [
-        {what: e.name, "title": e.title, "what": e.summary, "source": e.source} for e in entries
+        {name: entry.name, "title": entry.title, "what": entry.summary, "source": entry.source}
+        for entry in (CONTROLLERS if what == "controllers" else METHODS).values()
     ]
-
-
-TABLES = {"worlds": _worlds, "controllers": _controllers, "methods": _methods}
 
 
 def _runs(folder: str | None) -> Rows:
@@ -149,13 +141,14 @@ def _runs(folder: str | None) -> Rows:
 
 def _progress(runs: Sequence[Run], outlines: Sequence[Outline]) -> str:
     """Return the progress of a run, or of all stages of a shaping."""
-    budgets = [outline.budget_evaluations for outline in outlines]
+    from conevo.runs.outline import budget_of
+
     done = [run.done() for run in runs]
     return progress(
         sum(generations for generations, _ in done),
         sum(outline.generations for outline in outlines),
         sum(evaluations for _, evaluations in done),
-        sum(budgets) if all(budgets) else 0,
+        budget_of(outlines),
     )
 
 

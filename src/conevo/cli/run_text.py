@@ -5,12 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from conevo.cli.format import (
-    castes,
-    neurons,
-    progress,
-    table,
-)
+from conevo.cli.format import castes, neurons, progress, table
 from conevo.cli.testing_text import test_text
 from conevo.controllers.registry import DEFAULT
 from conevo.evolution.methods.registry import title_of

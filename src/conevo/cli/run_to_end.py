@@ -24,6 +24,7 @@ __all__ = [
     "device_option",
     "drop_output",
     "output_options",
+    "seed_option",
     "style_of",
     "threads_option",
     "time_limit_option",
@@ -50,37 +51,36 @@ output_options = all_of(
 )
 
 
-def accept_option(function: Function) -> Function:
-    """Add --accept-other-code to a command that continues runs."""
-    return click.option(
-        "--accept-other-code",
-        is_flag=True,
-        help="Continue results of another version of conevo; show and reports list both.",
-    )(function)
-
-
+accept_option = click.option(
+    "--accept-other-code",
+    is_flag=True,
+    help="Continue results of another version of conevo; show and reports list both.",
+)
 threads_option = click.option(
     "--threads",
     type=click.IntRange(1, 4096),
     help="CPU threads (default: all); does not change results.",
 )
+seed_option = click.option(
+    "--seed",
+    type=click.IntRange(0, 2**63 - 1),
+    help="Seed of other scenarios (default: those of the run's own test).",
+)
 
 
-def device_option(function: Function) -> Function:
-    """Add --device to a command that uses a run's team; None if it is not given."""
+def _known(ctx: click.Context, parameter: click.Parameter, name: str | None) -> str | None:
+    """Return the name of a device; None if it is not given."""
+    from conevo.kernels.devices import refuse_unknown_device
 
-    def known(ctx: click.Context, parameter: click.Parameter, name: str | None) -> str | None:
-        from conevo.kernels.devices import refuse_unknown_device
+    if name is not None:
+        refuse_unknown_device(name)
+    return name
 
-        if name is not None:
-            refuse_unknown_device(name)
-        return name
 
-    return click.option(
-        "--device", metavar="DEVICE", callback=known,
-        help="auto, cpu or cuda (default: that of the run's last session); does not change "
-        "results.",
-    )(function)  # fmt: skip
+device_option = click.option(
+    "--device", metavar="DEVICE", callback=_known,
+    help="auto, cpu or cuda (default: that of the run's last session); does not change results.",
+)  # fmt: skip
 
 
 def drop_output() -> None:
@@ -97,18 +97,17 @@ def style_of(as_json: bool, quiet: bool, verbose: bool) -> str:
     return "live" if sys.stdout.isatty() else "plain"
 
 
-def time_limit_option(function: Function) -> Function:
-    """Add --time-limit to a command; its value is a ``TimeLimit`` that has begun."""
+def _begun(ctx: click.Context, parameter: click.Parameter, text: str | None) -> TimeLimit:
+    """Return the time limit, which begins now."""
+    from conevo.runs.time_limit import TimeLimit, parse_seconds
 
-    def begin(ctx: click.Context, parameter: click.Parameter, text: str | None) -> TimeLimit:
-        from conevo.runs.time_limit import TimeLimit, parse_seconds
+    return TimeLimit(None if text is None else parse_seconds(text))
 
-        return TimeLimit(None if text is None else parse_seconds(text))
 
-    return click.option(
-        "--time-limit", "limit", metavar="TIME", callback=begin,
-        help="Stop cleanly after a time such as 90s, 10m, 1.5h or 2d, with exit code 0.",
-    )(function)  # fmt: skip
+time_limit_option = click.option(
+    "--time-limit", "limit", metavar="TIME", callback=_begun,
+    help="Stop cleanly after a time such as 90s, 10m, 1.5h or 2d, with exit code 0.",
+)  # fmt: skip
 
 
 def carry_on(
@@ -139,6 +138,8 @@ def carry_on(
     plain = f"conevo resume {quoted(found.path)}"
     given = [f" --{name.replace('_', '-')} {value}" for name, value in (length or {}).items()]
     advice = plain + "".join(given)
+    how: dict[str, Any] = {"threads": threads, "device": device}
+    how["accept_other_code"] = accept_other_code
 
     def remark(text: str) -> None:
         click.echo(f"conevo: note: {text}", err=True)
@@ -149,19 +150,10 @@ def carry_on(
         if not isinstance(found, Run):
             of, before = len(found.outlines), len(found.generations()) - len(run.generations())
         if length:
-            run.extend(
-                **length, threads=threads, device=device, accept_other_code=accept_other_code
-            )
+            run.extend(**length, **how)
             advice = plain  # the run has its new length
         with watching(run, style, stage, of, before) as watch:
-            run.resume(
-                time_limit=limit,
-                threads=threads,
-                device=device,
-                watch=watch,
-                remark=remark,
-                accept_other_code=accept_other_code,
-            )
+            run.resume(time_limit=limit, watch=watch, remark=remark, **how)
 
     if not length:
         found.refuse_finished()
@@ -176,11 +168,12 @@ def carry_on(
         if isinstance(found, Run):
             carry(found)
         else:
-            found.carry_on(carry, threads, device, accept_other_code)
+            found.carry_on(carry, **how)
     except (KeyboardInterrupt, BrokenPipeError) as error:
         if isinstance(error, BrokenPipeError):
             drop_output()
-        click.echo(f"interrupted after {_done(found)}; continue with: {advice}", err=True)
+        done = counted(len(found.generations()), "generation")
+        click.echo(f"interrupted after {done}; continue with: {advice}", err=True)
         sys.exit(130)
     except EnvironmentFailure as error:
         raise EnvironmentFailure(f"{error}; once fixed: {advice}") from error
@@ -192,11 +185,6 @@ def carry_on(
             f"another run"
         ) from error
     if found.status != "finished":
-        click.echo(f"time limit reached after {_done(found)}; continue with: {advice}", err=True)
+        done = counted(len(found.generations()), "generation")
+        click.echo(f"time limit reached after {done}; continue with: {advice}", err=True)
     print_end(found, style)
-
-
-def _done(found: Run | Shaping) -> str:
-    """Return the number of finished generations as text."""
-    runs = found.stages if hasattr(found, "stages") else [found]
-    return counted(sum(len(run.generations()) for run in runs), "generation")

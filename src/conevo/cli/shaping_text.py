@@ -26,13 +26,13 @@ def shaping_text(shaping: Shaping, n_rows: int = 0) -> str:
         n_rows: number of generations listed, but at least the first and the last of every stage; 0:
             none.
     """
-    stages = shaping.stages
+    stages, first, last = shaping.stages, shaping.methods[0], shaping.methods[-1]
     state = shaping.status + seal_text(shaping)
     records = shaping.generations()
     seconds = sum(record["seconds"] for record in records)
     parts = [
         title(shaping.outlines[-1]).replace(shaping.outlines[-1].task, span(shaping.tasks))
-        + _after(shaping)
+        + (f", begun by {title_of(first)}" if first != last else "")
         + (controlled(stages[0]) if stages else ""),
         f"{shaping.path}: {state}",
         f"{len(stages)} of {counted(len(shaping.outlines), 'stage')} begun, "
@@ -47,12 +47,6 @@ def shaping_text(shaping: Shaping, n_rows: int = 0) -> str:
     if shaping.status == "interrupted":
         parts += ["", f"Continue it with: conevo resume {quoted(shaping.path)}"]
     return "\n".join(parts)
-
-
-def _after(shaping: Shaping) -> str:
-    """Return the part of a title that names another method of the first stage, if it has one."""
-    first, last = shaping.methods[0], shaping.methods[-1]
-    return f", begun by {title_of(first)}" if first != last else ""
 
 
 def stage_summary(run: Run) -> dict[str, Any]:

@@ -4,15 +4,11 @@ from __future__ import annotations
 
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
 from conevo.cli.browser import open_while_serving
 from conevo.cli.run_to_end import device_option
-
-if TYPE_CHECKING:
-    from conevo.watch.state import Watched
 
 __all__ = ["watch"]
 
@@ -34,10 +30,17 @@ def watch(what: str | None, port: int, device: str | None, no_browser: bool) -> 
 
     Try: conevo watch runs/first
     """
+    from conevo.campaigns.campaign import CAMPAIGNS
+    from conevo.cli.lookup import campaign_at, find
     from conevo.kernels.devices import device_here
+    from conevo.runs.run import RUNS
     from conevo.watch.server import serve
+    from conevo.watch.state import Watched
 
-    watched = _watched(what)
+    if what is None:
+        watched = Watched(folders=[RUNS, CAMPAIGNS])
+    else:
+        watched = Watched([(campaign_at(what) or find(what)).path])
     if device is not None:
         device_here(device)
 
@@ -47,18 +50,6 @@ def watch(what: str | None, port: int, device: str | None, no_browser: bool) -> 
             open_while_serving(address)
 
     serve(watched, port, lambda label: _champion_page(*watched.champion(label), device), on_ready)
-
-
-def _watched(what: str | None) -> Watched:
-    """Return the runs and campaigns to follow."""
-    from conevo.campaigns.campaign import CAMPAIGNS
-    from conevo.cli.lookup import campaign_at, find
-    from conevo.runs.run import RUNS
-    from conevo.watch.state import Watched
-
-    if what is None:
-        return Watched(folders=[RUNS, CAMPAIGNS])
-    return Watched([(campaign_at(what) or find(what)).path])
 
 
 @lru_cache(maxsize=8)
