@@ -53,9 +53,7 @@ def trajectories(
 ) -> list[Trajectory]:
     """Return the trajectory that the options select, or both of two teams.
 
-    Args:
-        what, beside, generation, beside_generation, epoch: the argument and options of these names.
-        how: the options threads and device.
+    The arguments have the options' names; ``how`` are threads and device.
 
     Raises:
         UsageError: no such run or file, no team in it, or two of different tasks or scenarios.
