@@ -146,6 +146,8 @@ PLAYED = {
              "reset", "depend on the previous epoch in the same memory; reset leaves"),
     "constant": ("resolve", "team.fitness[i] = 0.5", "random teams",
                  "all 100 have the same fitness: there is nothing to select on"),
+    "late": ("outcome", "team.fitness[0] = 2.0", "values",
+             "outcome writes fitness, which must be right after each iteration: write it in"),
     "again": ("outcome", "team.kept[0] = team.kept[0] + 1.0; team.performance[0] = team.kept[0]",
               "record", "performance differs from that of evaluate"),
 }  # fmt: skip

@@ -6,7 +6,7 @@ import pytest
 from conevo.rng import fold
 from conevo.worlds.registry import world
 from conevo.worlds.rollout import Rollout
-from conevo.worlds.stepping import Stepper
+from conevo.worlds.walk import Walk
 from worlds.test_rover import crowd, random_team
 
 ONE_ROCK = {"rocks_per_activation": 1, "fitness": "activation"}
@@ -58,9 +58,7 @@ def test_lanes_agree_on_the_one_rock_of_an_activation(cpu_blocks):
 def test_cached_values_change_nothing(options):
     """Rovers that compute everything again in each iteration agree bit for bit."""
     a_world, (genes, slots, scenarios, heuristic) = meeting(12, 60, **options)
-    kept, fresh = (
-        Stepper(a_world, genes, slots[None], scenarios, heuristic[None]) for _ in range(2)
-    )
+    kept, fresh = (Walk(a_world, genes, slots[None], scenarios, heuristic[None]) for _ in range(2))
     others = (2**12 - 1) ^ (1 << np.arange(12, dtype=np.uint64))
     for step, t in kept.epoch(a_world.params.iterations):
         arrays = fresh.arrays()

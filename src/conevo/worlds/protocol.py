@@ -74,7 +74,8 @@ class Simulation:
     scene: struct type of a scenario; its arrays are those of the scenarios object, by name: flat
         over the scenarios, or of two and more dimensions if all scenarios share them.
     params_type, params: struct type of the parameters, and the parameters.
-    functions: the phases of an epoch: reset, sense, act, commit, resolve, outcome. A world in which
+    functions: the phases of an epoch: reset, sense, act, commit, resolve, outcome. The last one
+        writes ``performance``; all other results are right after each iteration. A world in which
         robots share something also has settle, once for the team between commit and resolve.
         Within a phase, robots visited in any order must give the same results bit for bit. In
         place of a function for one robot, a world may have phases over other items

@@ -13,7 +13,7 @@ from conevo.rng import stream
 from conevo.worlds.contract import dimensions_of
 from conevo.worlds.measures import measures_of
 from conevo.worlds.protocol import Scenarios, World
-from conevo.worlds.stepping import Arrays, Order, Stepper
+from conevo.worlds.walk import Arrays, Order, Walk
 
 __all__ = ["Trial"]
 
@@ -47,13 +47,14 @@ class Trial:
         self.world = world
         self._task = (world, genes, teams, scenarios, heuristic)
         self._n_teams, self._heuristic = len(teams), heuristic
-        self.plain = Stepper(*self._task)
+        self.plain = Walk(*self._task)
         self.n_worlds = self.plain.n_worlds
         self._simulation = world.simulation()
         self._has_phases = isinstance(self._simulation.functions["sense"], tuple)
         self._order: list[str] = []
         self._sensors: list[str] = []
         self._counts: list[str] = []
+        self._changed_at_end: list[str] = []
         self._executed = np.zeros((self.n_worlds, world.n_robots, len(world.actions)), int)
         self._switched = np.zeros((self.n_worlds, world.n_robots), int)
         self._action = np.full((self.n_worlds, world.n_robots), -1, np.int32)
@@ -62,30 +63,35 @@ class Trial:
         """Run the epochs; an index outside its array ends the process. It yields often."""
         plain, iterations = self.plain, self.world.params.iterations
         robots = stream(1, "check", "order")
-        others = {"reverse": Stepper(*self._task), "random": Stepper(*self._task)}
+        others = {"reverse": Walk(*self._task), "random": Walk(*self._task)}
         for name in ("fitness", "performance"):
-            for stepper in (plain, *others.values()):
-                stepper.arrays()[name][:] = SENTINEL
+            for walk in (plain, *others.values()):
+                walk.arrays()[name][:] = SENTINEL
         for step, t in plain.epoch(iterations):
             if step == "sense" and t in (0, 1, iterations // 2) and not self._has_phases:
                 self._look_at_sensors(t)
             before = {name: values.copy() for name, values in plain.arrays().items()}
             yield
             plain.step(step, plain.natural, t)
-            for kind, stepper in list(others.items()):
+            for kind, walk in list(others.items()):
                 order = plain.natural
                 if kind == "reverse":
                     order = order[:, ::-1]
                 elif kind == "random":
                     order = robots.permuted(order, axis=1)
                 yield
-                stepper.step(step, order, t)
-                if found := self._differences(plain.arrays(), stepper.arrays()):
+                walk.step(step, order, t)
+                if found := self._differences(plain.arrays(), walk.arrays()):
                     del others[kind]
                     if not self._order:
                         self._explain_order(step, t, found, before)
             if step == "resolve":
                 self._count(plain.arrays()["action"])
+            elif step == "outcome":
+                now = plain.arrays()
+                for name in ("fitness", "counts", "switches"):
+                    if before[name].tobytes() != now[name].tobytes():
+                        self._changed_at_end.append(name)
 
     def _count(self, action: npt.NDArray[np.int32]) -> None:
         """Add the actions executed in one iteration to the counts that the world must have."""
@@ -131,7 +137,7 @@ class Trial:
             f"{step} gives other results if robots are visited in another order "
             f"({', '.join(f'`{name}`' for name in names)} differ in iteration {t})"
         )
-        probe, r = Stepper(*self._task), self.world.n_robots
+        probe, r = Walk(*self._task), self.world.n_robots
         probe.step("reset", probe.natural)  # loads the networks
         arrays = probe.arrays()
         named = dimensions_of(self._simulation)
@@ -188,6 +194,11 @@ class Trial:
             yield "fitness is never written: every robot gets one in reset or resolve"
         elif bad := int((~np.isfinite(arrays["fitness"])).sum()):
             yield f"fitness is not finite: {bad} of {arrays['fitness'].size} values"
+        for name in self._changed_at_end:
+            yield (
+                f"outcome writes {name}, which must be right after each iteration: write it in "
+                f"resolve; outcome writes performance"
+            )
         for k, measure in enumerate(measures_of(self.world)):
             values = arrays["performance"][:, k]
             if (np.ascontiguousarray(values).view(np.uint32) == mark).any():
@@ -215,11 +226,11 @@ class Trial:
             yield "no robot ever executes an action"
 
     def _of_reset(self) -> Iterator[str]:
-        used, fresh = Stepper(*self._task), Stepper(*self._task)
+        used, fresh = Walk(*self._task), Walk(*self._task)
         for name, values in used.arrays().items():
             values[:] = self.plain.arrays()[name][::-1]
-        for stepper in (used, fresh):
-            stepper.step("reset", stepper.natural)
+        for walk in (used, fresh):
+            walk.step("reset", walk.natural)
         left = self._differences(used.arrays(), fresh.arrays())
         for step, t in used.epoch(self.world.params.iterations):
             used.step(step, used.natural, t)
@@ -256,7 +267,7 @@ class Trial:
         """
         world, genes, teams, scenarios, heuristic = self._task
         nobody = np.full_like(teams[:1], -1), scenarios, np.full_like(heuristic[:1], -1)
-        idle = Stepper(world, genes, *nobody)
+        idle = Walk(world, genes, *nobody)
         for step, t in idle.epoch(world.params.iterations):
             idle.step(step, idle.natural, t)
         ended, all_ended = idle.arrays(), self.plain.arrays()

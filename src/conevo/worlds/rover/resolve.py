@@ -15,6 +15,7 @@ from conevo.worlds.rover.state import (
     N_SETTINGS,
     NO_PICK,
     PARTS,
+    PRODUCT,
     ROCK_CELLS,
     UNIT,
     RoverConstants,
@@ -26,7 +27,7 @@ from conevo.worlds.rover.state import (
     rock_cell,
 )
 
-__all__ = ["RESOLVE", "RESOLVE_ONE_ROCK", "forget"]
+__all__ = ["CREDIT_TOTAL", "RESOLVE", "RESOLVE_ONE_ROCK", "forget"]
 
 ORDER = wp.constant(64)  # counter for the order of taking rocks, above every rover's number
 ROCK_BITS = wp.constant(wp.int64(20))
@@ -306,6 +307,16 @@ def credit_one(team: RoverTeam, scene: RoverScene, p: RoverConstants, q: int, t:
     team.pick[team.detecting[q]] = NO_PICK
 
 
+@wp.func
+def credit_total(team: RoverTeam, scene: RoverScene, p: RoverConstants, i: int, t: int) -> None:
+    """Make rover ``i``'s fitness the value that it has detected, or this times its area."""
+    value = team.value[i]
+    if p.fitness_reading == PRODUCT:
+        value = value * float(team.covered[i]) / float(COVER_CELLS * COVER_CELLS)
+    team.fitness[i] = value
+
+
+CREDIT_TOTAL = Phase(credit_total)
 RESOLVE = (Phase(enlist), Phase(detect, n_detecting), Phase(credit, n_crediting))
 RESOLVE_ONE_ROCK = (
     Phase(enlist),

@@ -27,7 +27,6 @@ __all__ = [
     "SCANNING",
     "SURVEYED",
     "UNIT",
-    "VALUE",
     "RoverConstants",
     "RoverScene",
     "RoverTeam",
@@ -55,7 +54,6 @@ DETECTING = wp.constant(2)
 FITNESS = ("cumulative", "activation", "product", "value")
 ACTIVATION = wp.constant(1)
 PRODUCT = wp.constant(2)
-VALUE = wp.constant(3)
 
 NO_PICK = wp.constant(wp.int64(2**62))
 

@@ -67,14 +67,13 @@ from conevo.worlds.rover import canals, rocks
 from conevo.worlds.rover.act import fail
 from conevo.worlds.rover.dynamics import (
     FITNESS,
-    FUNCTIONS,
     LISTS,
-    ONE_ROCK,
     SCRATCH,
     SURVEYED,
     RoverConstants,
     RoverScene,
     RoverTeam,
+    functions,
 )
 from conevo.worlds.rover.sites import N_REGIONS, draw_rocks, rock_sites
 
@@ -295,7 +294,7 @@ class RoverWorld:
             params_type=RoverConstants,
             params=kernel_params(RoverConstants, self.params, signed_inputs=0, **self._reaches()),
             functions=disturbed(
-                ONE_ROCK if self.params.rocks_per_activation else FUNCTIONS,
+                functions(self.params.rocks_per_activation, self.params.fitness),
                 (RoverTeam, RoverScene, RoverConstants),
                 self.params,
                 fail,

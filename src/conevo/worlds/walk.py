@@ -21,7 +21,7 @@ from conevo.worlds.episode import Job, given_to_think
 from conevo.worlds.protocol import Scenarios, World
 from conevo.worlds.rollout import Rollout
 
-__all__ = ["STEPS", "Stepper"]
+__all__ = ["STEPS", "Walk"]
 
 STEPS = ("reset", "sense", "think", "act", "commit", "settle", "resolve", "outcome")
 Order = npt.NDArray[np.int32]
@@ -29,7 +29,7 @@ Arrays = dict[str, npt.NDArray[Any]]
 
 
 @cache
-def _stepping_kernel(
+def _walking_kernel(
     State: Any,
     Scene: Any,
     Params: Any,
@@ -97,7 +97,7 @@ def _stepping_kernel(
     return step
 
 
-class Stepper(Rollout):
+class Walk(Rollout):
     """Runs the teams of one batch phase by phase, each in each scenario: B worlds in all.
 
     Args:
@@ -119,7 +119,7 @@ class Stepper(Rollout):
         super().__init__(world, n_threads=1)
         sim, mind = self._simulation, self._mind
         with engine.building:
-            self._kernel = _stepping_kernel(
+            self._kernel = _walking_kernel(
                 *(sim.state, sim.scene, sim.params_type),
                 *(mind.weights, mind.memory, mind.shape_type, mind.clear, mind.think),
                 tuple(stages_of(sim).values()),
