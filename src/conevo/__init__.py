@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from conevo.worlds.protocol import World
     from conevo.worlds.registry import WORLDS, world
     from conevo.worlds.rollout import Rollout
+    from conevo.worlds.stepper import Stepper
 
     __version__: str
 
@@ -42,6 +43,7 @@ __all__ = [
     "Rollout",
     "Run",
     "Scores",
+    "Stepper",
     "Trials",
     "UsageError",
     "World",
@@ -64,6 +66,7 @@ _HOMES = {
     "Rollout": "worlds.rollout",
     "Run": "runs.run",
     "Scores": "evolution.protocol",
+    "Stepper": "worlds.stepper",
     "Trials": "evolution.protocol",
     "UsageError": "errors",
     "World": "worlds.protocol",

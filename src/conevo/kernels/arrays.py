@@ -9,9 +9,10 @@ from collections.abc import Callable, Mapping
 from math import prod
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
+import numpy.typing as npt
 import warp as wp
 
-__all__ = ["allocate", "dimensions", "named_arrays", "shapes"]
+__all__ = ["allocate", "dimensions", "first_parts", "named_arrays", "shapes"]
 
 Names = tuple[str, ...]
 
@@ -60,3 +61,13 @@ def allocate(struct: Any, shape_of: Mapping[str, tuple[int, ...]], n: int, devic
         size = n * prod(shape[: len(shape) - len(apart)])
         setattr(made, name, wp.zeros((size, *apart), dtype=kind.dtype, device=device))
     return made
+
+
+def first_parts(array: Any, n: int, shape: tuple[int, ...]) -> npt.NDArray[Any]:
+    """Return a copy of the first ``n`` parts of a batch, each of a shape."""
+    values: npt.NDArray[Any]
+    if array.device.is_cpu:
+        values = array.numpy().reshape(-1, *shape)[:n].copy()
+    else:  # cut on the device, so that only these parts are fetched
+        values = array[: n * prod(shape) // prod(array.shape[1:])].numpy().reshape(n, *shape)
+    return values

@@ -7,7 +7,6 @@ workspace run in parts.
 
 import logging
 from dataclasses import dataclass
-from math import prod
 from typing import Any, Self
 
 import numpy as np
@@ -17,16 +16,14 @@ import warp as wp
 from conevo.controllers.protocol import Controller
 from conevo.controllers.registry import controller as make_controller
 from conevo.controllers.registry import genome_of, refuse_misfit
-from conevo.errors import UsageError
 from conevo.kernels import engine
-from conevo.kernels.arrays import allocate, dimensions, shapes
-from conevo.kernels.devices import device_here
-from conevo.kernels.threads import threads_of
+from conevo.kernels.arrays import allocate, dimensions, first_parts, shapes
 from conevo.kernels.views import SHARED_BYTES, near_arrays
 from conevo.terms import counted
-from conevo.worlds.contract import refuse_faults, scenario_faults, shapes_of, stages_of
+from conevo.worlds.contract import stages_of
 from conevo.worlds.episode import Job, episode_kernel, loading_kernel
 from conevo.worlds.measures import measures_of
+from conevo.worlds.on_device import WorldOnDevice
 from conevo.worlds.protocol import Outcome, Scenarios, World
 
 __all__ = ["Rollout"]
@@ -53,7 +50,7 @@ class _Workspace:
     weights: Any
 
 
-class Rollout:
+class Rollout(WorldOnDevice):
     """Runs teams in one world.
 
     Args:
@@ -83,40 +80,30 @@ class Rollout:
         timed: bool = False,
         shared_bytes: int = SHARED_BYTES,
     ) -> None:
-        engine.start()
-        if not hasattr(world, "simulation"):
-            raise UsageError(
-                f"world {world.name} is not written in Warp: its own simulator(...) plays it"
-            )
-        self.world = world
+        super().__init__(world, n_threads, device, lanes)
         self.controller = controller or make_controller(world=world)
-        self.device = device = device_here(device)
-        self.n_threads = threads_of(n_threads)
-        self._chunk = CHUNK if device == "cpu" else CUDA_CHUNK
+        self._chunk = CHUNK if self.device == "cpu" else CUDA_CHUNK
         with engine.building:
-            self._simulation = world.simulation()
-            refuse_faults(world, self._simulation)
-            self.lanes = lanes or (1 if device == "cpu" else self._simulation.lanes)
             refuse_misfit(self.controller, world)
             self.genome = genome_of(self.controller, world)
             self._mind = self.controller.mind(len(world.inputs), len(world.outputs))
             mind = self._mind
             self._loading = loading_kernel(mind)
-        self._shapes = shapes_of(world, self._simulation)
         sizes = {"robots": world.n_robots, "team": 1} | mind.sizes
         self._mind_shapes = {
             struct: shapes(dimensions(struct, lambda _: ("robots",)), sizes)
             for struct in (mind.memory, mind.weights)
         }
-        if device == "cpu":
+        if self.device == "cpu":
             with engine.building:
                 self._kernel = episode_kernel(self._simulation, mind, timed)
         else:
             self._kernel = self.cuda_form(self.lanes, timed, shared_bytes)
         stages = stages_of(self._simulation).items()
         self._phases = ["think", *(f"{at} {one.name}" for at, those in stages for one in those)]
-        self._clock = wp.zeros(len(self._phases) if timed else 0, dtype=wp.int64, device=device)
-        self._one_scenario: Scenarios | None = None  # of this world: an example for others
+        self._clock = wp.zeros(
+            len(self._phases) if timed else 0, dtype=wp.int64, device=self.device
+        )
         self._is_built = False
         self._workspace: _Workspace | None = None
 
@@ -257,22 +244,12 @@ class Rollout:
             job.t_begin, job.t_end = t, t + 1
             self._launch(batch, scene, job, 1)
             for name in names:
-                steps[name].append(self._read(batch, name, 1)[0])
-            seen = _first(getattr(batch.memory, mind.probe), 1, probe)[0]
+                steps[name].append(self._read(batch.state, name, 1)[0])
+            seen = first_parts(getattr(batch.memory, mind.probe), 1, probe)[0]
             steps["hidden"].append(seen[:, : self.genome.max_parts])
-        final = {n: self._read(batch, n, 1)[0] for n in self._simulation.recorded_at_end}
+        final = {n: self._read(batch.state, n, 1)[0] for n in self._simulation.recorded_at_end}
         seen = {name: np.stack(values) for name, values in steps.items()} | final
         return seen, self._outcome(self._collect(batch, 1, 1), 1, 1)
-
-    def _refuse_faulty(self, scenarios: Scenarios) -> None:
-        """Raise UsageError for scenarios that are not those of the world's scene."""
-        n = len(getattr(scenarios, "seed", ()))
-        if isinstance(getattr(scenarios, "seed", None), np.ndarray) and not n:
-            raise UsageError(f"world {self.world.name}: there must be at least one scenario")
-        if self._one_scenario is None:
-            self._one_scenario = self.world.scenarios([0])
-        for fault in scenario_faults(self._simulation.scene, scenarios, n, self._one_scenario):
-            raise UsageError(f"world {self.world.name}: scenarios: {fault}")
 
     def _checked(
         self,
@@ -299,24 +276,6 @@ class Rollout:
             np.ascontiguousarray(teams, dtype=np.int32),
             np.ascontiguousarray(heuristic, dtype=np.int32),
         )
-
-    def _scene(self, scenarios: Scenarios) -> Any:
-        scene = self._simulation.scene()
-        for name in self._simulation.scene.vars:
-            values = getattr(scenarios, name)
-            setattr(scene, name, self._array(values if self.is_shared(name) else values.ravel()))
-        return scene
-
-    def is_shared(self, name: str) -> bool:
-        """Return whether all scenarios have a field of theirs in common."""
-        field = self._simulation.scene.vars.get(name)
-        return field is not None and field.type.ndim > 1
-
-    def _array(self, values: npt.NDArray[Any]) -> Any:
-        dtype = wp.dtype_from_numpy(values.dtype)
-        values = np.ascontiguousarray(values)  # views are made from pointers, without strides
-        with engine.memory_named(self.device):
-            return wp.array(values, dtype=dtype, device=self.device, copy=self.device != "cpu")
 
     def _job(self, n_scenes: int, n_scenarios: int, teams_per_round: int) -> Any:
         job = Job()
@@ -373,10 +332,6 @@ class Rollout:
         assert self._workspace is not None
         return self._workspace
 
-    def _read(self, batch: _Workspace, name: str, n: int) -> npt.NDArray[Any]:
-        """Return a copy of an array of the first ``n`` worlds' state, [n, its dimensions]."""
-        return _first(getattr(batch.state, name), n, self._shapes[name])
-
     def _load(self, batch: _Workspace, pool: Any, teams: npt.NDArray[np.int32]) -> None:
         """Build the controllers of some teams."""
         inputs = [batch.weights, self._mind.shape, pool, self._array(teams), batch.n_teams]
@@ -395,7 +350,7 @@ class Rollout:
 
     def _collect(self, batch: _Workspace, n_teams: int, e: int) -> dict[str, npt.NDArray[Any]]:
         names = ("fitness", "counts", "switches", "performance")
-        return {name: self._read(batch, name, n_teams * e) for name in names}
+        return {name: self._read(batch.state, name, n_teams * e) for name in names}
 
     def _outcome(self, arrays: dict[str, npt.NDArray[Any]], n: int, e: int) -> Outcome:
         """Return the arrays of ``_collect`` for n teams in e scenarios as their outcome."""
@@ -407,13 +362,3 @@ class Rollout:
             switches=arrays["switches"].reshape(n, e, r),
             performance={one.name: performance[:, :, k] for k, one in enumerate(measures)},
         )
-
-
-def _first(array: Any, n: int, shape: tuple[int, ...]) -> npt.NDArray[Any]:
-    """Return a copy of the first ``n`` parts of a batch, each of a shape."""
-    values: npt.NDArray[Any]
-    if array.device.is_cpu:
-        values = array.numpy().reshape(-1, *shape)[:n].copy()
-    else:  # cut on the device, so that only these parts are fetched
-        values = array[: n * prod(shape) // prod(array.shape[1:])].numpy().reshape(n, *shape)
-    return values
