@@ -1,7 +1,7 @@
 """Launches that are repeated thousands of times: recorded once, on threads that are kept.
 
-``engine.launch`` prepares its arguments and its threads anew, which takes longer than a step of a
-single world.
+``engine.launch`` prepares its arguments and its threads each time, which takes longer than a step
+of a single world.
 """
 
 import os

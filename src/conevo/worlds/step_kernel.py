@@ -15,7 +15,7 @@ from conevo.worlds.protocol import Simulation
 
 __all__ = ["FINISH", "RESET", "STEP", "StepJob", "step_kernel"]
 
-# What a launch does with its worlds.
+# The tasks of a launch.
 STEP = wp.constant(0)
 RESET = wp.constant(1)
 FINISH = wp.constant(2)
@@ -24,7 +24,7 @@ MOST = wp.constant(2**20)  # numbers of a place of ``uniform``
 
 @wp.struct
 class StepJob:
-    """What all launches of a stepper have in common.
+    """The arguments that all launches of a stepper share.
 
     at: [n] the worlds that are reset or finished. given: [n] scenario of each world that is reset,
     -1 for one drawn from the pool. scenario: [n] scenario that each world plays. epochs: [n] how
@@ -47,7 +47,7 @@ class StepJob:
 
 @wp.func
 def drawn(job: StepJob, b: int) -> int:
-    """Return the scenario of world ``b``'s next epoch, which depends on nothing but its address."""
+    """Return the scenario of world ``b``'s next epoch, from its address alone."""
     epoch = job.epochs[b]
     u = uniform(job.seed, epoch % MOST, epoch // MOST, b)
     return wp.min(int(u * float(job.n_scenarios)), job.n_scenarios - 1)
