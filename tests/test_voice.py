@@ -36,6 +36,7 @@ CHECKED = (
     "src/conevo/replay/**/*.py",
     "src/conevo/runs/*.py",
     "src/conevo/report/**/*.py",
+    "src/conevo/simulators/**/*.py",
     "src/conevo/specialization/*.py",
     "src/conevo/studies/*.py",
     "src/conevo/watch/*.py",

@@ -1,4 +1,4 @@
-"""Python files outside the package, worlds and methods: run once, and identified by their texts.
+"""Python files outside the package, such as worlds: run once, and identified by their texts.
 
 Such a file may import other files of its folder. A digest identifies the texts of all of them. A
 run keeps it, so that it is never resumed with other texts. The digest also covers everything that a
@@ -26,10 +26,15 @@ from typing import Any, Literal, TypeVar, cast
 from conevo.errors import EnvironmentFailure, UsageError, unknown_name
 from conevo.reading import read_bytes, refuse_wide
 
-__all__ = ["entry_of", "files_of", "is_outside", "line_of", "takes"]
+__all__ = ["entry_of", "files_of", "is_outside", "line_of", "source_of", "takes"]
 
 MOST_BYTES = 2**20  # of a text
-OWN = {"world": "conevo_world_", "method": "conevo_method_"}  # prefixes of their modules' names
+OWN = {  # prefixes of their modules' names
+    "world": "conevo_world_",
+    "method": "conevo_method_",
+    "labels": "conevo_labels_",
+}
+Sort = Literal["world", "method", "labels"]
 _loading = threading.RLock()
 
 Entry = TypeVar("Entry")
@@ -50,7 +55,7 @@ class Source:
     digest: str
 
 
-def _load(path: Path, kind: Literal["world", "method"], digest: str = "") -> Source:
+def source_of(path: Path, kind: Sort, digest: str = "") -> Source:
     """Return a file, run once in a process for each version of its and its neighbours' texts.
 
     Args:
@@ -78,7 +83,7 @@ def _load(path: Path, kind: Literal["world", "method"], digest: str = "") -> Sou
 
 def entry_of(
     path: Path,
-    kind: Literal["world", "method"],
+    kind: Sort,
     entry_class: type[Entry],
     classes: tuple[str, str],
     problem: Callable[[Entry, ModuleType], str],
@@ -97,7 +102,7 @@ def entry_of(
     Raises:
         UsageError: a file cannot be read or run, has no entry, or they have another digest.
     """
-    source = _load(path, kind, digest)
+    source = source_of(path, kind, digest)
     entry = getattr(source.module, "ENTRY", None)
     if entry is None:
         wrong = f"it has no ENTRY, the {entry_class.__name__} of its {kind}"

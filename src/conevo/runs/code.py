@@ -34,6 +34,7 @@ DECIDING = (
     "outside.py",
     "kernels",
     "worlds",
+    "simulators",
     "controllers",
     "specialization",
     "evolution",
@@ -133,9 +134,15 @@ def refuse_other_kernels(path: Path, provenance: Record, fingerprint: str) -> No
         provenance: of the run.
         fingerprint: of the simulator here.
     """
-    if fingerprint != provenance["kernel_hash"]:
+    made = provenance["kernel_hash"]
+    if fingerprint != made and " " in made:  # of a task of another package
         raise UsageError(
-            f"{path} was made with other kernels ({provenance['kernel_hash']}, here "
+            f"{path} was made with {made}, and here is {fingerprint}: install the versions that "
+            f"made it, or start another run with 'conevo run --config {quoted(path / CONFIG)}'"
+        )
+    if fingerprint != made:
+        raise UsageError(
+            f"{path} was made with other kernels ({made}, here "
             f"{fingerprint}): install conevo {provenance['conevo']} and warp-lang "
             f"{provenance['warp']}, or start another run with "
             f"'conevo run --config {quoted(path / CONFIG)}'"

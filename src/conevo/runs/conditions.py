@@ -93,8 +93,8 @@ def _changed(
 ) -> RunConfig:
     """Return the configuration with another environment and other settings of the world."""
     address = config.address if on is None else on
-    if "/" not in address and ".py:" not in address:
-        address = config.entry.address(address)
+    if on is not None and "/" not in on and ":" not in on:
+        address = config.entry.address(on)
     there = resolve(address, config.method_entry.address, config.preset)
     known = [field.name for field in fields(there.world_params)]
     settings = {}

@@ -43,10 +43,14 @@ class Portrait:
 
 @dataclass(frozen=True)
 class Evaluation:
-    """Scores of a batch of trials, with their outcome."""
+    """Scores of a batch of trials, with their outcome.
+
+    steps: iterations that teams were played, in all; None: those of whole epochs.
+    """
 
     scores: Scores
     outcome: Outcome
+    steps: int | None = None
 
 
 Evaluate = Callable[[Trials], Evaluation]
@@ -116,13 +120,16 @@ def play(
     """
     outcome = simulator.evaluate(genes, teams, scenarios, rounds=rounds)
     if credit != "difference":
-        return Evaluation(score(outcome, credit), outcome)
-    rest = [
-        _value(simulator.evaluate(genes, without(teams, robot), scenarios, rounds=rounds))
-        for robot in range(teams.shape[1])
-    ]
+        return Evaluation(score(outcome, credit), outcome, _steps(outcome))
+    steps, rest = _steps(outcome), []
+    for robot in range(teams.shape[1]):
+        played = simulator.evaluate(genes, without(teams, robot), scenarios, rounds=rounds)
+        rest.append(_value(played))
+        more = _steps(played)
+        steps = None if steps is None or more is None else steps + more
     fitness = _value(outcome)[:, None] - np.stack(rest, axis=1)
-    return Evaluation(replace(score(outcome), fitness=fitness, plays=1 + len(rest)), outcome)
+    scores = replace(score(outcome), fitness=fitness, plays=1 + len(rest))
+    return Evaluation(scores, outcome, steps)
 
 
 def without(teams: npt.NDArray[np.int32], robot: int) -> npt.NDArray[np.int32]:
@@ -130,6 +137,11 @@ def without(teams: npt.NDArray[np.int32], robot: int) -> npt.NDArray[np.int32]:
     rest = teams.copy()
     rest[:, robot] = -1
     return rest
+
+
+def _steps(outcome: Outcome) -> int | None:
+    """Return the iterations that all teams were played, None if all epochs are whole."""
+    return None if outcome.steps is None else int(outcome.steps.sum())
 
 
 def _value(outcome: Outcome) -> FloatArray:

@@ -1,9 +1,10 @@
-"""The files that a run needs besides conevo, copied into it: its world's and method's, its prey.
+"""The files that a run needs besides conevo, copied into it: its world's, its method's, others.
 
 A value with a digest next to it names a file, as ``world`` and ``world_digest`` in ``[run]``, so do
 ``method`` and ``method_digest``,
-``prey`` and ``prey_digest`` in ``[world]``. The copies are named from the directory, so that it can
-be moved, and looked at where the original files are changed or gone.
+``prey`` and ``prey_digest`` in ``[world]``. It may name a part of the file, "FILE.py:NAME". The
+copies are named from the directory, so that it can be moved, and looked at where the original files
+are changed or gone.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from conevo.errors import UsageError
+from conevo.outside import files_of
 from conevo.reading import read_bytes
 from conevo.runs.durable import replace_file, writing
 
@@ -49,8 +51,12 @@ def keep_inputs(config: RunConfig, directory: Path) -> RunConfig:
         method = load_method(_copied(method.files, folder), method.digest)
     for field in dataclasses.fields(params):
         if getattr(params, f"{field.name}_digest", ""):
-            kept = copy_input(Path(getattr(params, field.name)), folder)
-            params = dataclasses.replace(params, **{field.name: str(kept)})
+            file, name = getattr(params, field.name), ""
+            if ".py:" in file:
+                file, _, name = file.rpartition(":")
+            files = files_of(Path(file)) if name else [Path(file)]
+            kept = f"{_copied(map(str, files), folder)}{f':{name}' if name else ''}"
+            params = dataclasses.replace(params, **{field.name: kept})
     if (entry, method, params) == (config.entry, config.method_entry, config.world_params):
         return config
     return dataclasses.replace(config, entry=entry, method_entry=method, world_params=params)

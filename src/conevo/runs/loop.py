@@ -66,11 +66,11 @@ def evolve_generations(
         if not has_time():
             return "time"
         started = time.perf_counter()
-        finished = _run_generation(method, state, evaluate, portray, settings)
+        finished = _run_generation(method, state, evaluate, portray, settings, iterations)
         if finished is None:
             return "budget"
-        began, (state, portrait, epochs) = state.progress, finished
-        steps = epochs * iterations + (last["team_steps"] if last else 0)
+        began, (state, portrait, steps) = state.progress, finished
+        steps += last["team_steps"] if last else 0
         seconds = time.perf_counter() - started
         last = _record(method, began, state.progress, portrait, steps, seconds)
         on_generation(state, last)
@@ -213,29 +213,32 @@ def _run_generation(
     evaluate: Evaluate,
     portray: Callable[[Outcome], Portrait],
     settings: RunSettings,
+    iterations: int,
 ) -> tuple[State, Portrait | None, int] | None:
     """Return the results of one generation, None if the budget does not pay for it.
 
-    These are the next state, the portrait of the fittest team, and the number of simulated epochs.
+    These are the next state, the portrait of the fittest team, and the number of team-steps, which
+    are the iterations that teams were played: fewer where epochs end early.
 
     Choice: trials that the budget cannot pay are not begun, and a generation that could not be
     finished does not count, so that a run never spends more than its budget.
     """
     generation, budget = state.progress.generation, settings.budget_evaluations
     portrait: Portrait | None = None
-    epochs = 0
+    steps = 0
     while state.progress.generation == generation:
         trials = _asked(method, state)
         n_teams = len(trials.teams) * settings.plays(trials.teams.shape[1])
         if budget and state.progress.team_evaluations + n_teams > budget:
             return None
         is_fixed = trials.scenarios == "fixed"
-        epochs += n_teams * (settings.fittest_epochs if is_fixed else settings.epochs)
+        epochs = n_teams * (settings.fittest_epochs if is_fixed else settings.epochs)
         evaluation = evaluate(trials)
+        steps += epochs * iterations if evaluation.steps is None else evaluation.steps
         if trials.portrait:
             portrait = portray(evaluation.outcome)
         state = _told(method, state, trials, evaluation.scores)
-    return state, portrait, epochs
+    return state, portrait, steps
 
 
 def _record(

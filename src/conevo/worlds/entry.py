@@ -51,7 +51,7 @@ class WorldEntry:
     @property
     def short_name(self) -> str:
         """The name without its version, as in "rover"."""
-        return self.name.rpartition("-v")[0]
+        return self.name.rpartition("-v")[0] or self.name
 
     @property
     def params_class(self) -> type[Any]:

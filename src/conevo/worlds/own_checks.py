@@ -101,15 +101,19 @@ def _joined(parts: list[Outcome]) -> Outcome:
         name: np.concatenate([one.performance[name] for one in parts])
         for name in parts[0].performance
     }
-    return Outcome(**names, performance=performance)
+    steps = [one.steps for one in parts if one.steps is not None]
+    return Outcome(**names, performance=performance, steps=np.concatenate(steps) if steps else None)
 
 
 def _same(one: Outcome, other: Outcome) -> bool:
     """Return whether two outcomes are the same, bit for bit."""
-    arrays = [
+    if (one.steps is None) != (other.steps is None):
+        return False
+    arrays: list[Any] = [
         (one.fitness, other.fitness),
         (one.counts, other.counts),
         (one.switches, other.switches),
+        *([] if one.steps is None or other.steps is None else [(one.steps, other.steps)]),
         *((values, other.performance[name]) for name, values in one.performance.items()),
     ]
     return all(np.array_equal(a, b) and a.dtype == b.dtype for a, b in arrays)

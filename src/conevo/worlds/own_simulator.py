@@ -134,6 +134,8 @@ class OwnSimulator:
         else:
             for name in names:
                 yield from _faults(name, reached[name], (n, e))
+        if out.steps is not None:
+            yield from _faults("steps", out.steps, (n, e), "iu", world.params.iterations)
 
     def _faults_of_record(self, seen: Any, u: int) -> Iterator[str]:
         world = self.world
@@ -155,7 +157,9 @@ class OwnSimulator:
                 yield f"{name} must be an array of numbers"
 
 
-def _faults(name: str, values: Any, shape: tuple[int, ...], kind: str = "f") -> Iterator[str]:
+def _faults(
+    name: str, values: Any, shape: tuple[int, ...], kind: str = "f", most: int | None = None
+) -> Iterator[str]:
     """Yield the faults of an array that must have this shape, and numbers of this kind."""
     if not isinstance(values, np.ndarray):
         yield f"{name} must be an array {list(shape)}, not {type(values).__name__}"
@@ -165,3 +169,5 @@ def _faults(name: str, values: Any, shape: tuple[int, ...], kind: str = "f") -> 
         yield f"{name} must be an array of {KINDS[kind]}, not of {values.dtype}"
     elif kind == "iu" and name != "action" and values.size and values.min() < 0:
         yield f"{name} must be 0 or more, not {values.min()}"
+    elif most is not None and values.size and values.max() > most:
+        yield f"{name} must be {most} or less, not {values.max()}"

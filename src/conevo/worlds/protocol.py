@@ -37,13 +37,15 @@ class Outcome:
     fitness [N, E, R]: each robot's private fitness. counts [N, E, R, C]: how many actions each
     robot executed for each of the world's castes. switches [N, E, R]: how often it executed a
     different action than in the previous iteration. performance: task performance measures, each
-    [N, E].
+    [N, E]. steps [N, E]: iterations that were played, where an epoch may end early; None: all of
+    them.
     """
 
     fitness: npt.NDArray[np.float32]
     counts: npt.NDArray[np.int32]
     switches: npt.NDArray[np.int32]
     performance: dict[str, npt.NDArray[np.float32]]
+    steps: npt.NDArray[np.int64] | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -195,7 +197,7 @@ class Simulator(Protocol):
             The recorded arrays of the world, each [T, its dimensions], among them ``x``, ``y``,
             ``action`` and ``fitness``, all [T, R]; ``inputs`` [T, R, S], ``outputs`` [T, R, O],
             ``hidden`` [T, R, U]; ``performance`` [T, measures]. The last row equals the outcome of
-            ``evaluate``.
+            ``evaluate``. After an epoch that ends early, ``action`` is -1 and the rest stays.
         """
 
     def record_with_outcome(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from difflib import get_close_matches
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from conevo.worlds.study import WorldStudy
 
 __all__ = [
+    "FAMILIES",
     "WORLDS",
     "WorldEntry",
     "colours_of",
@@ -85,6 +87,9 @@ WORLDS: dict[str, WorldEntry] = {
     )
 }
 
+# Modules that make the entries of other packages' tasks, "vmas:balance" (conevo.simulators).
+FAMILIES = {"vmas": "conevo.simulators.vmas.world"}
+
 # Versions that are still drawn and reported but no longer played, and the release that plays them.
 EARLIER = dict.fromkeys(("rover-v1", "pursuit-v1", "prey-v1", "gacc-v1"), "0.1.0")
 
@@ -93,8 +98,8 @@ def resolve(path: str, digest: str = "", is_whole: bool = True) -> tuple[WorldEn
     """Return the entry and environment of a path.
 
     Args:
-        path: "rover/complex-1", "rover-v2/complex-1", or "FILE.py:ENVIRONMENT" for a world in a
-            file outside the package.
+        path: "rover/complex-1", "rover-v2/complex-1", "FILE.py:ENVIRONMENT" for a world in a file
+            outside the package, or "FAMILY:TASK" for a task of another package.
         digest: of that file, checked if it is given.
         is_whole: whether the path must have an environment; the world's first one if it need not.
 
@@ -102,6 +107,8 @@ def resolve(path: str, digest: str = "", is_whole: bool = True) -> tuple[WorldEn
         UsageError: no such world or environment, or no environment given; a file without a world,
             or one that has changed.
     """
+    if (family := _family(path)) is not None:
+        return _task(family, path, digest)
     file, _, environment = path.rpartition(":")
     if path.endswith(".py"):
         file, environment = path, ""
@@ -115,7 +122,11 @@ def resolve(path: str, digest: str = "", is_whole: bool = True) -> tuple[WorldEn
             )
         example = f"{file}:{entry.environments[0]}"
     elif file or ".py/" in path or path.startswith(("/", ".")):
-        raise UsageError(f"world {path!r}: a world in a file is named FILE.py:ENVIRONMENT")
+        families = ", ".join(f"{one}:TASK" for one in FAMILIES)
+        raise UsageError(
+            f"world {path!r}: a world in a file is named FILE.py:ENVIRONMENT, a task of another "
+            f"package {families}"
+        )
     else:
         name, _, environment = path.partition("/")
         entry = _named(name)
@@ -128,6 +139,34 @@ def resolve(path: str, digest: str = "", is_whole: bool = True) -> tuple[WorldEn
     if environment not in entry.environments:
         raise unknown_name("environment", environment, entry.environments, f"of world {name!r}")
     return entry, environment
+
+
+def _family(path: str) -> str | None:
+    """Return the family of a task of another package, None for another world.
+
+    Raises:
+        UsageError: no such family, but the name of one is near.
+    """
+    family, colon, _ = path.partition(":")
+    if not colon:
+        family, slash, task = path.partition("/")
+        if slash and family in FAMILIES:
+            raise UsageError(f"world {path!r}: a task of {family} is named {family}:{task}")
+        return None
+    if family in FAMILIES:
+        return family
+    if ".py" not in path and get_close_matches(family, FAMILIES, n=1, cutoff=0.7):
+        raise unknown_name("family of tasks", family, FAMILIES)
+    return None
+
+
+def _task(family: str, path: str, digest: str) -> tuple[WorldEntry, str]:
+    """Return the entry of a task of another package, and its name."""
+    task = path.partition(":")[2]
+    if digest:
+        raise UsageError(f"run.world_digest belongs to a world in a file, not to {path!r}")
+    entry: WorldEntry = import_module(FAMILIES[family]).entry(task)
+    return entry, entry.environments[0]
 
 
 def _named(name: str) -> WorldEntry:

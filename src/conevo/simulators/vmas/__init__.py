@@ -1,0 +1,1 @@
+"""Tasks of VMAS; ``world`` has their entry, the other modules load torch."""
