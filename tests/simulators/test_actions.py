@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from conevo.simulators.actions import Continuous, Discrete
 
@@ -16,7 +17,9 @@ FORCES = Continuous(  # a robot with two forces of 2 and a message, and one with
 
 def test_outputs_are_squashed_to_the_ends_of_each_axis() -> None:
     outputs = np.array([[[0, 99, -99], [0, 99, 99]]], np.float32)
-    assert FORCES.of(outputs).tolist() == [[[0, 2, 0], [0, 0, 0]]]
+    assert FORCES.of(outputs) == pytest.approx(np.array([[[0, 2, 0], [0, 0, 0]]]), abs=1e-5)
+    assert (FORCES.low <= FORCES.of(outputs)).all()
+    assert (FORCES.of(outputs) <= FORCES.high).all()
     assert FORCES.nothing(1).tolist() == [[[0, 0, 0], [0, 0, 0]]]
     assert FORCES.drawn(np.full((1, 2, 3), 0.25, np.float32)).tolist() == [
         [[-1, -1, 0.25], [-0.5, 0, 0]]

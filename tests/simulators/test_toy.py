@@ -220,3 +220,14 @@ def test_the_constant_input_is_a_setting() -> None:
     assert world("toy:line").inputs == ("observation 0", "observation 1", "constant")
     assert world("toy:line", constant_input=False).inputs == ("observation 0", "observation 1")
     assert resolve("toy:line").controller.weight_scale == 3.0
+
+
+def test_epochs_of_a_difference_in_credit_count_too(tmp_path: Path) -> None:
+    """Each team is played once more for each robot, and each time an epoch may end early."""
+    plain, difference = (
+        evolved(tmp_path / credit, 1, **{"run.credit": credit, "world.iterations": 100})
+        for credit in ("robot", "difference")
+    )
+    own, more = (run.generations()[0]["team_steps"] for run in (plain, difference))
+    evaluations = difference.generations()[0]["team_evaluations"]
+    assert 2 * own < more < evaluations * 2 * 100

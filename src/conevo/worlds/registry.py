@@ -155,7 +155,7 @@ def _family(path: str) -> str | None:
         return None
     if family in FAMILIES:
         return family
-    if ".py" not in path and get_close_matches(family, FAMILIES, n=1, cutoff=0.7):
+    if ".py" not in path and get_close_matches(family, FAMILIES, n=1, cutoff=0.6):
         raise unknown_name("family of tasks", family, FAMILIES)
     return None
 
