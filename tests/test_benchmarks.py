@@ -37,6 +37,19 @@ def test_the_benchmark_of_devices_runs_on_the_cpu(benchmark, monkeypatch, capsys
     assert re.search(r"\n\| 2 iterations \| \d+ \| \d+\.\d{3} \|", output)
 
 
+def test_the_benchmark_of_steps_prints_a_row_for_each_number_of_worlds(
+    benchmark, monkeypatch, capsys
+):
+    stepper = benchmark("stepper")
+    light = f"{BENCHMARKS.parent}/examples/light.py:dark-1"
+    few = ["--world", light, "--worlds", "1", "3", "--threads", "1", "--repeats", "2"]
+    monkeypatch.setattr(sys, "argv", ["stepper.py", *few])
+    stepper.main()
+    printed = capsys.readouterr().out
+    row = r"\| \S+ \| {} \| 1 \| \d+\.\d \| \d+ \| \d+ - \d+ \|\n"
+    assert re.search(row.format(1) + row.format(3), printed)
+
+
 SHARED = """
 #if defined(__CUDA_ARCH__)
     __shared__ float kept[256];

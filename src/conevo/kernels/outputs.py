@@ -10,7 +10,9 @@ import numpy as np
 import numpy.typing as npt
 import warp as wp
 
-__all__ = ["highest", "sigmoid", "sigmoid_of"]
+__all__ = ["EXTREME", "highest", "sigmoid", "sigmoid_of"]
+
+EXTREME = 16.0  # from 2 * LIMIT on the sigmoid is constant, 1e-7 from 1
 
 LIMIT = wp.constant(7.9)
 P1 = wp.constant(4.89352455891786e-03)

@@ -5,7 +5,7 @@ import warp as wp
 from conevo.kernels.outputs import sigmoid
 from conevo.kernels.trigonometry import cosine_sine
 
-__all__ = ["is_taken", "random_step", "steered_step"]
+__all__ = ["component_bounds", "is_taken", "random_step", "steered_step"]
 
 
 @wp.func
@@ -23,6 +23,12 @@ def steered_step(sum_x: float, sum_y: float, length: float) -> wp.vec2f:
     """
     most = length * 1.4142135
     return wp.vec2f(most * (sigmoid(sum_x) - 0.5), most * (sigmoid(sum_y) - 0.5))
+
+
+def component_bounds(length: float) -> tuple[float, float]:
+    """Return the least and the largest component of a ``steered_step``."""
+    most = length * 1.4142135 * 0.5
+    return -most, most
 
 
 @wp.func

@@ -10,6 +10,7 @@ from conevo.errors import UsageError, unknown_name
 from conevo.kernels.arrays import dimensions, shapes
 from conevo.kernels.phases import Phase
 from conevo.worlds.protocol import Simulation, World
+from conevo.worlds.spaces import space_faults
 
 __all__ = [
     "STAGES",
@@ -133,6 +134,7 @@ def faults_of_names(world: World) -> Iterator[str]:
         elif twice := next((name for name in names if names.count(name) > 1), ""):
             yield f"{what} has {twice!r} twice"
     yield from _of_settings(world)
+    yield from space_faults(world)
     if len(world.castes) < len(world.actions):
         yield f"castes has {len(world.castes)} names, fewer than the {len(world.actions)} actions"
 

@@ -245,6 +245,9 @@ class World(Protocol):
     Its class may have ``drawn``, the things that replay and film draw next to its robots
     (``playback.drawn``).
 
+    Its class may have ``group``, ``input_bounds``, ``output_bounds`` and ``discrete_actions``, for
+    programs that control its robots from outside (``worlds.spaces``).
+
     A world that is not written in Warp has, in place of ``simulation``, a method
     ``simulator(controller, n_threads)`` that returns its own ``Simulator``.
     """

@@ -100,6 +100,7 @@ import numpy.typing as npt
 from annotated_types import Ge, Gt, Le
 
 from conevo.errors import UsageError
+from conevo.kernels.steps import component_bounds
 from conevo.parameters import parameters
 from conevo.rng import fold_all
 from conevo.worlds.disturbances import Disturbances, disturbed
@@ -110,6 +111,7 @@ from conevo.worlds.gacc.state import GaccConstants, GaccScene, GaccTeam
 from conevo.worlds.measures import Measure
 from conevo.worlds.places import draw_places, sectors
 from conevo.worlds.protocol import Scenarios, Simulation, kernel_params, names_of
+from conevo.worlds.spaces import Bounds, Choices, n_signed, one_output_each
 
 __all__ = ["GaccParams", "GaccScenarios", "GaccWorld"]
 
@@ -251,6 +253,11 @@ class GaccWorld:
         *("move: dx", "move: dy"),
         *(f"grip {kind}" for kind in TYPES),
     )
+    input_bounds: ClassVar[Bounds] = (  # an obstacle is less than 0
+        *((-1.0, 1.0),) * 8,
+        *((0.0, 1.0),) * 19,
+    )
+    discrete_actions: ClassVar[Choices] = one_output_each(outputs, "move: dx", "move: dy")
     controller: ClassVar[dict[str, Any]] = {
         "n_hidden": 10,  # section 6.2.7
         "max_hidden": 20,  # Choice: twice the initial number
@@ -284,6 +291,12 @@ class GaccWorld:
     def optimum(self) -> float:
         """Number of all objects."""
         return float(self.plan.parts.size)
+
+    @property
+    def output_bounds(self) -> Bounds:
+        """Preference for each action, and the components of a step, in sides of the square."""
+        step = component_bounds(self.params.move_range)
+        return (*((0.0, 1.0),) * 3, step, step, *((0.0, 1.0),) * 3)
 
     @property
     def n_robots(self) -> int:
@@ -355,7 +368,7 @@ class GaccWorld:
             params=kernel_params(
                 GaccConstants,
                 self.params,
-                signed_inputs=8,  # an obstacle is less than 0
+                signed_inputs=n_signed(self),
                 n_objects=plan.parts.size,
                 n_complex=c,
                 near_2=(max(p.robot_range, 2 * p.move_range + p.separation) + SLACK) ** 2,

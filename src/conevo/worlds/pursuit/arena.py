@@ -27,6 +27,7 @@ from conevo.worlds.pursuit.bodies import (
     PursuitTeam,
 )
 from conevo.worlds.pursuit.dynamics import fail, stand
+from conevo.worlds.spaces import n_signed
 
 __all__ = ["ArenaParams", "ArenaScenarios", "draw_scenarios", "simulate"]
 
@@ -203,7 +204,7 @@ def simulate(
         given: fields of ``bodies.Params`` that its parameters do not have.
     """
     robots = world.n_robots
-    given |= {"team_is_prey": team_is_prey, "signed_inputs": 0}
+    given |= {"team_is_prey": team_is_prey, "signed_inputs": n_signed(world)}
     p = kernel_params(PursuitConstants, world.params, world, **given)
     prey = 1 if team_is_prey else bodies - robots
     slots = max(1, -(-p.prey_hidden // int(SLOTS))) * int(SLOTS)

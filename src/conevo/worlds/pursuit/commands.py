@@ -20,9 +20,10 @@ from conevo.worlds.pursuit.bodies import (
     wheel_speed,
 )
 
-__all__ = ["FIRE", "command", "set_up_prey"]
+__all__ = ["FIRE", "WHEEL_BOUNDS", "command", "set_up_prey"]
 
 TURN_OFTEN = wp.constant(0.05)  # Choice: chance per iteration that a random walk turns
+WHEEL_BOUNDS = (-1.0, 1.0)  # of a wheel command
 NETWORK = wp.constant(0)
 HEURISTIC = wp.constant(1)
 slots_vector = wp.types.vector(length=int(SLOTS), dtype=float)

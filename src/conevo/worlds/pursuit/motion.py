@@ -4,6 +4,7 @@ import warp as wp
 
 from conevo.kernels.actions import count_action
 from conevo.kernels.khepera import RADIUS, drive
+from conevo.kernels.outputs import EXTREME
 from conevo.kernels.phases import Phase
 from conevo.kernels.trigonometry import cosine_sine
 from conevo.worlds.pursuit.bodies import (
@@ -20,10 +21,18 @@ from conevo.worlds.pursuit.bodies import (
 from conevo.worlds.pursuit.commands import FIRE, command
 from conevo.worlds.pursuit.senses import bodies
 
-__all__ = ["ACT", "ACTIONS", "COMMIT", "N_ACTIONS"]
+__all__ = ["ACT", "ACTIONS", "COMMIT", "N_ACTIONS", "PRIMITIVES"]
 
 # Choice: motor outputs are not actions; for S a predator's wheel pair is one of five primitives.
-ACTIONS = ("stop", "forward", "left", "right", "reverse")
+# Each with outputs that give it at full speed, of the left and of the right wheel.
+PRIMITIVES = {
+    "stop": (0.0, 0.0),
+    "forward": (EXTREME, EXTREME),
+    "left": (-EXTREME, EXTREME),
+    "right": (EXTREME, -EXTREME),
+    "reverse": (-EXTREME, -EXTREME),
+}
+ACTIONS = tuple(PRIMITIVES)
 
 STOP = wp.constant(0)
 FORWARD = wp.constant(1)

@@ -43,7 +43,10 @@ from conevo.parameters import parameters
 from conevo.worlds.measures import Measure
 from conevo.worlds.protocol import Simulation, names_of
 from conevo.worlds.pursuit.arena import ArenaParams, ArenaScenarios, draw_scenarios, simulate
+from conevo.worlds.pursuit.commands import WHEEL_BOUNDS
 from conevo.worlds.pursuit.dynamics import ACTIONS, PREY_FUNCTIONS
+from conevo.worlds.pursuit.motion import PRIMITIVES
+from conevo.worlds.spaces import Bounds, Choices
 
 __all__ = ["PreyParams", "PreyWorld"]
 
@@ -72,6 +75,10 @@ class PreyWorld:
     name: ClassVar[str] = "prey-v2"
     inputs: ClassVar[tuple[str, ...]] = names_of(("infrared",), 8)
     outputs: ClassVar[tuple[str, ...]] = ("left wheel", "right wheel")
+    group: ClassVar[str] = "prey"
+    input_bounds: ClassVar[Bounds] = ((0.0, 1.0),) * 8
+    output_bounds: ClassVar[Bounds] = (WHEEL_BOUNDS, WHEEL_BOUNDS)
+    discrete_actions: ClassVar[Choices] = PRIMITIVES
     controller: ClassVar[dict[str, Any]] = {
         "n_hidden": 5,  # section 4.1
         "max_hidden": 10,  # Choice: twice the initial number

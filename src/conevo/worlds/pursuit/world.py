@@ -57,7 +57,10 @@ from conevo.worlds.measures import Measure
 from conevo.worlds.protocol import Simulation, names_of
 from conevo.worlds.pursuit import prey_sets
 from conevo.worlds.pursuit.arena import ArenaParams, ArenaScenarios, draw_scenarios, simulate
+from conevo.worlds.pursuit.commands import WHEEL_BOUNDS
 from conevo.worlds.pursuit.dynamics import ACTIONS, PURSUIT_FUNCTIONS
+from conevo.worlds.pursuit.motion import PRIMITIVES
+from conevo.worlds.spaces import Bounds, Choices
 
 __all__ = ["PursuitParams", "PursuitWorld"]
 
@@ -115,6 +118,10 @@ class PursuitWorld:
     name: ClassVar[str] = "pursuit-v2"
     inputs: ClassVar[tuple[str, ...]] = names_of(("infrared", "light"), 8)
     outputs: ClassVar[tuple[str, ...]] = ("left wheel", "right wheel")
+    group: ClassVar[str] = "predator"
+    input_bounds: ClassVar[Bounds] = ((0.0, 1.0),) * 16
+    output_bounds: ClassVar[Bounds] = (WHEEL_BOUNDS, WHEEL_BOUNDS)
+    discrete_actions: ClassVar[Choices] = PRIMITIVES
     controller: ClassVar[dict[str, Any]] = {
         "n_hidden": 6,  # section 4.1
         "max_hidden": 12,  # Choice: twice the initial number

@@ -57,6 +57,7 @@ import numpy.typing as npt
 from annotated_types import Ge, Gt, Le
 
 from conevo.kernels.geometry import COVER_WORDS
+from conevo.kernels.steps import component_bounds
 from conevo.parameters import parameters
 from conevo.rng import fold_all, uniforms
 from conevo.worlds.disturbances import Disturbances, disturbed
@@ -76,6 +77,7 @@ from conevo.worlds.rover.dynamics import (
     functions,
 )
 from conevo.worlds.rover.sites import N_REGIONS, draw_rocks, rock_sites
+from conevo.worlds.spaces import Bounds, Choices, n_signed, one_output_each
 
 __all__ = ["RoverParams", "RoverScenarios", "RoverWorld"]
 
@@ -215,6 +217,9 @@ class RoverWorld:
     name: ClassVar[str] = "rover-v2"
     inputs: ClassVar[tuple[str, ...]] = names_of(("rovers", "red rocks"), 8)
     outputs: ClassVar[tuple[str, ...]] = ("low", "med", "hi", "move: dx", "move: dy")
+    group: ClassVar[str] = "rover"
+    input_bounds: ClassVar[Bounds] = ((0.0, 1.0),) * 16
+    discrete_actions: ClassVar[Choices] = one_output_each(outputs, "move: dx", "move: dy")
     controller: ClassVar[dict[str, Any]] = {
         "n_hidden": 10,  # section 5.2
         "max_hidden": 20,  # Choice: twice the initial number
@@ -233,6 +238,12 @@ class RoverWorld:
         """Value of all red rocks."""
         counts = rocks.mix(self.environment)
         return float(sum(n * value for n, value in zip(counts, rocks.VALUES, strict=True)))
+
+    @property
+    def output_bounds(self) -> Bounds:
+        """Preference for each setting, and the components of a step, in sides of the square."""
+        step = component_bounds(self.params.move_range)
+        return (*((0.0, 1.0),) * 3, step, step)
 
     @property
     def n_robots(self) -> int:
@@ -292,7 +303,7 @@ class RoverWorld:
             | self.params.kept(self.n_robots, len(self.inputs)),
             scene=RoverScene,
             params_type=RoverConstants,
-            params=kernel_params(RoverConstants, self.params, signed_inputs=0, **self._reaches()),
+            params=kernel_params(RoverConstants, self.params, **self._derived()),
             functions=disturbed(
                 functions(self.params.rocks_per_activation, self.params.fitness),
                 (RoverTeam, RoverScene, RoverConstants),
@@ -305,12 +316,16 @@ class RoverWorld:
             scratch=SCRATCH,
         )
 
-    def _reaches(self) -> dict[str, float]:
-        """Return the squared distances of rovers that may meet before the next survey."""
+    def _derived(self) -> dict[str, float]:
+        """Return constants of the kernels that follow from the parameters.
+
+        Among them are the squared distances of rovers that may meet before the next survey.
+        """
         p = self.params
         steps = 2 * int(SURVEYED) * p.move_range
         reaches = {
             "crowd_2": max(p.rover_sensor_radius, p.separation),
             "company_2": 2 * max(p.ranges),
         }
-        return {name: (1.001 * (reach + steps)) ** 2 for name, reach in reaches.items()}
+        squares = {name: (1.001 * (reach + steps)) ** 2 for name, reach in reaches.items()}
+        return squares | {"signed_inputs": n_signed(self)}
