@@ -16,7 +16,7 @@ from conevo.worlds.checks import random_teams
 from conevo.worlds.contract import faults_of_names
 from conevo.worlds.spaces import (
     MODES,
-    Actions,
+    ActionMode,
     discrete_actions_of,
     group_of,
     input_bounds_of,
@@ -60,7 +60,7 @@ def test_inputs_lie_within_their_bounds_and_reach_far(path: str, noise: float) -
 @pytest.mark.parametrize("path", WORLDS)
 def test_each_discrete_action_is_the_one_that_it_names(path: str) -> None:
     world = conevo.world(path)
-    actions = Actions(world)
+    actions = ActionMode(world)
     for k, name in enumerate(actions.names):
         stepper = begun(world)
         x, y = stepper.read("x"), stepper.read("y")
@@ -95,7 +95,7 @@ def test_discrete_actions_are_those_of_the_worlds() -> None:
 @pytest.mark.parametrize("path", ["pursuit/team-3", "prey/shaping-6"])
 def test_a_continuous_action_is_the_command_of_the_wheels(path: str) -> None:
     world = conevo.world(path)
-    actions, stepper = Actions(world, "continuous"), begun(world)
+    actions, stepper = ActionMode(world, "continuous"), begun(world)
     assert (actions.low.tolist(), actions.high.tolist()) == ([-1, -1], [1, 1])
     for values in ([0.3, -0.7], [1.0, -1.0], [0.0, 0.999], [3.0, -3.0]):
         wheels = np.broadcast_to(np.array(values), (1, world.n_robots, 2))
@@ -111,7 +111,7 @@ def test_a_continuous_action_is_the_command_of_the_wheels(path: str) -> None:
 @pytest.mark.parametrize("path", ["rover/complex-5", "gacc/complex-9"])
 def test_a_continuous_action_is_a_step(path: str) -> None:
     world = conevo.world(path)
-    actions, stepper = Actions(world, "continuous"), begun(world)
+    actions, stepper = ActionMode(world, "continuous"), begun(world)
     at = [k for k, name in enumerate(world.outputs) if name.startswith("move")]
     assert np.allclose(actions.high[at], world.params.move_range / np.sqrt(2))
     given = np.where(np.isin(np.arange(len(world.outputs)), at), [0.0], actions.low)
@@ -133,7 +133,7 @@ def test_a_team_replayed_from_outside_gets_its_fitness_as_the_sum_of_rewards(pat
     mind = controller(world=world)
     genes, (team,) = random_teams(world, 1)
     outcome = conevo.Rollout(world).evaluate(genes, team[None], world.scenarios([8]))
-    stepper, actions = Stepper(world, 1, [8]), Actions(world, "outputs")
+    stepper, actions = Stepper(world, 1, [8]), ActionMode(world, "outputs")
     stepper.reset()
     memory = np.zeros((*team.shape, mind.n_memory), np.float32)
     before = stepper.fitness.numpy().astype(np.float64)
@@ -156,16 +156,16 @@ def test_a_world_without_declarations_has_defaults() -> None:
     world = conevo.world(LIGHT)
     assert input_bounds_of(world) == ((-np.inf, np.inf),) * 2
     assert output_bounds_of(world) == ((0.0, 1.0),) * 4
-    assert Actions(world, "outputs").names == world.outputs
-    assert np.isinf(Actions(world, "outputs").high).all()
+    assert ActionMode(world, "outputs").names == world.outputs
+    assert np.isinf(ActionMode(world, "outputs").high).all()
     with pytest.raises(UsageError, match="light-v1 declares no discrete actions: use the mode"):
-        Actions(world)
+        ActionMode(world)
 
 
 def test_actions_that_do_not_fit_are_one_line() -> None:
     world = conevo.world("pursuit/team-3")
     with pytest.raises(UsageError, match=r"unknown mode of actions 'discreet'.*'discrete'"):
-        Actions(world, "discreet")  # type: ignore[arg-type]
+        ActionMode(world, "discreet")  # type: ignore[arg-type]
     for mode, given, words in (
         ("discrete", [[5]], "action 5: must be from 0 to 4 \\(stop, forward, left"),
         ("discrete", [-1], "action -1"),
@@ -174,10 +174,10 @@ def test_actions_that_do_not_fit_are_one_line() -> None:
         ("outputs", 3.0, "got shape \\[\\]"),
     ):
         with pytest.raises(UsageError, match=words):
-            Actions(world, mode).outputs(given)  # type: ignore[arg-type]
+            ActionMode(world, mode).outputs(given)  # type: ignore[arg-type]
     for mode in MODES:  # a bound of no side effect: any leading shape
         shape = (3, 4) if mode == "discrete" else (3, 4, 2)
-        assert Actions(world, mode).outputs(np.ones(shape, int)).shape == (3, 4, 2)
+        assert ActionMode(world, mode).outputs(np.ones(shape, int)).shape == (3, 4, 2)
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,7 @@ from conevo.worlds.protocol import World
 
 __all__ = [
     "MODES",
-    "Actions",
+    "ActionMode",
     "Bounds",
     "Choices",
     "Mode",
@@ -127,7 +127,7 @@ def one_output_each(outputs: Sequence[str], x: str, y: str) -> dict[str, tuple[f
     return found
 
 
-class Actions:
+class ActionMode:
     """Turns the actions of one mode into outputs, as ``Stepper.outputs`` takes them.
 
     - "discrete": an action is the number of a named one, an integer [...].
