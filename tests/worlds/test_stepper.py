@@ -106,14 +106,8 @@ def random_outputs(world: Any) -> np.ndarray:
 
 @pytest.mark.parametrize("device", DEVICES)
 @pytest.mark.parametrize("path", WORLDS)
-def test_stepping_equals_recording(path: str, device: str) -> None:
-    equals_the_record(conevo.world(path, iterations=150), device)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("path", WORLDS)
-def test_stepping_equals_recording_for_whole_epochs(path: str) -> None:
-    equals_the_record(conevo.world(path))
+def test_stepping_equals_recording_for_whole_epochs(path: str, device: str) -> None:
+    equals_the_record(conevo.world(path), device)
 
 
 @pytest.mark.parametrize("path", ["rover/complex-5", "pursuit/team-3", "gacc/complex-9"])
