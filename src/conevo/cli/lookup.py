@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from conevo.errors import UsageError, unknown_name, without_team
-from conevo.runs.directory import CAMPAIGN, kind_of, kinds_in
+from conevo.runs.directory import CAMPAIGN, UNREADABLE, kind_of, kinds_in
 from conevo.runs.durable import is_there
 from conevo.runs.run import RUNS, Run
 from conevo.runs.shaping import Shaping
@@ -80,8 +80,12 @@ def find_last(text: str) -> Run:
 
 
 def directories(folder: Path, *kinds: str) -> list[Path]:
-    """Return the directories of these kinds (``kind_of``) in ``folder``, sorted by name."""
-    return [path for path, kind in kinds_in(folder).items() if kind in kinds]
+    """Return the directories of these kinds in ``folder``, sorted by name.
+
+    Those that may not be read are among them: one may be of any kind.
+    """
+    wanted = (*kinds, UNREADABLE)
+    return [path for path, kind in kinds_in(folder).items() if kind in wanted]
 
 
 def campaign_at(text: str) -> Campaign | None:

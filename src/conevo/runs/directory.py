@@ -36,25 +36,37 @@ __all__ = [
     "CAMPAIGN",
     "CONFIG",
     "SHAPING",
+    "UNREADABLE",
     "Directory",
     "appearing",
     "as_json",
     "kind_of",
     "kinds_in",
     "refuse_existing",
+    "refuse_unreadable",
 ]
 
 CONFIG, SHAPING, CAMPAIGN, LOCK, SEAL = "config.toml", "shaping.toml", "plan.toml", "lock", "DONE"
 LONGEST_WRITE = 3600.0  # seconds, of a file that other processes may be writing
 KINDS = {CONFIG: "run", SHAPING: "shaping", CAMPAIGN: "campaign"}
+UNREADABLE = "unreadable"
 
 
 def kind_of(path: Path) -> str:
-    """Return the kind of a directory: "run", "shaping", "campaign" or none ("").
+    """Return the kind of a directory: "run", "shaping", "campaign", UNREADABLE or none ("").
 
-    Only the name of its file counts; readers report damage.
+    Only the name of its file counts; readers report damage, and a directory that may not be read.
     """
-    return next((kind for name, kind in KINDS.items() if is_there(path / name)), "")
+    try:
+        return next((kind for name, kind in KINDS.items() if is_there(path / name)), "")
+    except PermissionError:
+        return UNREADABLE
+
+
+def refuse_unreadable(path: Path) -> None:
+    """Raise EnvironmentFailure if this process may not read a directory."""
+    if kind_of(path) == UNREADABLE:
+        raise EnvironmentFailure(f"{path}: this process may not read the directory")
 
 
 def kinds_in(folder: Path) -> dict[Path, str]:
@@ -140,9 +152,11 @@ class Directory:
 
     Raises:
         UsageError: it is not of this kind.
+        EnvironmentFailure: it may not be read.
     """
 
     def __init__(self, path: Path, kind: str) -> None:
+        refuse_unreadable(path)
         name = next(name for name in KINDS if KINDS[name] == kind)
         if not is_there(path / name):
             raise UsageError(f"{path} is not a {kind} (it has no {name})")

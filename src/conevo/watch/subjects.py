@@ -17,7 +17,7 @@ from conevo.campaigns.plan import levels_of
 from conevo.errors import UsageError
 from conevo.numbers import finite
 from conevo.runs import locks
-from conevo.runs.directory import CONFIG, LOCK, SEAL, SHAPING, kind_of
+from conevo.runs.directory import CONFIG, LOCK, SEAL, SHAPING, kind_of, refuse_unreadable
 from conevo.runs.outline import Outline, budget_of, flattened, span
 from conevo.runs.progress import Done, seconds_left, share_of
 from conevo.runs.provenance import declared
@@ -168,6 +168,7 @@ class Subject:
             self._kind, self._shaping, self._outlines, self._stages = "", None, [], []
             if self.path.is_symlink():
                 raise UsageError("is a link, and links are not followed: watch its target")
+            refuse_unreadable(self.path)
             if not (kind := kind_of(self.path)):
                 if self._is_planned:
                     return
