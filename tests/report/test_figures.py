@@ -20,6 +20,7 @@ from conevo.report.figures import style as drawing
 from conevo.report.figures.curves import Line
 from conevo.report.figures.lettering import drawable, fitted, labels_of, width_of
 from conevo.report.figures.style import DASHES, HATCHES, MARKERS, Drawing, hatches, ticks_of
+from conevo.report.learning_curves import Course
 from conevo.worlds.registry import colours_of
 
 pytestmark = pytest.mark.filterwarnings("error")
@@ -93,8 +94,8 @@ def unseen_ticks(figure: Any) -> list[Any]:
     ]
 
 
-def band(level: float) -> curves.Band:
-    return curves.Band(X, X * level, X * level - 1, X * level + 1)
+def band(level: float) -> Course:
+    return Course(X, X * level, X * level - 1, X * level + 1, 2)
 
 
 def bars() -> Drawing:
@@ -256,7 +257,7 @@ def test_nothing_is_drawn_beyond_the_range_of_a_measure(drawn) -> None:
     figures.bars({"": cells}, ["1"], {"cone": "CONE"}, x_label="x", y_label="y", within=within)
     runs = {"cone": [figures.Points([0.1, 0.9], (0.5, -4.6, 5.6))]}
     figures.points({"": runs}, ["1"], {"cone": "CONE"}, x_label="x", y_label="y", within=within)
-    wide = curves.Band(X, X / 40, X / 40 - 3, X / 40 + 3)
+    wide = Course(X, X / 40, X / 40 - 3, X / 40 + 3, 2)
     line = Line("cone")
     curves.lines({"": {line: wide}}, {line: "CONE"}, x_label="x", y_label="y", within=within)
     for figure in drawn[:2]:

@@ -27,6 +27,7 @@ from conevo.report.statistics import (
     holm,
     is_alike,
     mean_interval,
+    moments,
     normality,
 )
 
@@ -104,6 +105,11 @@ class Summary:
     mean: Estimate
     sd: float | None
     normal: Normality
+
+    @property
+    def range(self) -> tuple[float, float]:
+        """The lowest and the highest run."""
+        return min(self.values), max(self.values)
 
 
 @dataclass(frozen=True)
@@ -207,8 +213,7 @@ def group_values(values: Iterable[RunValue]) -> dict[Group, dict[Cell, list[RunV
 def summarize(runs: Sequence[RunValue]) -> Summary:
     """Return the results of the runs of a cell."""
     values = tuple(run.value for run in runs)
-    sd = float(np.std(values, ddof=1)) if len(values) > 1 else None
-    return Summary(values, mean_interval(values), sd, normality(values))
+    return Summary(values, mean_interval(values), moments(values)[1], normality(values))
 
 
 def compare_all(cells: Mapping[Cell, Sequence[RunValue]]) -> list[Pair]:
@@ -262,16 +267,12 @@ def aggregate(cells: Mapping[Cell, Sequence[RunValue]]) -> list[Aggregate]:
     gains = {
         treatment: [np.multiply(sign, of) for of in some] for treatment, some in strata.items()
     }
-    improvement = {
-        (a, b): probability_of_improvement(gains[a], gains[b])
-        for b, a in combinations(treatments, 2)
-    }
     return [
         Aggregate(
             treatment=a,
             environments=len(common),
             iqm=iqm_interval(strata[a]),
-            improvement={b: improvement[a, b] for b in treatments[:k]},
+            improvement={b: probability_of_improvement(gains[a], gains[b]) for b in treatments[:k]},
         )
         for k, a in enumerate(treatments)
     ]

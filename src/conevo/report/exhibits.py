@@ -34,7 +34,7 @@ __all__ = [
     "with_values",
 ]
 
-Item = TypeVar("Item", default=Any)
+Item = TypeVar("Item", default=Any, contravariant=True)
 Row = Mapping[str, Any]
 NOTHING = "–"
 MOST_OPEN = 12  # rows of a table that a page shows without being asked
@@ -73,14 +73,18 @@ class Column(Generic[Item]):
         title: its heading; empty if only CSV has the column.
         show: makes the text of a cell.
         is_wide: whether it contains sentences, which need more width.
-        of: returns its value for an item (``rows_of``).
+        of: returns its value for an item (``rows_of``), if that is not the attribute called key.
     """
 
     key: str
     title: str = ""
     show: Callable[[Any], str] = number
     is_wide: bool = False
-    of: Callable[[Item], Any] = field(default=lambda _: None, kw_only=True)
+    of: Callable[[Item], Any] | None = field(default=None, kw_only=True)
+
+    def value(self, item: Item) -> Any:
+        """Return its value for an item."""
+        return self.of(item) if self.of else getattr(item, self.key)
 
     @property
     def is_text(self) -> bool:
@@ -161,10 +165,11 @@ class Table(Exhibit):
         columns: Sequence[Column[Item]],
         items: Iterable[Item],
         is_folded: bool | None = None,
+        numbers: Sequence[Row] = (),
     ) -> Table:
         """Return a table with a row per item."""
         shown = [column for column in columns if column.title]
-        return cls(name, title, note, shown, rows_of(columns, items), is_folded)
+        return cls(name, title, note, shown, rows_of(columns, items), is_folded, numbers=numbers)
 
     @property
     def is_open(self) -> bool:
@@ -215,15 +220,15 @@ class Section:
 
 def rows_of(columns: Sequence[Column[Item]], items: Iterable[Item]) -> list[dict[str, Any]]:
     """Return a row of numbers for each item: the value of every column."""
-    return [{column.key: column.of(item) for column in columns} for item in items]
+    return [{column.key: column.value(item) for column in columns} for item in items]
 
 
 def with_values(columns: Sequence[Column[Item]], rows: Sequence[Row]) -> list[Column[Item]]:
-    """Return the columns that have a value in one of the rows."""
+    """Return the columns with a title that have a value in one of the rows."""
     return [
         column
         for column in columns
-        if any(row.get(column.key) not in (None, (None, None)) for row in rows)
+        if column.title and any(row[column.key] not in (None, (None, None)) for row in rows)
     ]
 
 

@@ -21,7 +21,7 @@ import html
 import json
 import re
 import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from importlib import resources
 from pathlib import Path
 
@@ -32,7 +32,7 @@ from conevo.campaigns.plan import Plan
 from conevo.campaigns.tables import Tables
 from conevo.errors import UsageError
 from conevo.reading import DamagedFile, read_bytes, read_json
-from conevo.report.exhibits import Exhibit, Figure, Section, Table
+from conevo.report.exhibits import Figure, Section, Table
 from conevo.report.latex import document, figures_to_latex, to_latex
 from conevo.report.learning_curves import read_histories
 from conevo.report.marl_eval import export
@@ -153,36 +153,21 @@ def _files(plan: Plan, sections: list[Section]) -> Iterator[tuple[str, bytes]]:
 def _page(plan: Plan, sections: list[Section]) -> str:
     """Return the page."""
     import jinja2
-    from markupsafe import Markup
 
-    def drawn(figure: Figure) -> Markup:
-        return Markup(_inline(figure))
-
-    def rows(table: Table) -> Markup:
-        return Markup(_body(table))
-
-    def number_of() -> Mapping[str, str]:
-        """Return "Table 3", "Figure 2" for every exhibit's name."""
-        counts = {"Table": 0, "Figure": 0}
-        numbers = {}
-        for one in (one for section in sections for one in section.all_exhibits()):
-            kind = "Figure" if isinstance(one, Figure) else "Table"
-            counts[kind] += 1
-            numbers[one.name] = f"{kind} {counts[kind]}"
-        return numbers
-
+    counts = {"Table": 0, "Figure": 0}
+    numbers: dict[str, str] = {}  # "Table 3", "Figure 2" for every exhibit's name
+    for one in (one for section in sections for one in section.all_exhibits()):
+        kind = "Figure" if isinstance(one, Figure) else "Table"
+        counts[kind] += 1
+        numbers[one.name] = f"{kind} {counts[kind]}"
     template = resources.files("conevo.report").joinpath(TEMPLATE).read_text(encoding="utf-8")
     environment = jinja2.Environment(
         autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
     )
-    environment.tests["figure"] = _is_figure
+    environment.tests["figure"] = lambda one: isinstance(one, Figure)
     return environment.from_string(template).render(
-        plan=plan, sections=sections, drawn=drawn, rows=rows, numbers=number_of()
+        plan=plan, sections=sections, drawn=_inline, rows=_body, numbers=numbers
     )
-
-
-def _is_figure(one: Exhibit) -> bool:
-    return isinstance(one, Figure)
 
 
 def _body(table: Table) -> str:

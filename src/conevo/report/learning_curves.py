@@ -8,6 +8,7 @@ does not count before its first.
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -124,18 +125,15 @@ def courses(histories: Histories, column: str, n: int = 50) -> dict[Cell, Course
     made = {}
     for cell, rows, has in histories.at(x):
         values = np.where(has, histories.columns[column][rows], math.nan)
-        known = np.isfinite(values)
-        counts = known.sum(axis=0)
-        shown = counts > 0
+        shown = ~np.isnan(values).all(axis=0)
         if not shown.any():
             continue
-        counts = counts[shown]
-        mean = np.where(known, values, 0).sum(axis=0)[shown] / counts
-        squares = (np.where(known[:, shown], values[:, shown] - mean, 0) ** 2).sum(axis=0)
-        several = counts > 1
-        reach = np.full(len(mean), math.nan)
-        t = stdtrit(counts[several] - 1, 1 - ALPHA / 2)
-        reach[several] = t * np.sqrt(squares[several] / (counts[several] - 1) / counts[several])
+        values = values[:, shown]
+        counts = np.sum(~np.isnan(values), axis=0)
+        mean = np.nanmean(values, axis=0)
+        with warnings.catch_warnings(action="ignore"):  # of a single run
+            error = np.sqrt(np.nanvar(values, axis=0, ddof=1) / counts)
+        reach = stdtrit(counts - 1, 1 - ALPHA / 2) * error
         made[cell] = Course(x[shown], mean, mean - reach, mean + reach, int(counts[-1]))
     return made
 

@@ -26,7 +26,7 @@ import numpy.typing as npt
 
 from conevo.report.ranks import above, mann_whitney, smallest_mann_whitney
 from conevo.rng import stream
-from conevo.typing import Floats, Record
+from conevo.typing import Floats
 
 __all__ = [
     "ALPHA",
@@ -38,9 +38,9 @@ __all__ = [
     "holm",
     "is_alike",
     "mean_interval",
+    "moments",
     "normality",
     "proportion_interval",
-    "with_holm",
 ]
 
 ALPHA = 0.05
@@ -137,7 +137,7 @@ def normality(values: npt.ArrayLike) -> Normality:
     Both p-values are None below three runs, and if all are equal.
     """
     x = finite(values)
-    mean, sd = _moments(x)
+    mean, sd = moments(x)
     if len(x) < 3 or not sd:
         return Normality(len(x), None, None)
     from scipy.stats import kstest, norm
@@ -156,7 +156,7 @@ def compare(a: npt.ArrayLike, b: npt.ArrayLike) -> Comparison:
     """
     x, y = finite(a), finite(b)
     n, m = len(x), len(y)
-    (mean_a, sd_a), (mean_b, sd_b) = _moments(x), _moments(y)
+    (mean_a, sd_a), (mean_b, sd_b) = moments(x), moments(y)
     difference = None if mean_a is None or mean_b is None else mean_a - mean_b
     tests: dict[str, float] = {}
     if difference is not None and sd_a is not None and sd_b is not None and (sd_a or sd_b):
@@ -182,12 +182,6 @@ def holm(ps: Sequence[float | None]) -> list[float | None]:
     return adjusted
 
 
-def with_holm(rows: Sequence[Record]) -> list[Record]:
-    """Return rows with their ``p_mann_whitney`` corrected by Holm, as ``p_holm``."""
-    corrected = holm([row["p_mann_whitney"] for row in rows])
-    return [row | {"p_holm": p} for row, p in zip(rows, corrected, strict=True)]
-
-
 def is_alike(comparison: Comparison, margin: float = 0.15) -> bool:
     """Return whether two samples are shown to be alike (absence of evidence is not evidence).
 
@@ -211,7 +205,7 @@ def mean_interval(values: npt.ArrayLike, level: float = 0.95) -> Estimate:
     The interval is None below two runs, and if all are equal.
     """
     x = finite(values)
-    mean, sd = _moments(x)
+    mean, sd = moments(x)
     method = "Student's t"
     if mean is None or not sd:
         return Estimate(mean, None, None, len(x), method)
@@ -240,6 +234,18 @@ def proportion_interval(successes: int, n: int, level: float = 0.95) -> Estimate
     return Estimate(successes / n, float(low), float(high), n, method)
 
 
+def moments(values: npt.ArrayLike) -> tuple[float | None, float | None]:
+    """Return the mean of a sample, None without runs, and its deviation (n - 1), None below two.
+
+    The latter is exactly 0 if all values are equal.
+    """
+    x = finite(values)
+    mean = float(x.mean()) if len(x) else None
+    if len(x) < 2:
+        return mean, None
+    return (mean, float(x.std(ddof=1))) if np.ptp(x) > 0 else (float(x[0]), 0.0)
+
+
 def finite(values: npt.ArrayLike) -> Floats:
     """Return the finite values of a sample, [runs].
 
@@ -250,14 +256,6 @@ def finite(values: npt.ArrayLike) -> Floats:
     if x.ndim != 1:
         raise ValueError(f"a sample has one value per run, not the shape {x.shape}")
     return x[np.isfinite(x)]
-
-
-def _moments(x: Floats) -> tuple[float | None, float | None]:
-    """Return mean and standard deviation; the latter exactly 0 if all values are equal."""
-    mean = float(x.mean()) if len(x) else None
-    if len(x) < 2:
-        return mean, None
-    return (mean, float(x.std(ddof=1))) if np.ptp(x) > 0 else (float(x[0]), 0.0)
 
 
 def _t_tests(x: Floats, y: Floats) -> dict[str, float]:

@@ -121,6 +121,7 @@ def judge(claim: Claim, evidence: Evidence) -> Verdict:
     low, high = key.interval if key else (None, None)
     power = _power(claim, cells)
     alone = by_rank if agree else f"{UNDECIDED}the tests disagree"
+    elsewhere = NOT_JUDGED if claim.contradiction else BY_WORLD if claim.decided else ""
     why = [
         *wording.counts(cells),
         *([] if agree else [f"t-test: {by_t}; Mann-Whitney with Holm: {by_rank}"]),
@@ -139,7 +140,7 @@ def judge(claim: Claim, evidence: Evidence) -> Verdict:
         n=wording.sizes(cells),
         budget="; ".join(one for one in spent if one),
         variant=evidence.variant,
-        verdict=_marked(claim, alone) if key else alone,
+        verdict=(elsewhere or alone) if key else alone,
         alone=alone,
         caution=claim.contradiction or claim.decided or claim.caution,
         power=power,
@@ -150,11 +151,6 @@ def judge(claim: Claim, evidence: Evidence) -> Verdict:
         why="; ".join(why),
         cells=tuple(cells),
     )
-
-
-def _marked(claim: Claim, alone: str) -> str:
-    """Return the verdict, which more than the runs may decide."""
-    return NOT_JUDGED if claim.contradiction else BY_WORLD if claim.decided else alone
 
 
 def _concerns(claim: Claim, evidence: Evidence) -> bool:

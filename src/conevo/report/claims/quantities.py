@@ -159,10 +159,7 @@ def _exchanged(sql: str, lacks: str, is_share: bool) -> Quantity:
 
 COLLECTIVES = ("entrapment", "pursuer-blocker", "spiders-fly", "role-switcher")
 QUANTITIES: dict[str, Quantity] = {
-    "value": _tested("value"),
-    "area": _tested("area"),
-    "capture_time": _tested("capture_time"),
-    "delivered": _tested("delivered"),
+    **{name: _tested(name) for name in ("value", "area", "capture_time", "delivered", "path")},
     "share of the optimum": Quantity(_share, "no testing phase"),
     "whole": _lesioned("avg(whole.value)"),
     "lesioned": _lesioned("avg(lesioned.value)"),
@@ -215,7 +212,6 @@ QUANTITIES: dict[str, Quantity] = {
     "members of nothing": _members(),
     "members of pursuer-blocker and spiders-fly": _members("pursuer-blocker", "spiders-fly"),
     "members of spiders-fly and role-switcher": _members("spiders-fly", "role-switcher"),
-    "path": _tested("path"),
     "delivered after shaping": Quantity(_when_shaped(True), "no shaping", is_apart=True),
     "delivered directly": Quantity(_when_shaped(False), "no direct evolution", is_apart=True),
     "change": Quantity(changed, "no runs of changed and unchanged settings"),

@@ -16,6 +16,7 @@ import numpy as np
 from conevo.palette import method_looks
 from conevo.report.figures.lettering import LINE, SIZE, fitted, lines_in
 from conevo.report.figures.style import (
+    EVERYTHING,
     HATCHES,
     HEIGHT,
     MARKERS,
@@ -43,7 +44,6 @@ if TYPE_CHECKING:
 __all__ = ["Bar", "Drawing", "Points", "bars", "points"]
 
 SLOT = 0.5  # inches: most that one method takes of an axis
-EVERYTHING = (-math.inf, math.inf)
 
 
 class Bar(NamedTuple):
@@ -93,8 +93,7 @@ def bars(
                 known = [(p, one) for p, one in enumerate(cells) if one and one.height is not None]
                 if not known:
                     continue
-                y = _numbers([one.height for _, one in known])
-                spread = _numbers([one.deviation for _, one in known])
+                y, spread = np.array([one for _, one in known], dtype=np.float64).T  # NaN for None
                 x = np.array([p for p, _ in known]) + (k - (len(names) - 1) / 2) * width
                 signs[method] = axes.bar(
                     x,
@@ -266,8 +265,3 @@ def _bound(grid: Sequence[Axes], ends: Sequence[float]) -> None:
     room = 0.05 * (high - low) or 0.05 * abs(high) or 1.0
     bottom, top = (low if low == 0 else low - room), (high if high == 0 > low else high + room)
     grid[0].set_ylim(bottom, top)
-
-
-def _numbers(values: Sequence[float | None]) -> Floats:
-    """Return values with NaN for None."""
-    return np.array([math.nan if value is None else value for value in values], dtype=np.float64)

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from conevo.palette import method_looks
 from conevo.report.figures.lettering import LINE, drawable, fitted, lines_in, width_of
@@ -15,6 +14,7 @@ from conevo.report.figures.small_multiples import Panels
 from conevo.report.figures.style import (
     COLUMN,
     DASHES,
+    EVERYTHING,
     MARKERS,
     WIDTH,
     Drawing,
@@ -30,19 +30,10 @@ from conevo.report.figures.style import (
     ticks_of,
     width_for,
 )
+from conevo.report.learning_curves import Course
+from conevo.typing import Floats
 
-__all__ = ["Band", "Line", "lines", "stacks"]
-
-EVERYTHING = (-math.inf, math.inf)
-
-
-class Band(NamedTuple):
-    """A line with a band around it: x, middle, low and high [X]; NaN for no value."""
-
-    x: npt.NDArray[np.float64]
-    middle: npt.NDArray[np.float64]
-    low: npt.NDArray[np.float64]
-    high: npt.NDArray[np.float64]
+__all__ = ["Line", "lines", "stacks"]
 
 
 class Line(NamedTuple):
@@ -53,7 +44,7 @@ class Line(NamedTuple):
 
 
 def lines(
-    panels: Mapping[str, Mapping[Line, Band]],
+    panels: Mapping[str, Mapping[Line, Course]],
     names: Mapping[Line, str],
     *,
     x_label: str,
@@ -85,7 +76,9 @@ def lines(
         figure, axes = one_panel(high + legend_height(list(texts.values()), width), width)
         drawn = [_inside(band, within) for of in panels.values() for band in of.values()]
         right = max(float(band.x[-1]) for band in drawn)
-        y_ticks, y_limits = ticks_of(_lowest(drawn), _highest(drawn), limits)
+        lowest = min(0.0, *(float(np.nanmin([band.low, band.mean])) for band in drawn))
+        highest = max(0.0, *(float(np.nanmax([band.high, band.mean])) for band in drawn))
+        y_ticks, y_limits = ticks_of(lowest, highest, limits)
         x_ticks, _ = ticks_of(0.0, right, (0.0, right), 3 if columns > 2 else 5)
         field = Panels(axes, rows, columns, (0.0, right), y_limits, shape, above)
         used = [divmod(k, columns) for k in range(len(panels))]
@@ -98,7 +91,7 @@ def lines(
             for place, of in zip(used, panels.values(), strict=True):
                 if name in of:
                     band, start = _inside(of[name], within), sum(map(len, x))
-                    across, middle = field.at(*place, band.x, band.middle)
+                    across, middle = field.at(*place, band.x, band.mean)
                     low, up = (field.at(*place, band.x, end)[1] for end in (band.low, band.high))
                     shapes += _outline(low, up, across)
                     every = max(1, len(across) // 6)
@@ -135,8 +128,8 @@ def lines(
 
 
 def stacks(
-    panels: Mapping[tuple[str, str], Mapping[str, npt.NDArray[np.float64]]],
-    x: npt.NDArray[np.float64],
+    panels: Mapping[tuple[str, str], Mapping[str, Floats]],
+    x: Floats,
     colours: Mapping[str, str],
     *,
     x_label: str,
@@ -198,25 +191,15 @@ def stacks(
         return saved(figure)
 
 
-def _inside(band: Band, within: tuple[float, float]) -> Band:
+def _inside(band: Course, within: tuple[float, float]) -> Course:
     """Return a band that ends where values do."""
     return band._replace(low=np.clip(band.low, *within), high=np.clip(band.high, *within))
 
 
-def _outline(
-    low: npt.NDArray[np.float64], high: npt.NDArray[np.float64], x: npt.NDArray[np.float64]
-) -> list[npt.NDArray[np.float64]]:
+def _outline(low: Floats, high: Floats, x: Floats) -> list[Floats]:
     """Return the polygon between two lines, none where there is nothing between them."""
     known = np.isfinite(low) & np.isfinite(high)
     if not (high[known] > low[known]).any():
         return []
     x, low, high = x[known], low[known], high[known]
     return [np.column_stack([np.append(x, x[::-1]), np.append(low, high[::-1])])]
-
-
-def _lowest(bands: Sequence[Band]) -> float:
-    return min(0.0, *(float(np.nanmin([band.low, band.middle])) for band in bands))
-
-
-def _highest(bands: Sequence[Band]) -> float:
-    return max(0.0, *(float(np.nanmax([band.high, band.middle])) for band in bands))

@@ -29,7 +29,6 @@ class Panels:
 
     Attributes:
         axes: what to draw on, in places that ``at`` gives.
-        rows, columns: of panels.
         x, y: limits of every panel.
         shape: width and height of a panel, in inches: so that ticks are as long both ways.
         gap_y: between rows, in panels: room for numbers and for the lines of titles.
@@ -45,8 +44,7 @@ class Panels:
         shape: tuple[float, float],
         title_lines: int = 1,
     ) -> None:
-        self.axes, self.rows, self.columns, self.x, self.y = axes, rows, columns, x, y
-        self.shape = shape
+        self.axes, self.x, self.y, self.shape = axes, x, y, shape
         self.gap_y = (0.12 + title_lines * LINE) / shape[1]
         axes.set_axis_off()
         axes.set_xlim(-0.02, columns * (1 + GAP_X) - GAP_X + 0.02)

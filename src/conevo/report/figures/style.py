@@ -35,6 +35,7 @@ DASHES: tuple[Any, ...] = (
     (0, (8, 2, 2, 2)), (0, (2, 4)),
 )  # fmt: skip
 MARKERS = "os^DvPX*<p"
+EVERYTHING = (-math.inf, math.inf)  # the values of a measure that may have any
 SETTINGS: dict[Any, Any] = {
     "font.family": FONT,
     "font.size": SIZE,
@@ -182,16 +183,6 @@ def part_handles(colours: Mapping[str, str]) -> dict[str, Any]:
     return {
         name: Patch(facecolor=colour, hatch=hatch, edgecolor="0.25", linewidth=0.3)
         for (name, colour), hatch in zip(colours.items(), hatches(len(colours)), strict=True)
-    }
-
-
-def grey_handles(meanings: Sequence[tuple[float, str]]) -> dict[str, Any]:
-    """Return signs for degrees of darkness."""
-    from matplotlib.patches import Patch
-
-    return {
-        text: Patch(facecolor=grey(darkness), edgecolor="0.4", linewidth=0.4)
-        for darkness, text in meanings
     }
 
 

@@ -13,7 +13,6 @@ from conevo.report.figures.style import (
     WIDTH,
     Drawing,
     grey,
-    grey_handles,
     hatches,
     legend_height,
     mark_places,
@@ -105,7 +104,7 @@ def heat_map(
     """
     with style():
         from matplotlib.collections import PatchCollection
-        from matplotlib.patches import Rectangle
+        from matplotlib.patches import Patch, Rectangle
 
         side = [_side(row) for row in rows]
         lines = max(map(lines_in, side))
@@ -140,7 +139,11 @@ def heat_map(
         for spine in axes.spines.values():
             spine.set_visible(False)
         axes.set_xlabel(fitted(x_label, 0.6 * width, 2), x=0.5 * len(columns) / across)
-        put_legend(figure, grey_handles(legend))
+        handles = {
+            text: Patch(facecolor=grey(darkness), edgecolor="0.4", linewidth=0.4)
+            for darkness, text in legend
+        }
+        put_legend(figure, handles)
         return saved(figure)
 
 

@@ -9,7 +9,7 @@ from conevo.palette import FAINT, several
 from conevo.report.comparison import Cell
 from conevo.report.exhibits import Column, Figure, Section, Table, number
 from conevo.report.figures import tiles
-from conevo.report.sections.scope import KEYS, Scope, sizes
+from conevo.report.sections.scope import SHOWN_KEYS, Scope, key, sizes
 from conevo.worlds.registry import studies
 from conevo.worlds.study import StudyWords
 
@@ -22,25 +22,23 @@ Counts = dict[Cell, Counter[str]]
 def behaviours(scope: Scope) -> Section | None:
     """Return which collective and individual behaviours were seen; None in other worlds."""
     counts: dict[str, Counts] = defaultdict(lambda: defaultdict(Counter))
-    studied: dict[Cell, set[str]] = defaultdict(set)
-    for cell, run, kind, behaviour, count in scope.rows(
-        "SELECT run, kind, behaviour, count FROM behaviours ORDER BY ALL"
+    # The team's row names its most frequent behaviour: there it is runs that are counted.
+    for cell, kind, behaviour, count in scope.per_cell(
+        "SELECT cell, kind, behaviour, if(kind = 'team', count(*), sum(count))"
+        " FROM own JOIN behaviours USING (run) GROUP BY cell, kind, behaviour"
     ):
-        # The team's row names its most frequent behaviour: there it is runs that are counted.
-        counts[kind][cell][behaviour] += 1 if kind == "team" else count
-        studied[cell].add(run)
+        counts[kind][cell][behaviour] = count
     if not counts:
         return None
-    n = {cell: len(studied[cell]) for cell in scope.ordered(studied)}
-    names, words = _named({name for of in counts["collective"].values() for name in of})
-    return Section(
-        "Behaviours",
-        (),
-        [
-            *_events(scope, counts["collective"], n, names, words),
-            _table(scope, counts, n, names, words),
-        ],
+    studied = dict(
+        scope.per_cell(
+            "SELECT cell, count(DISTINCT run) FROM own JOIN behaviours USING (run) GROUP BY cell"
+        )
     )
+    n = {cell: studied[cell] for cell in scope.ordered(studied)}
+    names, words = _named({name for of in counts["collective"].values() for name in of})
+    events = _events(scope, counts["collective"], n, names, words)
+    return Section("Behaviours", (), [*events, _table(scope, counts, n, names, words)])
 
 
 def _named(seen: Collection[str]) -> tuple[Sequence[str], StudyWords]:
@@ -70,7 +68,7 @@ def _events(
     if not 0 < len(shares) <= MOST_BARS:
         return []
     rows = [
-        scope.key(cell.environment, cell.treatment)
+        key(cell)
         | {"n": n[cell], words.events: total[cell], "behaviour": name, "count": counts[cell][name]}
         for cell in n
         for name in names
@@ -101,14 +99,14 @@ def _table(
     individual = sorted({name for of in counts["individual"].values() for name in of})
     collective = [name for name in names if any(of[name] for of in counts["team"].values())]
     rows = [
-        scope.key(cell.environment, cell.treatment)
+        key(cell)
         | {"n": n[cell]}
         | {f"runs {name}": counts["team"][cell][name] for name in collective}
         | {f"robots {name}": counts["individual"][cell][name] / n[cell] for name in individual}
         for cell in n
     ]
     columns = [
-        *KEYS,
+        *SHOWN_KEYS,
         Column("n", "n"),
         *(Column(f"runs {name}", name, number) for name in collective),
         *(Column(f"robots {name}", name, number) for name in individual),

@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, NamedTuple
-
-import numpy as np
 
 from conevo.palette import caste_colours
 from conevo.report.comparison import Cell, Treatment
-from conevo.report.exhibits import Column, Exhibit, Figure, Section, Table, number, plain
+from conevo.report.exhibits import Column, Exhibit, Figure, Section, Table, plain, rows_of
 from conevo.report.figures import curves
 from conevo.report.learning_curves import Histories, caste_courses
 from conevo.report.sections.arrangement import Arrangement
-from conevo.report.sections.scope import KEYS, Scope, sizes
+from conevo.report.sections.scope import KEYS, SHOWN_KEYS, Scope, key, sizes
 from conevo.specialization.favourite import MAJORITY
 from conevo.terms import NON_SPECIALIZED, S_SCALE, SHARE_SCALE
 from conevo.worlds.registry import colours_of
@@ -23,6 +20,40 @@ from conevo.worlds.registry import colours_of
 __all__ = ["castes"]
 
 MOST_ROWS = 12  # of panels that fit on a page
+TEAMS = f"""
+    SELECT cell, count(*), count(*) FILTER (castes = 1), avg(specialized), avg(devoted)
+    FROM own JOIN (
+        SELECT run, count(DISTINCT caste) AS castes,
+            count(DISTINCT caste) FILTER (caste <> '{NON_SPECIALIZED}') AS specialized,
+            if(count(setting_share) > 0, count(*) FILTER (setting_share > {MAJORITY}), NULL)
+                AS devoted
+        FROM robots GROUP BY run
+    ) USING (run) GROUP BY cell
+"""
+MEMBERS = f"""
+    SELECT min(cell), caste, favourite_setting, count(*),
+        count(*) / sum(count(*)) OVER (PARTITION BY {{group}}), avg(setting_share),
+        count(*) FILTER (setting_share > {MAJORITY})
+    FROM own JOIN robots USING (run) JOIN runs USING (run) WHERE setting_share IS NOT NULL
+    GROUP BY {{group}}, caste, favourite_setting ORDER BY count(*) DESC, caste, favourite_setting
+"""
+
+
+class _Member(NamedTuple):
+    """Robots of champions that have a caste and a favourite setting in common.
+
+    cell: of all of them, or the first of their treatment. robots: how many; portion: of all robots
+    of the cell or treatment. share: of the setting in those that they used, mean. devoted: how many
+    used it in more than half of their work.
+    """
+
+    cell: Cell
+    caste: str
+    setting: str
+    robots: int
+    portion: float
+    share: float
+    devoted: int
 
 
 def castes(scope: Scope, histories: Histories) -> Section:
@@ -32,11 +63,7 @@ def castes(scope: Scope, histories: Histories) -> Section:
     at = scope.arranged(found, by_environment=True)
     if found and at.is_drawable and len(at.small_panels()) <= MOST_ROWS:
         exhibits.append(_over_generations(scope, histories, at, x, found))
-    teams = _champions(scope)
-    if teams:
-        exhibits.append(_of_champions(scope, teams))
-    if members := _members(scope):
-        exhibits.append(_by_setting(scope, members))
+    exhibits += [*_of_champions(scope), *_by_setting(scope)]
     text = () if exhibits else ("No team of these runs was studied.",)
     return Section("Castes", text, exhibits)
 
@@ -56,8 +83,7 @@ def _over_generations(
         for cell in sorted(cells, key=lambda one: at.methods.index(one.treatment.method))
     }
     rows = [
-        scope.key(cell.environment, cell.treatment)
-        | {"evaluations": float(evaluations), "caste": name, "share": float(share)}
+        key(cell) | {"evaluations": float(evaluations), "caste": name, "share": float(share)}
         for cell, parts in found.items()
         for name, shares in parts.items()
         for evaluations, share in zip(x, shares, strict=True)
@@ -82,115 +108,64 @@ def _over_generations(
     )
 
 
-def _champions(scope: Scope) -> dict[Cell, list[dict[str, int]]]:
-    """Return the castes of each run's champion in the study, with their robots."""
-    found: dict[Cell, dict[str, dict[str, int]]] = defaultdict(lambda: defaultdict(dict))
-    for cell, run, caste, robots in scope.rows(
-        "SELECT run, caste, count(*) FROM robots GROUP BY ALL ORDER BY ALL"
-    ):
-        found[cell][run][caste] = robots
-    return {cell: list(teams.values()) for cell, teams in found.items()}
-
-
-def _devoted(scope: Scope) -> dict[Cell, float]:
-    """Return how many robots of a champion do more than half of their work in one setting, mean."""
-    found = scope.per_cell(
-        f"SELECT cell, avg(n) FROM (SELECT run, count(*) FILTER (setting_share > {MAJORITY}) AS n"
-        " FROM robots GROUP BY run HAVING count(setting_share) > 0) JOIN own USING (run)"
-        " GROUP BY cell"
-    )
-    return dict(found)
-
-
-def _of_champions(scope: Scope, teams: Mapping[Cell, Sequence[Mapping[str, int]]]) -> Table:
-    seen = {caste for of in teams.values() for team in of for caste in team}
-    names = [*sorted(seen - {NON_SPECIALIZED}), *({NON_SPECIALIZED} & seen)]
-    devoted = _devoted(scope)
-    rows: list[dict[str, Any]] = [
-        scope.key(*cell)
-        | {"n": len(of), "one_caste": sum(len(team) == 1 for team in of)}
-        | {"specialized": float(np.mean([len(set(team) - {NON_SPECIALIZED}) for team in of]))}
-        | {name: float(np.mean([team.get(name, 0) for team in of])) for name in names}
-        | {"devoted": devoted.get(cell)}
+def _of_champions(scope: Scope) -> list[Table]:
+    """Return the castes of each cell's champions, as they were studied; nothing without a study."""
+    robots = {
+        (cell, caste): robots
+        for cell, caste, robots in scope.per_cell(
+            "SELECT cell, caste, count(*) FROM own JOIN robots USING (run) GROUP BY ALL"
+        )
+    }
+    if not robots:
+        return []
+    teams = {cell: team for cell, *team in scope.per_cell(TEAMS)}
+    names = sorted({caste for _, caste in robots}, key=lambda name: (name == NON_SPECIALIZED, name))
+    rows = [
+        key(cell)
+        | {"n": n, "one_caste": of_one_caste, "specialized": specialized}
+        | {name: robots.get((cell, name), 0) / n for name in names}
+        | {"devoted": devoted}
         for cell in scope.ordered(teams)
-        for of in [teams[cell]]
+        for n, of_one_caste, specialized, devoted in [teams[cell]]
     ]
     columns = [
-        *KEYS,
+        *SHOWN_KEYS,
         Column("n", "n"),
-        *(Column(name, name, number) for name in names),
+        *(Column(name, name) for name in names),
         Column("specialized", "specialized castes"),
         Column("one_caste", "teams of one caste"),
         Column("devoted", f"robots above {MAJORITY:g} in one setting"),
     ]
-    return Table(
-        f"{scope.stem}-champions",
-        "Castes of the champions",
+    note = (
         "Robots in each caste, mean over the champions, observed in fresh scenarios; specialized "
         "castes: how many a champion has, mean; n: runs. Castes go by S, which cannot see with "
         f"which setting a robot works: robots above {MAJORITY:g} in one setting do more than half "
-        "of their work with it, whatever they do in between.",
-        columns,
-        rows,
+        "of their work with it, whatever they do in between."
     )
+    return [Table(f"{scope.stem}-champions", "Castes of the champions", note, columns, rows)]
 
 
-class _Member(NamedTuple):
-    """Robots of a cell's champions that have a caste and a favourite setting in common.
-
-    robots: how many; share: of the setting in those that they used, mean; devoted: how many used
-    it in more than half of their work.
-    """
-
-    cell: Cell
-    caste: str
-    setting: str
-    robots: int
-    share: float
-    devoted: int
-
-
-def _members(scope: Scope) -> list[_Member]:
-    """Return who is in which caste with which favourite; of studies that have favourites."""
-    found = scope.per_cell(
-        "SELECT cell, caste, favourite_setting, count(*), avg(setting_share),"
-        f" count(*) FILTER (setting_share > {MAJORITY}) FROM own JOIN robots USING (run)"
-        " WHERE setting_share IS NOT NULL GROUP BY ALL"
-        " ORDER BY cell, count(*) DESC, caste, favourite_setting"
-    )
-    return [_Member(*row) for row in found]
-
-
-def _by_setting(scope: Scope, members: Sequence[_Member]) -> Table:
+def _by_setting(scope: Scope) -> list[Table]:
     """Show castes by S next to favourite settings, a row per method and pair of them."""
-    numbers = [
-        scope.key(*cell) | {"n": len(scope.cells[cell])} | _shown([one])
-        for cell in scope.ordered(scope.cells)
-        for one in members
-        if one.cell == cell
-    ]
-    rows = []
-    for treatment in scope.treatments:
-        pairs: dict[tuple[str, str], list[_Member]] = defaultdict(list)
-        for one in members:
-            if one.cell.treatment == treatment:
-                pairs[one.caste, one.setting].append(one)
-        of = [_shown(group) for group in pairs.values()]
-        total = sum(row["robots"] for row in of)
-        rows += [
-            {"treatment": treatment.title} | row | {"portion": row["robots"] / total}
-            for row in sorted(of, key=lambda row: (-row["robots"], row["caste"], row["setting"]))
-        ]
-    columns = [
-        KEYS[1],
+    by_cell, by_treatment = (
+        [_Member(*row) for row in scope.per_cell(MEMBERS.format(group=group))]
+        for group in ("cell", "method, variant")
+    )
+    if not by_cell:
+        return []
+    by_cell.sort(key=lambda one: scope.ordered(scope.cells).index(one.cell))
+    by_treatment.sort(key=lambda one: scope.treatments.index(one.cell.treatment))
+    pair: list[Column[_Member]] = [
         Column("caste", "caste by S", plain),
         Column("setting", "favourite setting", plain),
         Column("robots", "robots"),
-        Column("portion", "portion of the robots"),
+    ]
+    of_pair: list[Column[_Member]] = [
         Column("share", "share of it"),
         Column("devoted", f"robots above {MAJORITY:g}"),
     ]
-    return Table(
+    n: Column[_Member] = Column("n", of=lambda one: len(scope.cells[one.cell]))
+    table = Table.of(
         f"{scope.stem}-favourites",
         "Castes by S, and the settings that robots prefer",
         "All robots of the champions, in fresh scenarios, environments together (CSV: each of "
@@ -199,19 +174,8 @@ def _by_setting(scope: Scope, members: Sequence[_Member]) -> Table:
         "them. S shows how often a robot switches actions, and cannot see settings: one that "
         "moves and detects in turn has S = 1 and is non-specialized, even if it always detects "
         "with the same setting.",
-        columns,
-        rows,
-        numbers=numbers,
+        [KEYS[-1], *pair, Column("portion", "portion of the robots"), *of_pair],
+        by_treatment,
+        numbers=rows_of([*KEYS, n, *pair, *of_pair], by_cell),
     )
-
-
-def _shown(group: Sequence[_Member]) -> dict[str, Any]:
-    """Return members of one caste and favourite as a row."""
-    robots = sum(one.robots for one in group)
-    return {
-        "caste": group[0].caste,
-        "setting": group[0].setting,
-        "robots": robots,
-        "share": sum(one.share * one.robots for one in group) / robots,
-        "devoted": sum(one.devoted for one in group),
-    }
+    return [table]

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import NamedTuple
 
-from conevo.report.comparison import Treatment
+from conevo.report.comparison import Cell
 from conevo.report.exhibits import Column, Section, Table, plain
-from conevo.report.sections.scope import Scope
+from conevo.report.sections.scope import KEYS, Scope
 from conevo.terms import counted
 
 __all__ = ["champions"]
@@ -20,16 +20,40 @@ NAMES = {
 }
 """Names of a study, and where it matters of its team, in a sentence."""
 
+CHOSEN = """
+    SELECT cell, replace(measure, '_', ' '), count(*), avg(selection), avg(validation), avg(test)
+    FROM own JOIN champions USING (run)
+    WHERE measure IN ('fitness', '{measure}') AND selection IS NOT NULL
+        AND validation IS NOT NULL AND test IS NOT NULL
+    GROUP BY cell, measure ORDER BY measure <> 'fitness', cell
+"""
+
+
+class _Chosen(NamedTuple):
+    """A measure of the champions of a cell's runs: means over runs."""
+
+    cell: Cell
+    measure: str
+    n: int
+    selection: float
+    validation: float
+    test: float
+
+    @property
+    def ratio(self) -> float | None:
+        """What is left in the test of the performance that was selected."""
+        return self.test / self.selection if self.selection > 0 else None
+
 
 def champions(scope: Scope) -> Section | None:
     """Return selection, validation and test of each cell's champions; None if no run has them."""
-    rows = [*_rows(scope, "fitness"), *_rows(scope, scope.measure)]
-    text = [*_not_finite(scope)]
-    if not rows:
+    measure = scope.main.name.replace("'", "''")
+    chosen = [_Chosen(*row) for row in scope.per_cell(CHOSEN.format(measure=measure))]
+    text = _not_finite(scope)
+    if not chosen:
         return Section("How champions were chosen", text) if text else None
-    columns = [
-        Column("environment", "environment", plain),
-        Column("treatment", "method", plain),
+    columns: list[Column[_Chosen]] = [
+        *KEYS,
         Column("measure", "measure", plain),
         Column("n", "n"),
         Column("selection", "selection"),
@@ -46,29 +70,8 @@ def champions(scope: Scope) -> Section | None:
         "n: runs in which all three are finite."
     )
     title = "Champions: selection, validation and test"
-    table = Table(f"{scope.stem}-chosen", title, note, columns, rows)
+    table = Table.of(f"{scope.stem}-chosen", title, note, columns, chosen)
     return Section("How champions were chosen", text, [table])
-
-
-def _rows(scope: Scope, measure: str) -> list[dict[str, Any]]:
-    """Return a row per cell."""
-    name = measure.replace("'", "''")
-    found = scope.tables.query(
-        "SELECT r.environment, r.method, r.variant, count(*), avg(c.selection), avg(c.validation),"
-        " avg(c.test) FROM champions c JOIN runs r USING (run) JOIN budgets b USING (run)"
-        f" WHERE {scope.group.condition} AND c.measure = '{name}' AND c.selection IS NOT NULL"
-        " AND c.validation IS NOT NULL AND c.test IS NOT NULL GROUP BY ALL"
-    )[1]
-    cells = {(row[0], Treatment(row[1], row[2])): row[3:] for row in found}
-    return [
-        scope.key(*cell)
-        | {"measure": measure.replace("_", " "), "n": n}
-        | {"selection": selection, "validation": validation, "test": test}
-        | {"ratio": test / selection if selection > 0 else None}
-        for cell in scope.cells
-        if cell in cells
-        for n, selection, validation, test in [cells[cell]]
-    ]
 
 
 def _not_finite(scope: Scope) -> list[str]:

@@ -58,22 +58,22 @@ def claims(tables: Tables) -> Section:
 def _columns(has_levels: bool) -> list[Column[Verdict]]:
     """Return the columns of a claim; levels are shown if the campaign has any."""
     return [
-        Column("id", of=lambda one: one.id),
+        Column("id"),
         Column("place", "claim", plain, of=lambda one: f"{one.id} ({one.source})"),
         Column("variant", "levels" * has_levels, plain, of=lambda one: one.variant or None),
-        Column("claim", "claim of the thesis", plain, is_wide=True, of=lambda one: one.claim),
-        Column("source", of=lambda one: one.source),
-        Column("effect", "effect", plain, is_wide=True, of=lambda one: one.effect),
+        Column("claim", "claim of the thesis", plain, is_wide=True),
+        Column("source"),
+        Column("effect", "effect", plain, is_wide=True),
         Column("interval", "95 % interval", interval, of=lambda one: (one.low, one.high)),
-        Column("n", "n", plain, of=lambda one: one.n),
+        Column("n", "n", plain),
         Column("exchanges", "exchange", plain, of=lambda one: per_generation(*one.exchange)),
-        Column("budget", of=lambda one: one.budget),
-        Column("tests", of=lambda one: one.tests),
+        Column("budget"),
+        Column("tests"),
         Column(
             "how", "tests; budget", plain, is_wide=True, of=lambda one: f"{one.tests}; {one.budget}"
         ),
-        Column("verdict", "verdict", plain, is_wide=True, of=lambda one: one.verdict),
-        Column("power", of=lambda one: one.power),
+        Column("verdict", "verdict", plain, is_wide=True),
+        Column("power"),
         Column("reasons", "why", plain, is_wide=True, of=_reasons),
     ]
 

@@ -7,13 +7,12 @@ pooled, as figure 4.12 names none; the drawing has every behaviour's clones, of 
 from __future__ import annotations
 
 from collections import defaultdict
-from statistics import fmean, stdev
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from conevo.report.exhibits import Column, Figure, Section, Table, interval, p_value, plain
 from conevo.report.figures import charts as figures
 from conevo.report.sections.scope import Scope, place_names
-from conevo.report.statistics import compare, with_holm
+from conevo.report.statistics import Comparison, compare, holm, moments
 
 __all__ = ["composed"]
 
@@ -22,17 +21,6 @@ NOTE = (
     "Teams composed of the fittest specialist of each behaviour of a champion, as many as 4.6.5 "
     "lists, and teams of clones of one; all methods together."
 )
-COLUMNS = [
-    Column("environment", "environment", plain),
-    Column("team", "team", plain),
-    Column("n", "n"),
-    Column("value", "composed"),
-    Column("clones", "best clones"),
-    Column("difference", "difference"),
-    Column("interval", "95 % interval", interval),
-    Column("p_t", "p (t)", p_value),
-    Column("p_holm", "p (MW, Holm)", p_value),
-]
 
 
 class _Played(NamedTuple):
@@ -44,21 +32,44 @@ class _Played(NamedTuple):
     value: float
 
 
+class _Pair(NamedTuple):
+    """Composed teams of one behaviour against the best clones of the same runs."""
+
+    environment: str
+    team: str
+    found: Comparison
+    p_holm: float | None
+
+
+COLUMNS: list[Column[_Pair]] = [
+    Column("environment", "environment", plain),
+    Column("team", "team", plain),
+    Column("n", "n", of=lambda one: one.found.n_a),
+    Column("value", "composed", of=lambda one: one.found.mean_a),
+    Column("clones", "best clones", of=lambda one: one.found.mean_b),
+    Column("difference", "difference", of=lambda one: one.found.difference),
+    Column("interval", "95 % interval", interval, of=lambda one: (one.found.low, one.found.high)),
+    Column("p_t", "p (t)", p_value, of=lambda one: one.found.p_t),
+    Column("p_mann_whitney", of=lambda one: one.found.p_mann_whitney),
+    Column("p_holm", "p (MW, Holm)", p_value),
+]
+
+
 def composed(scope: Scope) -> Section | None:
     """Return what composed teams and teams of clones reach; None if no team was composed."""
     by_run = _played(scope)
-    rows = _rows(scope, by_run)
-    if not rows:
+    pairs = _pairs(scope, by_run)
+    if not pairs:
         return None
     about = f"Task performance ({scope.unit}) of composed teams and teams of clones"
-    table = Table(
+    table = Table.of(
         f"{scope.stem}-composed-teams",
         about,
         f"{NOTE} Best clones: of the same runs. n: runs whose champions have all behaviours of the "
         "team. p (t): Student's independent t-test, uncorrected, as in the thesis; p (MW, Holm): "
-        f"Mann-Whitney, corrected by Holm for the {len(rows)} rows.",
+        f"Mann-Whitney, corrected by Holm for the {len(pairs)} rows.",
         COLUMNS,
-        rows,
+        pairs,
     )
     return Section(TITLE, exhibits=[_figure(scope, about, by_run), table])
 
@@ -66,37 +77,31 @@ def composed(scope: Scope) -> Section | None:
 def _played(scope: Scope) -> dict[str, list[_Played]]:
     """Return the teams of each run that were composed or cloned."""
     found: dict[str, list[_Played]] = {run.run: [] for of in scope.cells.values() for run in of}
-    for cell, run, *played in scope.rows(
+    for cell, run, *played in scope.per_cell(
         """
-        SELECT s.run, s.study, s.team, avg(s.value) FROM scores s JOIN runs r USING (run)
+        SELECT cell, run, s.study, s.team, avg(s.value)
+        FROM own JOIN scores s USING (run) JOIN runs r USING (run)
         WHERE s.study IN ('clones', 'composed') AND s.team <> 'whole' AND s.measure = r.measure
             AND s.value IS NOT NULL
-        GROUP BY ALL ORDER BY ALL
+        GROUP BY ALL ORDER BY run, s.study, s.team
         """
     ):
         found[run].append(_Played(cell.environment, *played))
     return found
 
 
-def _rows(scope: Scope, by_run: dict[str, list[_Played]]) -> list[dict[str, Any]]:
+def _pairs(scope: Scope, by_run: dict[str, list[_Played]]) -> list[_Pair]:
     """Return each composed team with the best clones of the same runs."""
     best = max if scope.main.larger_is_better else min
-    pairs: dict[tuple[str, str], list[tuple[float, float]]] = defaultdict(list)
+    values: dict[tuple[str, str], list[tuple[float, float]]] = defaultdict(list)
     for teams in by_run.values():
         clones = [team.value for team in teams if team.study == "clones"]
         for team in teams:
             if team.study == "composed" and clones:
-                pairs[team.environment, team.team].append((team.value, best(clones)))
-    rows: list[dict[str, Any]] = []
-    for (environment, name), values in sorted(pairs.items()):
-        found = compare([a for a, _ in values], [b for _, b in values])
-        rows.append(
-            {"environment": environment, "team": name, "n": len(values)}
-            | {"value": found.mean_a, "clones": found.mean_b, "difference": found.difference}
-            | {"interval": (found.low, found.high)}
-            | {"p_t": found.p_t, "p_mann_whitney": found.p_mann_whitney}
-        )
-    return with_holm(rows)
+                values[team.environment, team.team].append((team.value, best(clones)))
+    found = {key: compare(*zip(*of, strict=True)) for key, of in sorted(values.items())}
+    corrected = holm([one.p_mann_whitney for one in found.values()])
+    return [_Pair(*key, one, p) for (key, one), p in zip(found.items(), corrected, strict=True)]
 
 
 def _figure(scope: Scope, about: str, by_run: dict[str, list[_Played]]) -> Figure:
@@ -110,7 +115,7 @@ def _figure(scope: Scope, about: str, by_run: dict[str, list[_Played]]) -> Figur
     }
     places = [e for e in scope.environments if any(e in of for of in values.values())]
     means = {
-        f"{team} {study}": [_bar(values[study, team].get(e, [])) for e in places]
+        f"{team} {study}": [figures.Bar(*moments(values[study, team].get(e, []))) for e in places]
         for study, team in sorted(values)
     }
     rows = [
@@ -133,9 +138,3 @@ def _figure(scope: Scope, about: str, by_run: dict[str, list[_Played]]) -> Figur
             within=scope.within,
         ),
     )
-
-
-def _bar(values: list[float]) -> figures.Bar | None:
-    if not values:
-        return None
-    return figures.Bar(fmean(values), stdev(values) if len(values) > 1 else None)

@@ -8,8 +8,10 @@ means. If smaller values of a measure are better, an increase is a loss.
 
 from __future__ import annotations
 
-from collections import defaultdict
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from itertools import groupby
+from statistics import fmean
+from typing import NamedTuple
 
 from conevo.report.comparison import Cell
 from conevo.report.exhibits import (
@@ -21,11 +23,12 @@ from conevo.report.exhibits import (
     interval,
     p_value,
     plain,
+    rows_of,
     with_values,
 )
 from conevo.report.figures import charts as figures
 from conevo.report.sections.scope import KEYS, Scope, named, sizes
-from conevo.report.statistics import compare, mean_interval, with_holm
+from conevo.report.statistics import Comparison, Estimate, compare, holm, mean_interval
 
 __all__ = ["interventions"]
 
@@ -38,6 +41,7 @@ ENDS = "which ends at ±100 %, where losses do"
 class _Team(NamedTuple):
     """A changed team of a run: its main measure, and that of the team unchanged."""
 
+    cell: Cell
     run: str
     caste: str
     whole: float
@@ -54,6 +58,16 @@ class _Team(NamedTuple):
         """The loss in percent of the larger of the two: -100 to 100, below 0 for a gain."""
         lost = self.whole - self.value if self.larger_is_better else self.value - self.whole
         return 100 * lost / self.scale
+
+
+class _Changed(NamedTuple):
+    """The changed teams of a cell and caste, the unchanged ones, and the loss in percent."""
+
+    cell: Cell
+    caste: str
+    result: Comparison
+    lost: Estimate
+    p_holm: float | None = None
 
 
 class _Study(NamedTuple):
@@ -90,78 +104,66 @@ STUDIES = {
 
 def interventions(scope: Scope) -> list[Section]:
     """Return a section per study; none on changed places if no run was studied in that way."""
-    return [
-        _section(scope, name, cells, lost)
-        for name in STUDIES
-        for cells, lost in [_teams(scope, name)]
-        if cells or name != ROTATED
-    ]
+    return [one for study in STUDIES if (one := _section(scope, study))]
 
 
-def _section(scope: Scope, study: str, cells: dict[Cell, list[_Team]], lost: int) -> Section:
+def _section(scope: Scope, study: str) -> Section | None:
+    cells, lost = _teams(scope, study)
+    if not cells and study == ROTATED:
+        return None
     text = []
     if lost:
         text.append(f"Teams left out, as neither they nor the unchanged ones scored: {lost}.")
     if not cells:
         none = "None of these runs has an intervention study."
         return Section(STUDIES[study].title, text or [none])
-    exhibits = [_figure(scope, study, cells), _table(scope, study, _rows(scope, cells))]
+    exhibits = [_figure(scope, study, cells), _table(scope, study, _compared(cells))]
     return Section(STUDIES[study].title, text, exhibits)
 
 
 def _teams(scope: Scope, study: str) -> tuple[dict[Cell, list[_Team]], int]:
     """Return the changed teams of each cell by run, and the number with nothing to lose."""
     found = [
-        (cell, _Team(run, caste, whole, value, scope.main.larger_is_better))
-        for cell, run, caste, whole, value in scope.rows(
+        _Team(cell, run, caste, whole, value, scope.main.larger_is_better)
+        for cell, run, caste, whole, value in scope.per_cell(
             f"""
-            WITH played AS (
-                SELECT s.run, r.seed, s.team, avg(s.value) AS value
-                FROM scores s JOIN runs r USING (run)
+            SELECT cell, run, team,
+                max(value) FILTER (team = 'whole') OVER (PARTITION BY run) AS whole, value
+            FROM (
+                SELECT cell, run, seed, team, avg(s.value) AS value
+                FROM own JOIN scores s USING (run) JOIN runs r USING (run)
                 WHERE s.study = '{study}' AND s.measure = r.measure AND s.value IS NOT NULL
                 GROUP BY ALL
             )
-            SELECT run, changed.team, whole.value, changed.value
-            FROM played changed JOIN played whole USING (run)
-            WHERE whole.team = 'whole' AND changed.team <> 'whole'
-            ORDER BY changed.seed, run, changed.team
+            QUALIFY team <> 'whole' AND whole IS NOT NULL ORDER BY seed, run, team
             """
         )
     ]
-    able = {
-        cell: [team for own, team in found if own == cell and team.scale > 0]
-        for cell in scope.cells
-    }
-    kept = {cell: teams for cell, teams in able.items() if teams}
-    return kept, len(found) - sum(map(len, kept.values()))
+    able = [team for team in found if team.scale > 0]
+    cells = {cell: [team for team in able if team.cell == cell] for cell in scope.cells}
+    return {cell: teams for cell, teams in cells.items() if teams}, len(found) - len(able)
 
 
 def _figure(scope: Scope, study: str, cells: dict[Cell, list[_Team]]) -> Exhibit:
     """Draw a point per run: the mean over its castes."""
     _, what, note = STUDIES[study]
-    means: dict[Cell, list[float]] = {}
-    for cell, teams in cells.items():
-        of_run = defaultdict(list)
-        for team in teams:
-            of_run[team.run].append(team.lost)
-        means[cell] = [sum(values) / len(values) for values in of_run.values()]
-    rows = [
-        scope.key(cell.environment, cell.treatment)
-        | {"run": team.run, "caste": team.caste, "whole": team.whole, scope.measure: team.value}
-        | {"lost": team.lost}
+    means = {
+        cell: [fmean(team.lost for team in of) for _, of in groupby(teams, lambda one: one.run)]
         for cell, teams in cells.items()
-        for team in teams
+    }
+    columns: list[Column[_Team]] = [
+        *KEYS,
+        Column("run", "run", plain),
+        Column("caste", _caste_title(study), plain),
+        Column("whole"),
+        Column(scope.main.name, of=lambda one: one.value),
+        Column("lost", "lost, %"),
     ]
+    items = [team for teams in cells.values() for team in teams]
     title = f"Task performance ({scope.unit}) that is lost with {what}"
     at = scope.arranged(means)
     if not at.is_drawable:
-        columns = [
-            *KEYS,
-            Column("run", "run", plain),
-            *_by_caste(study),
-            Column("lost", "lost, %"),
-        ]
-        return Table(f"{scope.stem}-{study}", title, note, columns, rows, is_folded=True)
+        return Table.of(f"{scope.stem}-{study}", title, note, columns, items, is_folded=True)
     several = any(len(values) > 1 for values in means.values())
     size = sizes(len(values) for values in means.values())
     return Figure(
@@ -171,7 +173,7 @@ def _figure(scope: Scope, study: str, cells: dict[Cell, list[_Team]]) -> Exhibit
         f"({scope.main.direction}). A point per run{'' if study == ROTATED else OVER_CASTES}"
         + (f"; next to them the mean with Student's 95 % interval, {ENDS}" if several else "")
         + f". {size} per cell.",
-        rows=rows,
+        rows=rows_of(columns, items),
         drawing=figures.points(
             at.grid(means, lambda of: figures.Points(of, mean_interval(of).ends(-MOST, MOST))),
             at.places,
@@ -184,47 +186,44 @@ def _figure(scope: Scope, study: str, cells: dict[Cell, list[_Team]]) -> Exhibit
     )
 
 
-def _rows(scope: Scope, cells: dict[Cell, list[_Team]]) -> list[dict[str, Any]]:
-    rows: list[dict[str, Any]] = []
+def _compared(cells: dict[Cell, list[_Team]]) -> list[_Changed]:
+    """Return the changed teams of each cell and caste, compared with the unchanged ones."""
+    found = []
     for cell, teams in cells.items():
         for caste in sorted({team.caste for team in teams}):
             with_it = [team for team in teams if team.caste == caste]
             result = compare([team.value for team in with_it], [team.whole for team in with_it])
             lost = mean_interval([team.lost for team in with_it])
-            of = _percent(result.mean_a, result.mean_b)
-            rows.append(
-                scope.key(cell.environment, cell.treatment)
-                | {"caste": caste, "n": len(with_it)}
-                | {"whole": result.mean_b, "changed": result.mean_a, "percent": of}
-                | {"lost": lost.value, "interval": lost.within(-MOST, MOST)}
-                | {"p_t": result.p_t, "p_mann_whitney": result.p_mann_whitney}
-            )
-    return with_holm(rows)
+            found.append(_Changed(cell, caste, result, lost))
+    corrected = holm([one.result.p_mann_whitney for one in found])
+    return [one._replace(p_holm=p) for one, p in zip(found, corrected, strict=True)]
 
 
-def _by_caste(study: str) -> list[Column]:
-    return [] if study == ROTATED else [Column("caste", "caste", plain)]
+def _caste_title(study: str) -> str:
+    return "" if study == ROTATED else "caste"
 
 
-def _percent(changed: float | None, whole: float | None) -> float | None:
-    """Return the changed value in percent of the whole, None without one."""
-    return 100 * changed / whole if changed is not None and whole else None
+def _percent(found: Comparison) -> float | None:
+    """Return the mean of changed teams in percent of the unchanged ones', None if that is 0."""
+    return 100 * found.mean_a / found.mean_b if found.mean_a is not None and found.mean_b else None
 
 
-def _table(scope: Scope, study: str, rows: list[dict[str, Any]]) -> Table:
+def _table(scope: Scope, study: str, changed: Sequence[_Changed]) -> Table:
     _, what, note = STUDIES[study]
-    columns = [
+    columns: list[Column[_Changed]] = [
         *KEYS,
-        *_by_caste(study),
-        Column("n", "n"),
-        Column("whole", "unchanged"),
-        Column("changed", "changed"),
-        Column("percent", "% of unchanged"),
-        Column("lost", "lost, %"),
-        Column("interval", "95 % interval", interval),
-        Column("p_t", "p (t)", p_value),
+        Column("caste", _caste_title(study), plain),
+        Column("n", "n", of=lambda one: one.lost.n),
+        Column("whole", "unchanged", of=lambda one: one.result.mean_b),
+        Column("changed", "changed", of=lambda one: one.result.mean_a),
+        Column("percent", "% of unchanged", of=lambda one: _percent(one.result)),
+        Column("lost", "lost, %", of=lambda one: one.lost.value),
+        Column("interval", "95 % interval", interval, of=lambda one: one.lost.within(-MOST, MOST)),
+        Column("p_t", "p (t)", p_value, of=lambda one: one.result.p_t),
+        Column("p_mann_whitney", of=lambda one: one.result.p_mann_whitney),
         Column("p_holm", "p (MW, Holm)", p_value),
     ]
+    rows = rows_of(columns, changed)
     shown = with_values(columns, rows)
     is_tested = any(column.key == "p_t" for column in shown)
     tests = (

@@ -8,8 +8,9 @@ from typing import Any
 from conevo.report.comparison import Cell
 from conevo.report.exhibits import Column, Exhibit, Figure, Section, Table, plain
 from conevo.report.figures import curves
+from conevo.report.figures.style import EVERYTHING
 from conevo.report.learning_curves import Course, Histories, courses
-from conevo.report.sections.scope import KEYS, Scope, named, sizes
+from conevo.report.sections.scope import SHOWN_KEYS, Scope, key, named, sizes
 from conevo.terms import S_SCALE
 
 __all__ = ["learning"]
@@ -52,7 +53,7 @@ def _exhibit(
 ) -> Exhibit:
     """Draw courses, a panel per environment and variant; a table if those are too many."""
     rows = [
-        scope.key(cell.environment, cell.treatment)
+        key(cell)
         | ({"threshold": suffix} if suffix else {})
         | {"evaluations": x, "mean": mean, "interval": (low, high), "n": course.n}
         for (cell, suffix), course in lines.items()
@@ -74,7 +75,7 @@ def _exhibit(
     }
     panels = {
         title: {
-            curves.Line(cell.treatment.method, suffix): curves.Band(*course[:4])
+            curves.Line(cell.treatment.method, suffix): course
             for (cell, suffix), course in lines.items()
             if cell in cells
         }
@@ -93,7 +94,7 @@ def _exhibit(
             x_label="team evaluations",
             y_label=SHORT.get(name, scope.unit),
             limits=limits,
-            within=limits or (scope.within if name == "learning" else curves.EVERYTHING),
+            within=limits or (scope.within if name == "learning" else EVERYTHING),
         ),
     )
 
@@ -110,7 +111,7 @@ def _course_table(
     most = max(float(course.x[-1]) for course in lines.values())
     quarters = [round(most * k / 4) for k in (1, 2, 3, 4)]
     rows = [
-        scope.key(cell.environment, cell.treatment)
+        key(cell)
         | ({"threshold": suffix} if suffix else {})
         | {"n": course.n}
         | {str(q): _at(course, q) for q in quarters}
@@ -118,7 +119,7 @@ def _course_table(
     ]
     has_parts = any(suffix for _, suffix in lines)
     columns = [
-        *KEYS,
+        *SHOWN_KEYS,
         *([Column("threshold", "threshold", plain)] if has_parts else []),
         Column("n", "n"),
         *(Column(str(q), f"at {q:,}") for q in quarters),

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
-
-import numpy as np
+from collections.abc import Iterator, Sequence
+from itertools import product, starmap
+from typing import NamedTuple
 
 from conevo.report.comparison import Cell
-from conevo.report.exhibits import Column, Section, Table, number, plain
-from conevo.report.sections.scope import Scope, span
+from conevo.report.exhibits import Column, Section, Table, number, plain, rows_of
+from conevo.report.sections.scope import KEYS, Scope, span
 from conevo.specialization.diversity import task_specialization
 from conevo.specialization.team import METRICS, Metric
 from conevo.terms import S_SCALE, SHARE_SCALE
-from conevo.typing import Record
 
 __all__ = ["definitions", "metrics"]
 
@@ -21,7 +20,7 @@ MOST_COLUMNS = 5  # of treatments next to each other; more are below each other
 DIVERSITY = "hierarchic_social_entropy"
 PAYS = "diversity that pays"
 PAYING = Metric(
-    lambda _: None,  # of several runs, see ``_numbers``
+    lambda _: None,  # of several runs, see ``_paying``
     "plus or minus the hierarchic social entropy",
     "the runs' mean hierarchic social entropy times its correlation with their task performance; "
     "below 0: diversity costs",
@@ -38,44 +37,67 @@ DIRECTIONS = {
 }
 
 
+MEASURED = """
+    SELECT cell, metric, count(*), avg(value), stddev_samp(value)
+    FROM own JOIN metrics USING (run) WHERE isfinite(value) GROUP BY cell, metric
+"""
+
+
+class _Number(NamedTuple):
+    """A measure of the champions of a cell: mean and standard deviation of the runs."""
+
+    cell: Cell
+    metric: str
+    n: int
+    mean: float | None
+    sd: float | None
+
+    @property
+    def about(self) -> dict[str, str]:
+        """Where it is, and its name with its direction."""
+        direction = f" ({DIRECTIONS[self.metric]})" if self.metric in DIRECTIONS else ""
+        return {"environment": self.cell.environment, "metric": _title(self.metric) + direction}
+
+    @property
+    def text(self) -> str:
+        """Mean and deviation."""
+        return number(self.mean) + (f" ± {number(self.sd)}" if self.sd else "")
+
+
+NUMBERS: Sequence[Column[_Number]] = (*KEYS, *(Column(name) for name in _Number._fields[1:]))
+
+
 def metrics(scope: Scope) -> Section:
     """Return every measure of the champions, a column per treatment."""
     title = "Measures of specialization"
-    found: dict[str, dict[Cell, list[float]]] = defaultdict(lambda: defaultdict(list))
-    diversity: dict[str, float] = {}
-    for cell, run, metric, value in scope.rows(
-        "SELECT run, metric, value FROM metrics WHERE isfinite(value) ORDER BY run, metric"
-    ):
-        found[metric][cell].append(value)
-        if metric == DIVERSITY:
-            diversity[run] = value
+    found = [_Number(*row) for row in scope.per_cell(MEASURED)]
     if not found:
         return Section(title, ["No team of these runs was studied."])
-    names = [*(m for m in METRICS if m in found), *sorted(found.keys() - METRICS.keys())]
-    numbers = [
-        scope.key(environment, treatment) | about
-        for environment in scope.environments
-        for metric in [*names, *([PAYS] if diversity else [])]
-        for treatment in scope.treatments
-        for about in _numbers(scope, Cell(environment, treatment), metric, found, diversity)
-    ]
+    names = [*METRICS, *sorted({one.metric for one in found} - METRICS.keys()), PAYS]
+    by_place = {
+        (one.cell.environment, one.metric, one.cell.treatment): one
+        for one in [*found, *_paying(scope)]
+    }
+    places = product(scope.environments, names, scope.treatments)
+    numbers = [by_place[place] for place in places if place in by_place]
     runs: dict[str, list[int]] = defaultdict(list)
     for cell, of in scope.cells.items():
         runs[cell.treatment.title].append(len(of))
     treatments = {one.title: f"{one.title} ({span(runs[one.title])})" for one in scope.treatments}
     columns = [Column("environment", "environment", plain), Column("metric", "measure", plain)]
+    rows: list[dict[str, str]]
     if len(treatments) > MOST_COLUMNS:
         columns += [Column("treatment", "method", plain), Column("value", "value", plain)]
         rows = [
-            _named(one) | {"treatment": treatments[one["treatment"]], "value": _shown(one)}
+            one.about | {"treatment": treatments[one.cell.treatment.title], "value": one.text}
             for one in numbers
         ]
     else:
-        columns += [Column(key, name, plain) for key, name in treatments.items()]
-        by_metric: dict[tuple[str, str], Record] = {}
+        columns += [Column(title, name, plain) for title, name in treatments.items()]
+        by_metric: dict[tuple[str, str], dict[str, str]] = {}
         for one in numbers:
-            row = by_metric.setdefault((one["environment"], one["metric"]), _named(one))
-            row[one["treatment"]] = _shown(one)
+            row = by_metric.setdefault((one.cell.environment, one.metric), one.about)
+            row[one.cell.treatment.title] = one.text
         rows = list(by_metric.values())
     table = Table(
         f"{scope.stem}-specialization-measures",
@@ -85,39 +107,24 @@ def metrics(scope: Scope) -> Section:
         f"{PAYS.capitalize()} is one number for all runs of a cell, from three on.",
         columns,
         rows,
-        numbers=numbers,
+        numbers=rows_of(NUMBERS, numbers),
     )
     return Section(title, (), [table])
 
 
-def _numbers(
-    scope: Scope,
-    cell: Cell,
-    metric: str,
-    found: Mapping[str, Mapping[Cell, Sequence[float]]],
-    diversity: Mapping[str, float],
-) -> Iterator[Record]:
-    """Yield what a measure is in a cell; nothing if the cell has none."""
-    if metric == PAYS:
-        of = [run for run in scope.cells.get(cell, ()) if run.run in diversity]
-        sign = 1 if scope.main.larger_is_better else -1
-        reached = [sign * run.value for run in of]
-        part = task_specialization([diversity[run.run] for run in of], reached)
-        yield {"metric": metric, "n": len(of), "mean": part, "sd": None}
-    elif values := found[metric].get(cell):
-        sd = float(np.std(values, ddof=1)) if len(values) > 1 else None
-        yield {"metric": metric, "n": len(values), "mean": float(np.mean(values)), "sd": sd}
-
-
-def _named(one: Record) -> Record:
-    """Return where and what a number is."""
-    metric = one["metric"]
-    direction = f" ({DIRECTIONS[metric]})" if metric in DIRECTIONS else ""
-    return {"environment": one["environment"], "metric": _title(metric) + direction}
-
-
-def _shown(one: Record) -> str:
-    return number(one["mean"]) + (f" ± {number(one['sd'])}" if one["sd"] else "")
+def _paying(scope: Scope) -> Iterator[_Number]:
+    """Yield the diversity that pays of each cell; nothing if no run has a diversity."""
+    sql = "SELECT cell, run, value FROM own JOIN metrics USING (run) WHERE isfinite(value)"
+    found = scope.per_cell(f"{sql} AND metric = '{DIVERSITY}'")
+    diversity = {run: value for _, run, value in found}
+    if not diversity:
+        return
+    sign = 1 if scope.main.larger_is_better else -1
+    for cell in starmap(Cell, product(scope.environments, scope.treatments)):
+        runs = [one for one in scope.cells.get(cell, ()) if one.run in diversity]
+        reached = [sign * one.value for one in runs]
+        part = task_specialization([diversity[one.run] for one in runs], reached)
+        yield _Number(cell, PAYS, len(runs), part, None)
 
 
 def _title(metric: str) -> str:

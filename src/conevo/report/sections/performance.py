@@ -4,16 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from statistics import fmean, stdev
+from statistics import fmean
 from typing import Any
 
-from conevo.report.comparison import (
-    Aggregate,
-    Cell,
-    Summary,
-    aggregate,
-    summarize,
-)
+from conevo.campaigns.tables import RunValue
+from conevo.report.comparison import Aggregate, Cell, Summary, aggregate, summarize
 from conevo.report.exhibits import (
     Column,
     Exhibit,
@@ -24,10 +19,12 @@ from conevo.report.exhibits import (
     number,
     p_value,
     plain,
+    rows_of,
     with_values,
 )
 from conevo.report.figures import charts as figures
 from conevo.report.sections.scope import KEYS, Scope, named, sizes, span
+from conevo.report.statistics import moments
 from conevo.worlds.registry import entry_of
 
 __all__ = ["performance"]
@@ -38,27 +35,59 @@ MOST_COLUMNS = 5  # of treatments that a table compares with each other
 def performance(scope: Scope) -> Section:
     """Return the performance of every cell."""
     found = {cell: summarize(scope.cells[cell]) for cell in scope.ordered(scope.cells)}
-    exchanges = scope.exchanges()
-    rows = [_row(scope, cell, one, exchanges.get(cell)) for cell, one in found.items()]
-    exhibits = [*_drawn(scope, found, rows), _table(scope, rows), *_pooled(scope), *_others(scope)]
+    columns = _columns(scope)
+    rows = rows_of(columns, found.items())
+    exhibits = [
+        *_drawn(scope, found, rows),
+        _table(scope, columns, rows),
+        *_pooled(scope),
+        *_others(scope),
+    ]
     return Section(f"Task performance: {scope.main.heading}", _warnings(scope), exhibits)
+
+
+def _columns(scope: Scope) -> list[Column[tuple[Cell, Summary]]]:
+    """Return the numbers of a cell; without a generation 0, optimum or exchange None is there."""
+    made = scope.exchanges()
+    begun = {cell: fmean(run.value for run in runs) for cell, runs in scope.first.items()}
+    pairs = {cell: pairs for cell, (pairs, _) in made.items()}
+    percent = {cell: 100 * share for cell, (_, share) in made.items()}
+    return [
+        *KEYS,
+        Column("n", "n", of=lambda one: len(one[1].values)),
+        Column("mean", "mean", of=lambda one: one[1].mean.value),
+        Column("sd", "sd", of=lambda one: one[1].sd),
+        Column(
+            "interval", "95 % interval", interval, of=lambda one: one[1].mean.within(*scope.within)
+        ),
+        Column("range", "lowest to highest", interval, of=lambda one: one[1].range),
+        Column("generation_0", "generation 0", of=lambda one: begun.get(one[0])),
+        Column("share", "share of optimum", of=lambda one: _share(scope.cells[one[0]], one[1])),
+        Column("p_ks", "p (KS)", p_value, of=lambda one: one[1].normal.p_ks),
+        Column(
+            "p_lilliefors", "p (Lilliefors)", p_value, of=lambda one: one[1].normal.p_lilliefors
+        ),
+        Column("exchanges", "exchange, pairs", of=lambda one: pairs.get(one[0])),
+        Column("exchange_share", "exchange, %", of=lambda one: percent.get(one[0])),
+    ]
 
 
 def _drawn(
     scope: Scope, found: Mapping[Cell, Summary], rows: Sequence[Mapping[str, Any]]
 ) -> list[Exhibit]:
     """Return means as bars, and every run as a point; a table of the runs if that is too much."""
-    runs = [
-        scope.key(*cell) | {"seed": one.seed, "run": one.run, scope.measure: one.value}
-        for cell, values in scope.cells.items()
-        for one in values
+    runs = [(cell, one) for cell, values in scope.cells.items() for one in values]
+    columns: list[Column[tuple[Cell, RunValue]]] = [
+        *KEYS,
+        Column("seed", "seed", of=lambda one: one[1].seed),
+        Column("run", of=lambda one: one[1].run),
+        Column(scope.main.name, scope.unit, of=lambda one: one[1].value),
     ]
     title = f"Task performance ({scope.unit}) of every run"
     at = scope.arranged(found)
     if not at.is_drawable:
-        columns = [*KEYS, Column("seed", "seed"), Column(scope.measure, scope.unit)]
         note = "Mean over fresh scenarios."
-        return [Table(f"{scope.stem}-runs", title, note, columns, runs, is_folded=True)]
+        return [Table.of(f"{scope.stem}-runs", title, note, columns, runs, is_folded=True)]
     names = named({cell: len(one.values) for cell, one in found.items()})
     size = sizes(len(one.values) for one in found.values())
     several = any(len(one.values) > 1 for one in found.values())
@@ -85,7 +114,7 @@ def _drawn(
         title,
         f"{scope.about} A point per run; next to them the mean with Student's 95 % interval. "
         f"{size} per cell.",
-        rows=runs,
+        rows=rows_of(columns, runs),
         drawing=figures.points(
             at.grid(found, lambda one: figures.Points(one.values, one.mean.ends(*scope.within))),
             at.places,
@@ -98,9 +127,13 @@ def _drawn(
     return [bars, points]
 
 
-def _table(scope: Scope, rows: Sequence[Mapping[str, Any]]) -> Table:
+def _table(
+    scope: Scope,
+    columns: Sequence[Column[tuple[Cell, Summary]]],
+    rows: Sequence[Mapping[str, Any]],
+) -> Table:
     """Return the performance of every cell, with its statistics."""
-    shown = _performance_columns(rows)
+    shown = with_values(columns, rows)
     keys = {column.key for column in shown}
     notes = {
         "interval": "95 % interval: Student's t"
@@ -129,50 +162,11 @@ def _table(scope: Scope, rows: Sequence[Mapping[str, Any]]) -> Table:
     )
 
 
-def _row(
-    scope: Scope, cell: Cell, one: Summary, made: tuple[float, float] | None
-) -> dict[str, Any]:
-    """Return the numbers of a cell.
-
-    Args:
-        scope, cell, one: the cell and the results of its runs.
-        made: pairs that exchanged in a generation, and their share; None if the method never does.
-    """
-    begun = [run.value for run in scope.first.get(cell, ())]
-    optima = {run.optimum for run in scope.cells[cell]}
+def _share(runs: Sequence[RunValue], of: Summary) -> float | None:
+    """Return the mean as a share of the optimum, None unless it is known and all runs have it."""
+    optima = {run.optimum for run in runs}
     optimum = optima.pop() if len(optima) == 1 else None
-    mean, (pairs, share) = one.mean.value, made or (None, None)
-    return scope.key(*cell) | {
-        "n": len(one.values),
-        "mean": mean,
-        "sd": one.sd,
-        "interval": one.mean.within(*scope.within),
-        "range": (min(one.values), max(one.values)),
-        "generation_0": sum(begun) / len(begun) if begun else None,
-        "share": mean / optimum if optimum and mean is not None else None,
-        "p_ks": one.normal.p_ks,
-        "p_lilliefors": one.normal.p_lilliefors,
-        "exchanges": pairs,
-        "exchange_share": None if share is None else 100 * share,
-    }
-
-
-def _performance_columns(rows: Sequence[Mapping[str, Any]]) -> list[Column]:
-    columns = [
-        *KEYS,
-        Column("n", "n"),
-        Column("mean", "mean"),
-        Column("sd", "sd"),
-        Column("interval", "95 % interval", interval),
-        Column("range", "lowest to highest", interval),
-        Column("generation_0", "generation 0"),
-        Column("share", "share of optimum"),
-        Column("exchanges", "exchange, pairs"),
-        Column("exchange_share", "exchange, %"),
-        Column("p_ks", "p (KS)", p_value),
-        Column("p_lilliefors", "p (Lilliefors)", p_value),
-    ]
-    return with_values(columns, rows)
+    return of.mean.value / optimum if optimum and of.mean.value is not None else None
 
 
 def _warnings(scope: Scope) -> list[str]:
@@ -242,31 +236,16 @@ def _aggregate_row(one: Aggregate) -> dict[str, Any]:
 
 def _others(scope: Scope) -> list[Exhibit]:
     """Return a table of the measures other than the main one."""
-    rows = [
-        scope.key(environment, treatment)
-        | {
-            "measure": measure.title,
-            "unit": measure.unit,
-            "direction": measure.direction,
-            "n": len(values),
-        }
-        | {"mean": fmean(of), "sd": stdev(of) if len(of) > 1 else None}
-        for measure, cells in scope.others.items()
-        for (environment, treatment), values in cells.items()
-        for of in [[one.value for one in values]]
+    columns: list[Column[tuple[Cell, Sequence[RunValue]]]] = [
+        *KEYS,
+        Column("measure", "measure", plain, of=lambda one: one[1][0].measure.title),
+        Column("unit", "unit", plain, of=lambda one: one[1][0].measure.unit),
+        Column("direction", "direction", plain, of=lambda one: one[1][0].measure.direction),
+        Column("n", "n", of=lambda one: len(one[1])),
+        Column("mean", "mean", of=lambda one: moments([run.value for run in one[1]])[0]),
+        Column("sd", "sd", of=lambda one: moments([run.value for run in one[1]])[1]),
     ]
-    if not rows:
-        return []
-    columns = [
-        Column("environment", "environment", plain),
-        Column("measure", "measure", plain),
-        Column("unit", "unit", plain),
-        Column("direction", "direction", plain),
-        Column("treatment", "method", plain),
-        Column("n", "n"),
-        Column("mean", "mean"),
-        Column("sd", "sd"),
-    ]
+    items = [one for cells in scope.others.values() for one in cells.items()]
     note = "Mean over runs of the mean over fresh scenarios; sd: of the runs; n: runs."
     name, title = f"{scope.stem}-measures", "Other measures of task performance"
-    return [Table(name, title, note, columns, rows, is_folded=True)]
+    return [Table.of(name, title, note, columns, items, is_folded=True)] if items else []

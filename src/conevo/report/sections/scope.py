@@ -5,21 +5,27 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from itertools import product
 from typing import Any
 
 from conevo.campaigns.tables import RunValue, Tables
 from conevo.report.comparison import Cell, Group, Treatment, group_values, treatments_of
-from conevo.report.exhibits import Column, number, plain, slug
+from conevo.report.exhibits import Column, number, plain, rows_of, slug
 from conevo.report.sections.arrangement import Arrangement, arrange
 from conevo.worlds.measures import Measure
 
-__all__ = ["KEYS", "Scope", "named", "place_names", "scopes", "sizes", "span"]
+__all__ = ["KEYS", "SHOWN_KEYS", "Scope", "key", "named", "place_names", "scopes", "sizes", "span"]
 
 
-KEYS = (Column("environment", "environment", plain), Column("treatment", "method", plain))
-"""Columns that name a cell."""
+OfCell = tuple[Cell, *tuple[Any, ...]]  # a cell, and something about it
+KEYS: tuple[Column[OfCell], ...] = (
+    Column("environment", "environment", plain, of=lambda one: one[0].environment),
+    Column("method", of=lambda one: one[0].treatment.method),
+    Column("variant", of=lambda one: one[0].treatment.variant),
+    Column("treatment", "method", plain, of=lambda one: one[0].treatment.title),
+)
+"""Columns that name a cell, in CSV."""
+SHOWN_KEYS = [column for column in KEYS if column.title]
 
 Cells = Mapping[Cell, Sequence[RunValue]]
 
@@ -53,11 +59,6 @@ class Scope:
     def environments(self) -> list[str]:
         """Environments in order."""
         return list(dict.fromkeys(environment for environment, _ in self.cells))
-
-    @property
-    def measure(self) -> str:
-        """The name of the world's main measure."""
-        return self.main.name
 
     @property
     def main(self) -> Measure:
@@ -109,19 +110,6 @@ class Scope:
             by_environment=by_environment,
         )
 
-    @cached_property
-    def _cell_of(self) -> dict[str, Cell]:
-        return {one.run: cell for cell, values in self.cells.items() for one in values}
-
-    def rows(self, sql: str) -> list[tuple[Any, ...]]:
-        """Return the rows of a query that are about the group's runs, each after its cell.
-
-        Args:
-            sql: its first column is a run.
-        """
-        found = self.tables.query(sql)[1]
-        return [(self._cell_of[row[0]], *row) for row in found if row[0] in self._cell_of]
-
     def per_cell(self, sql: str) -> list[tuple[Any, ...]]:
         """Return the rows of a query about the group's cells, each after its cell.
 
@@ -151,14 +139,10 @@ class Scope:
         )
         return {cell: (pairs, share) for cell, pairs, share in found}
 
-    def key(self, environment: str, treatment: Treatment) -> dict[str, Any]:
-        """Return how rows of numbers name a cell."""
-        return {
-            "environment": environment,
-            "method": treatment.method,
-            "variant": treatment.variant,
-            "treatment": treatment.title,
-        }
+
+def key(cell: Cell) -> dict[str, Any]:
+    """Return how rows of numbers name a cell."""
+    return rows_of(KEYS, [(cell,)])[0]
 
 
 def scopes(tables: Tables) -> list[Scope]:

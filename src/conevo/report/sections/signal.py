@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 from conevo.numbers import plus_minus
 from conevo.report.comparison import Cell
 from conevo.report.exhibits import Column, Section, Table, plain
-from conevo.report.sections.scope import KEYS, Scope
+from conevo.report.sections.scope import SHOWN_KEYS, Scope, key
 from conevo.studies.repeatability import LEAST_RELIABILITY, has_signal
 
 __all__ = ["blind_cells", "signal"]
@@ -51,7 +51,7 @@ def signal(scope: Scope) -> Section | None:
             " these genotypes is nearly blind, and comparisons of these cells hardly test methods."
         )
     columns = [
-        *KEYS,
+        *SHOWN_KEYS,
         Column("unit", "unit on trial", plain),
         Column("n", "n"),
         Column("scheme", "trials"),
@@ -94,7 +94,7 @@ def _found(scope: Scope) -> dict[Cell, dict[str, MeasuredSignal]]:
 def _row(scope: Scope, cell: Cell, own: dict[str, MeasuredSignal]) -> dict[str, Any]:
     """Return the numbers of a cell."""
     first = own["first"]
-    row = scope.key(*cell) | {"unit": first.unit, "n": first.n, "scheme": first.scheme}
+    row = key(cell) | {"unit": first.unit, "n": first.n, "scheme": first.scheme}
     for generation in ("first", "last"):
         one = own.get(generation, MeasuredSignal())
         row |= {
