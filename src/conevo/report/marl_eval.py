@@ -89,36 +89,32 @@ def _environments(tables: Tables) -> dict[str, Cells]:
     found: dict[str, Cells] = {}
     rows = tables.query(
         """
-        WITH tests AS (
-            SELECT run, list(s.value ORDER BY s.scenario) AS test
-            FROM scores s JOIN runs r USING (run, measure)
-            WHERE s.study = 'test' AND s.team = 'champion' GROUP BY run
+        WITH judged AS (
+            SELECT run, measure, if(coalesce(larger_is_better, true), 1, -1) AS sign
+            FROM runs LEFT JOIN measures USING (run, measure)
+        ), tests AS (
+            SELECT run, list(sign * value ORDER BY scenario) AS test
+            FROM scores JOIN judged USING (run, measure)
+            WHERE study = 'test' AND team = 'champion'
+            GROUP BY run HAVING bool_and(coalesce(isfinite(value), false))
         ), curves AS (
             SELECT run, list(team_steps ORDER BY generation) AS team_steps,
-                   list(value ORDER BY generation) AS reached
-            FROM generations GROUP BY run
+                   list(sign * value ORDER BY generation) AS reached
+            FROM generations JOIN judged USING (run)
+            GROUP BY run HAVING bool_and(coalesce(isfinite(value), false))
         )
-        SELECT run, seed, world, family, preset, environment, method, variant, measure,
-               coalesce(larger_is_better, true), curves.team_steps, reached, test
-        FROM runs JOIN tests USING (run) JOIN curves USING (run)
-             LEFT JOIN measures USING (run, measure)
+        SELECT concat_ws(' ', world, nullif(family, ''), nullif(preset, '')), environment,
+               replace(concat_ws(' ', method, nullif(variant, '')), ',', ';'), run, seed,
+               if(sign < 0, 'negated-', '') || replace(measure, '_', '-'),
+               curves.team_steps, reached, test
+        FROM runs JOIN judged USING (run, measure) JOIN tests USING (run) JOIN curves USING (run)
         ORDER BY world, family, preset, number, environment, method, variant, seed, run
         """
     )[1]
-    for run, seed, world, family, preset, task, method, variant, measure, larger, *curve in rows:
-        steps, values, test = curve
-        if not np.isfinite(np.array(values + test, dtype=float)).all():
-            continue
-        environment = " ".join(part for part in (world, family, preset) if part)
-        algorithm = " ".join(part for part in (method, variant) if part).replace(",", ";")
-        one = _Run(run, seed, measure.replace("_", "-"), steps, values, test)
-        if not larger:
-            one = one._replace(
-                measure=f"negated-{one.measure}",
-                values=[-value for value in values],
-                test=[-value for value in test],
-            )
-        found.setdefault(environment, {}).setdefault(task, {}).setdefault(algorithm, []).append(one)
+    for environment, task, algorithm, *about in rows:
+        found.setdefault(environment, {}).setdefault(task, {}).setdefault(algorithm, []).append(
+            _Run(*about)
+        )
     return found
 
 

@@ -5,14 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-__all__ = [
-    "Claim",
-    "Compare",
-    "Part",
-    "Sample",
-    "Statement",
-    "Within",
-]
+__all__ = ["Claim", "Compare", "Part", "Sample", "Statement", "Within"]
 
 
 Expected = Literal["above", "alike"]

@@ -151,7 +151,13 @@ def arrange(
         axis=along.replace("_", " ") or axis,
         axis_name=along.replace("_", " ") or "environment",
         places=places,
-        panels=[_title(across, one) for one in combinations],
+        panels=[
+            ", ".join(
+                f"{name.replace('_', ' ')} = {level}"
+                for name, level in zip(across, one, strict=True)
+            )
+            for one in combinations
+        ],
         methods=list(dict.fromkeys(treatment.method for treatment in treatments)),
         environments=environments,
         where=where,
@@ -161,12 +167,6 @@ def arrange(
 def _agree(panel: Sequence[str], levels: Sequence[str | None]) -> bool:
     """Whether levels are those of a panel; a missing level fits any."""
     return all(level in (None, own) for own, level in zip(panel, levels, strict=True))
-
-
-def _title(factors: Iterable[str], levels: Sequence[str]) -> str:
-    return ", ".join(
-        f"{name.replace('_', ' ')} = {level}" for name, level in zip(factors, levels, strict=True)
-    )
 
 
 def _rank(level: str) -> tuple[bool, float, str]:

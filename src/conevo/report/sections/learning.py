@@ -10,7 +10,7 @@ from conevo.report.exhibits import Column, Exhibit, Figure, Section, Table, plai
 from conevo.report.figures import curves
 from conevo.report.figures.style import EVERYTHING
 from conevo.report.learning_curves import Course, Histories, courses
-from conevo.report.sections.scope import SHOWN_KEYS, Scope, key, named, sizes
+from conevo.report.sections.scope import KEYS, Scope, key, named, sizes
 from conevo.terms import S_SCALE
 
 __all__ = ["learning"]
@@ -110,27 +110,23 @@ def _course_table(
     """Return courses at quarters of the budget."""
     most = max(float(course.x[-1]) for course in lines.values())
     quarters = [round(most * k / 4) for k in (1, 2, 3, 4)]
-    rows = [
-        key(cell)
-        | ({"threshold": suffix} if suffix else {})
-        | {"n": course.n}
-        | {str(q): _at(course, q) for q in quarters}
-        for (cell, suffix), course in lines.items()
-    ]
     has_parts = any(suffix for _, suffix in lines)
-    columns = [
-        *SHOWN_KEYS,
-        *([Column("threshold", "threshold", plain)] if has_parts else []),
-        Column("n", "n"),
-        *(Column(str(q), f"at {q:,}") for q in quarters),
+    columns: list[Column[tuple[Cell, str, Course]]] = [
+        *KEYS,
+        Column("threshold", "threshold" * has_parts, plain, of=lambda one: one[1]),
+        Column("n", "n", of=lambda one: one[2].n),
+        *map(_at, quarters),
     ]
+    items = [(*about, course) for about, course in lines.items()]
     note += " At the number of team evaluations given; n: runs."
-    return Table(
-        f"{scope.stem}-{name}", title, note, columns, rows, is_folded=True, numbers=numbers
-    )
+    return Table.of(f"{scope.stem}-{name}", title, note, columns, items, True, numbers)
 
 
-def _at(course: Course, evaluations: float) -> float | None:
-    """Return the value of a course after that number of team evaluations; None before its start."""
-    reached = course.x <= evaluations
-    return float(course.mean[reached][-1]) if reached.any() else None
+def _at(evaluations: int) -> Column[tuple[Cell, str, Course]]:
+    """Return the values of courses after that number of team evaluations; None before a start."""
+
+    def value(one: tuple[Cell, str, Course]) -> float | None:
+        reached = one[2].x <= evaluations
+        return float(one[2].mean[reached][-1]) if reached.any() else None
+
+    return Column(str(evaluations), f"at {evaluations:,}", of=value)
