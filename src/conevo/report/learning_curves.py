@@ -124,7 +124,8 @@ def courses(histories: Histories, column: str, n: int = 50) -> dict[Cell, Course
     x = histories.grid(n)
     made = {}
     for cell, rows, has in histories.at(x):
-        values = np.where(has, histories.columns[column][rows], math.nan)
+        values = histories.columns[column][rows]
+        values = np.where(has & np.isfinite(values), values, math.nan)
         shown = ~np.isnan(values).all(axis=0)
         if not shown.any():
             continue

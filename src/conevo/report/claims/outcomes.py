@@ -127,14 +127,12 @@ class Answer:
 def measure(statements: Sequence[Statement], evidence: Evidence) -> list[Answer]:
     """Return all the statements of a claim with their numbers and outcomes."""
     gathered = [evidence.gather(statement) for statement in statements]
-    made = [_compare(*pair) for pair in zip(statements, gathered, strict=True)]
-    corrected = holm([one.p_mann_whitney if one else None for one in made])
-    return [
-        _cell(statement, runs, comparison, p)
-        for statement, runs, comparison, p in zip(
-            statements, gathered, made, corrected, strict=True
-        )
+    made = [
+        compare(*runs.samples) if isinstance(one, Compare) and all(runs.samples) else None
+        for one, runs in zip(statements, gathered, strict=True)
     ]
+    corrected = holm([one.p_mann_whitney if one else None for one in made])
+    return list(map(_cell, statements, gathered, made, corrected))
 
 
 def _cell(
@@ -156,12 +154,6 @@ def _cell(
     else:
         by_t = by_rank = _place(estimate, statement.low, statement.high)
     return Answer(statement, runs, comparison, estimate, p, by_t, by_rank)
-
-
-def _compare(statement: Statement, runs: Gathered) -> Comparison | None:
-    if not isinstance(statement, Compare) or not all(runs.samples):
-        return None
-    return compare(*runs.samples)
 
 
 def _estimate(statement: Statement, runs: Gathered) -> Estimate | None:
