@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import NamedTuple
 
@@ -223,27 +223,17 @@ def compare_all(cells: Mapping[Cell, Sequence[RunValue]]) -> list[Pair]:
     registry's order comes first, so that a difference is the gain of the newer method. Choice: the
     family of Holm's correction is all pairs of the cells given.
     """
-    direction, found = _larger_is_better(cells), _by_environment(cells)
-    made = [
-        (environment, a, b, compare(samples[a], samples[b]))
-        for environment, samples in found.items()
-        for b, a in combinations(samples, 2)
+    direction = _larger_is_better(cells)
+    pairs = [
+        Pair(environment, a, b, compare(of[a], of[b]), None, 0, direction, (of[a], of[b]))
+        for environment, of in _by_environment(cells).items()
+        for b, a in combinations(of, 2)
         if a.method == b.method or agree(a.variant, b.variant)
     ]
-    corrected = holm([result.p_mann_whitney for *_, result in made])
-    tests = sum(result.p_mann_whitney is not None for *_, result in made)
+    corrected = holm([pair.result.p_mann_whitney for pair in pairs])
+    tests = sum(pair.result.p_mann_whitney is not None for pair in pairs)
     return [
-        Pair(
-            environment,
-            a,
-            b,
-            result,
-            p,
-            tests,
-            direction,
-            (tuple(found[environment][a]), tuple(found[environment][b])),
-        )
-        for (environment, a, b, result), p in zip(made, corrected, strict=True)
+        replace(pair, p_holm=p, n_tests=tests) for pair, p in zip(pairs, corrected, strict=True)
     ]
 
 
@@ -285,13 +275,13 @@ def _larger_is_better(cells: Mapping[Cell, Sequence[RunValue]]) -> bool:
 
 def _by_environment(
     cells: Mapping[Cell, Sequence[RunValue]],
-) -> dict[str, dict[Treatment, list[float]]]:
+) -> dict[str, dict[Treatment, tuple[float, ...]]]:
     """Return the samples of each environment, treatments in order."""
     order = treatments_of(treatment for _, treatment in cells)
     environments = dict.fromkeys(environment for environment, _ in cells)
     return {
         environment: {
-            treatment: [one.value for one in cells[Cell(environment, treatment)]]
+            treatment: tuple(one.value for one in cells[Cell(environment, treatment)])
             for treatment in order
             if Cell(environment, treatment) in cells
         }

@@ -7,6 +7,7 @@ other factors has its own panel. A method without a factor is in all panels of t
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
@@ -88,10 +89,10 @@ def factors_of(treatments: Iterable[Treatment]) -> dict[str, list[str]]:
     A factor of one level is included if a method has treatments with and without it.
     """
     listed = [(treatment.method, levels_of(treatment.variant)) for treatment in treatments]
-    found: dict[str, list[str]] = {}
+    found: dict[str, set[str]] = defaultdict(set)
     for _, own in listed:
         for name, level in own.items():
-            found[name] = list(dict.fromkeys([*found.get(name, []), level]))
+            found[name].add(level)
     return {
         name: sorted(levels, key=_rank)
         for name, levels in found.items()

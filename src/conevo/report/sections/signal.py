@@ -39,7 +39,7 @@ NOTE = (
 def signal(scope: Scope) -> Section | None:
     """Return a row per treatment and environment; None if no run has a study of signal."""
     found = _found(scope)
-    rows = [_row(scope, cell, own) for cell, own in found.items()]
+    rows = [_row(cell, own) for cell, own in found.items()]
     if not rows:
         return None
     blind = [row for row in rows if row["verdict"] != "signal"]
@@ -91,7 +91,7 @@ def _found(scope: Scope) -> dict[Cell, dict[str, MeasuredSignal]]:
     return found
 
 
-def _row(scope: Scope, cell: Cell, own: dict[str, MeasuredSignal]) -> dict[str, Any]:
+def _row(cell: Cell, own: dict[str, MeasuredSignal]) -> dict[str, Any]:
     """Return the numbers of a cell."""
     first = own["first"]
     row = key(cell) | {"unit": first.unit, "n": first.n, "scheme": first.scheme}
