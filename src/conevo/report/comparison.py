@@ -1,7 +1,7 @@
 """The results of treatments, and every two of them compared: samples of runs, one value per run.
 
 A treatment is a method with the levels of a campaign's further factors. Runs are compared within a
-task and a budget only (``frames.Tables``); tasks of one family and budget make a ``Group``.
+task and a budget only (``tables.Tables``); tasks of one family and budget make a ``Group``.
 """
 
 from __future__ import annotations
