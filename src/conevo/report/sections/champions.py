@@ -41,7 +41,7 @@ class _Chosen(NamedTuple):
 
     @property
     def ratio(self) -> float | None:
-        """What is left in the test of the performance that was selected."""
+        """Performance in the test, as a share of that which was selected."""
         return self.test / self.selection if self.selection > 0 else None
 
 

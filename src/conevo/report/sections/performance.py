@@ -23,7 +23,7 @@ from conevo.report.exhibits import (
     with_values,
 )
 from conevo.report.figures import charts as figures
-from conevo.report.sections.scope import KEYS, Scope, named, sizes, span
+from conevo.report.sections.scope import KEYS, SHOWN_KEYS, Scope, named, sizes, span
 from conevo.report.statistics import moments
 from conevo.worlds.registry import entry_of
 
@@ -236,11 +236,12 @@ def _aggregate_row(one: Aggregate) -> dict[str, Any]:
 
 def _others(scope: Scope) -> list[Exhibit]:
     """Return a table of the measures other than the main one."""
-    columns: list[Column[tuple[Cell, Sequence[RunValue]]]] = [
-        *KEYS,
+    about: list[Column[tuple[Cell, Sequence[RunValue]]]] = [
         Column("measure", "measure", plain, of=lambda one: one[1][0].measure.title),
         Column("unit", "unit", plain, of=lambda one: one[1][0].measure.unit),
         Column("direction", "direction", plain, of=lambda one: one[1][0].measure.direction),
+    ]
+    values: list[Column[tuple[Cell, Sequence[RunValue]]]] = [
         Column("n", "n", of=lambda one: len(one[1])),
         Column("mean", "mean", of=lambda one: moments([run.value for run in one[1]])[0]),
         Column("sd", "sd", of=lambda one: moments([run.value for run in one[1]])[1]),
@@ -248,4 +249,8 @@ def _others(scope: Scope) -> list[Exhibit]:
     items = [one for cells in scope.others.values() for one in cells.items()]
     note = "Mean over runs of the mean over fresh scenarios; sd: of the runs; n: runs."
     name, title = f"{scope.stem}-measures", "Other measures of task performance"
-    return [Table.of(name, title, note, columns, items, is_folded=True)] if items else []
+    environment, method = SHOWN_KEYS
+    columns = [environment, *about, method, *values]
+    numbers = rows_of([*KEYS, *about, *values], items)
+    table = Table.of(name, title, note, columns, items, numbers=numbers, is_folded=True)
+    return [table] if items else []
