@@ -29,7 +29,7 @@ CHOSEN = """
 """
 
 
-class _Chosen(NamedTuple):
+class _Champions(NamedTuple):
     """A measure of the champions of a cell's runs: means over runs."""
 
     cell: Cell
@@ -48,11 +48,11 @@ class _Chosen(NamedTuple):
 def champions(scope: Scope) -> Section | None:
     """Return selection, validation and test of each cell's champions; None if no run has them."""
     measure = scope.main.name.replace("'", "''")
-    chosen = [_Chosen(*row) for row in scope.per_cell(CHOSEN.format(measure=measure))]
+    chosen = [_Champions(*row) for row in scope.per_cell(CHOSEN.format(measure=measure))]
     text = _not_finite(scope)
     if not chosen:
         return Section("How champions were chosen", text) if text else None
-    columns: list[Column[_Chosen]] = [
+    columns: list[Column[_Champions]] = [
         *KEYS,
         Column("measure", "measure", plain),
         Column("n", "n"),
