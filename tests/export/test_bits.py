@@ -91,3 +91,16 @@ def test_fast_arithmetic_agrees_for_one_step_only(ending, tmp_path):
     assert np.abs(first - outputs[0]).max() < 1e-3
     off = np.abs(played(step, team, observations) - outputs).max(axis=(1, 2))
     assert off.max() > 1
+
+
+@pytest.mark.parametrize("ending", [one for one in FORMATS if one != ".npz"])
+def test_a_sum_of_negative_zeros_is_zero(ending, tmp_path):
+    """Sums start with a 0 that is added: 0 + -0 is 0, and onnxruntime leaves out a number 0."""
+    from dataclasses import replace
+
+    team, observations, _ = epoch(f"{LIGHT}:dark-1", "srn", SHORT)
+    net = team.network
+    weights = net.weights | {"w_out": np.full_like(net.weights["w_out"], -0.0)}
+    zeros = replace(team, network=replace(net, weights=weights))
+    found = played(step_of(zeros, tmp_path, ending), zeros, observations)
+    assert found.tobytes() == bytes(found.nbytes)

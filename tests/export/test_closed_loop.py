@@ -1,0 +1,53 @@
+"""An exported file that drives a stepped world repeats the epoch that the kernels have recorded."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import conevo
+from conevo.controllers.registry import controller
+from conevo.export.networks import KINDS
+from conevo.worlds.stepper import Stepper
+from export.replayed import recorded, step_of
+
+LIGHT = Path(__file__).resolve().parents[2] / "examples" / "light.py"
+TASKS = ("rover/complex-5", "pursuit/team-3", "prey/shaping-6", "gacc/complex-9", f"{LIGHT}:dark-1")
+KEY = 3
+
+
+def drive(world, team, folder, ending):
+    """Return observations [T, R, S] and outputs [T, R, O] of an epoch that a file drives."""
+    stepper = Stepper(world, 1, [KEY], n_threads=1)
+    stepper.reset(scenario=0)
+    step, context = step_of(team, folder, ending), team.first_context
+    observations, outputs = [], []
+    for _ in range(world.params.iterations):
+        observations.append(stepper.inputs.numpy()[0].copy())
+        found, context = step(observations[-1], context)
+        stepper.outputs.assign(found[None])
+        stepper.step()
+        outputs.append(found)
+    return np.stack(observations), np.stack(outputs)
+
+
+def assert_repeats(task, name, folder, endings, **params):
+    world = conevo.world(task, **params)
+    team, observations, outputs = recorded(world, controller(name, world=world), KEY)
+    for ending in endings:
+        seen, found = drive(world, team, folder, ending)
+        assert seen.tobytes() == observations.tobytes(), ending
+        assert found.tobytes() == outputs.tobytes(), ending
+    assert (observations[1:] != observations[:-1]).any()  # robots see something else in time
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_a_file_repeats_an_epoch_of_its_own(name, tmp_path):
+    assert_repeats("pursuit/team-3", name, tmp_path, [".py", ".h"], iterations=100)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("task", TASKS, ids=lambda task: Path(task).name)
+def test_a_file_repeats_a_whole_epoch_in_every_world(task, tmp_path):
+    for name in KINDS:
+        assert_repeats(task, name, tmp_path / name, [".py", ".onnx", ".h"])
