@@ -252,9 +252,11 @@ def test_a_damaged_run_is_left_out_and_the_rest_is_reported(campaign, tmp_path):
         ("provenance.json", '"stopped_by": "', '"stopped_by": "x'),
     ],
 )
-def test_a_run_that_was_changed_is_left_out(campaign, tmp_path, file, old, new):
+@pytest.mark.parametrize("has_tables", [True, False])
+def test_a_run_that_was_changed_is_left_out(campaign, tmp_path, file, old, new, has_tables):
     copy = Campaign(shutil.copytree(campaign.path, tmp_path / "copy"))
-    shutil.rmtree(copy.paths.tables)
+    if not has_tables:
+        shutil.rmtree(copy.paths.tables)
     label = list(copy.planned)[1]
     path = copy.paths.run(label) / file
     whole = path.read_text()

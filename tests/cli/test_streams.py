@@ -30,6 +30,12 @@ def test_a_reader_that_stops_is_not_an_error(tmp_path: Path) -> None:
     assert (done.returncode, done.stderr) == (0, "")
 
 
+def test_output_that_does_not_fit_its_disk_is_named(tmp_path: Path) -> None:
+    done = shell("$CONEVO list worlds > /dev/full", tmp_path)
+    assert done.returncode == 3
+    assert done.stderr == "conevo: error: standard output: No space left on device\n"
+
+
 @pytest.mark.parametrize("closed", [">&-", ">&- 2>&-", "<&- >&- 2>&-"])
 def test_closed_streams_do_not_end_a_run(tmp_path: Path, closed: str) -> None:
     words = " ".join(command(Path("run"), "cone", run__generations=1))

@@ -252,3 +252,8 @@ def test_a_configuration_file_contains_every_field() -> None:
     tables = tomllib.loads(config.to_toml())
     assert set(tables["method"]) == set(type(config.method_config).__dataclass_fields__)
     assert set(tables["world"]) == set(type(config.world_params).__dataclass_fields__)
+
+
+def test_overrides_that_are_not_a_dict_are_refused() -> None:
+    with pytest.raises(UsageError, match=r"overrides = \[1\]: must be a dict of settings"):
+        resolve("rover/complex-1", overrides=[1])  # type: ignore[arg-type]

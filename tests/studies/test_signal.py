@@ -211,6 +211,7 @@ def test_the_command_prints_its_cost_first_and_then_the_results(capsys, tmp_path
         (["nowhere"], "unknown run 'nowhere' in runs/"),
         ([], "which world? Name one as WORLD/ENVIRONMENT"),
         ([TASK, "--trials", "1"], "Invalid value for '--trials': 1 is not in the range"),
+        ([TASK, "--trials", "1000000"], "1000000 is not in the range 2<=x<=10000"),
         ([TASK, "--units", "1"], "Invalid value for '--units': 1 is not in the range"),
         ([TASK, "--method", "hetcne", "--units", "5"], "genotypes (5) must be at least the robots"),
         (["rover/complex-1", "--method", f"{ROOT}/examples/own_method.py:team-es"],
@@ -232,6 +233,14 @@ def test_a_run_takes_no_settings(capsys, tmp_path) -> None:
 
 
 def test_numbers_are_refused_in_python_too() -> None:
-    for numbers in ({"trials": 1}, {"units": 1}):
-        with pytest.raises(UsageError, match=r"= 1: a signal takes two"):
+    for numbers in ({"trials": 1}, {"trials": 10_001}, {"units": 1}):
+        with pytest.raises(UsageError, match=r"= 1(0001)?: a signal takes (2 to 10,000|two)"):
             measure_signal(tiny("ccga"), **numbers)
+
+
+def test_progress_counts_the_trials_of_all_populations(tmp_path) -> None:
+    run, seen = evolve_tiny(tmp_path / "run", "homcne"), []
+    measure_signal(run, trials=4, advance=lambda *done: seen.append(done))
+    assert seen[-1] == (8, 8)
+    assert [done for done, _ in seen] == sorted(done for done, _ in seen)
+    assert (4, 8) in seen

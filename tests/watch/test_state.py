@@ -6,7 +6,10 @@ import shutil
 
 import pytest
 
-from conevo.errors import UsageError
+from conevo.cli.lookup import open_directory
+from conevo.errors import EnvironmentFailure, UsageError
+from conevo.runs.directory import kinds_in
+from conevo.runs.durable import is_there
 from conevo.watch.state import Watched
 from watch.followed import (
     append,
@@ -111,6 +114,25 @@ def test_a_damaged_provenance_is_one_line(tmp_path, content):
     assert run["problem"].startswith("provenance.json is damaged: ")
     (path / "provenance.json").write_text(good)
     assert (one(watched)["problem"], one(watched)["generation"]) == ("", 2)
+
+
+def test_a_run_that_may_not_be_read_is_one_line_and_other_runs_are_shown(tmp_path, monkeypatch):
+    bad, _ = write_run(tmp_path / "bad"), write_run(tmp_path / "good")
+
+    def may_enter(path):
+        if path.parent == bad:
+            raise PermissionError(path)
+        return is_there(path)
+
+    monkeypatch.setattr("conevo.runs.directory.is_there", may_enter)
+    runs = by_label(Watched([], [tmp_path]))
+    assert (runs["good"]["status"], runs["good"]["problem"]) == ("interrupted", "")
+    assert runs["bad"]["status"] == "damaged"
+    assert runs["bad"]["problem"].endswith("bad: this process may not read the directory")
+    rows = {path.name: kind for path, kind in kinds_in(tmp_path).items()}
+    assert rows == {"good": "run", "bad": "unreadable"}
+    with pytest.raises(EnvironmentFailure, match="may not read the directory"):
+        open_directory(bad)
 
 
 def test_very_many_generations_are_thinned_evenly_and_the_first_and_last_stay(tmp_path):

@@ -46,14 +46,18 @@ PROVENANCE = ("stopped_by", "run_id", "conevo", "numpy", "warp", "kernel_hash") 
 
 
 def is_sealed(paths: Paths, finished: Sequence[PlannedRun]) -> bool:
-    """Whether the tables are those of these runs, and of no others."""
+    """Whether the tables are those of these runs as they are now, and of no others."""
     path = paths.tables / MANIFEST
     if not all((paths.tables / f"{table}.parquet").is_file() for table in SCHEMA):
         return False
     try:
-        return path.is_file() and read_json(path) == _manifest(finished) | {"left_out": {}}
-    except DamagedFile:
+        if not path.is_file() or read_json(path) != _manifest(finished) | {"left_out": {}}:
+            return False
+        for part in {part for run in finished for parts in run.courses.values() for part in parts}:
+            Store(paths.run(part)).refuse_changed()
+    except ConevoError:
         return False
+    return True
 
 
 @contextmanager

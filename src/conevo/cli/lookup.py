@@ -107,6 +107,10 @@ def find_campaign(text: str) -> Campaign:
     from conevo.campaigns.campaign import CAMPAIGNS
 
     found = campaign_at(text)
+    if found is None and kind_of(Path(text)) in ("run", "shaping"):
+        raise UsageError(
+            f"{text} is a {kind_of(Path(text))}; see it with 'conevo show {quoted(text)}'"
+        )
     if found is None:
         known = [path.name for path in directories(CAMPAIGNS, "campaign")]
         raise unknown_name("campaign", text, known, f"in {CAMPAIGNS}/")

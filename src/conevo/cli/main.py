@@ -211,11 +211,14 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
             3,
         )
     except OSError as error:
-        if error.errno == errno.EPIPE:  # the reader of our output has ended
-            from conevo.cli.run_to_end import drop_output
+        from conevo.cli.run_to_end import drop_output
 
+        if error.errno == errno.EPIPE:  # the reader of our output has ended
             drop_output()
             sys.exit(0)
+        if error.errno == errno.ENOSPC and not error.filename:
+            drop_output()
+            fail(f"standard output: {error.strerror}", 3)
         fail(f"{error.filename}: {error.strerror}" if error.filename else str(error), 3)
     except (Exception, SystemExit) as error:
         outside = sys.modules.get("conevo.outside")

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import sys
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -28,7 +30,7 @@ __all__ = ["signal"]
     "single population 3 for every robot, at least 20; with elite partners 5).",
 )  # fmt: skip
 @click.option(
-    "--trials", type=click.IntRange(2, 1_000_000), metavar="N", default=50, show_default=True,
+    "--trials", type=click.IntRange(2, 10_000), metavar="N", default=50, show_default=True,
     help="Trials of each genotype.",
 )  # fmt: skip
 @threads_option
@@ -72,7 +74,24 @@ def signal(
     else:
         order = Order(**settings, device=device or "cpu")
         of, device = order.resolve(what), order.device
-    found = measure_signal(of, units, trials, threads=threads, device=device, announce=announce)
+    with ExitStack() as stack:
+        bars: list[Any] = []
+
+        def advance(done: int, total: int) -> None:
+            if not bars:
+                bar = click.progressbar(length=total, label="trials", file=sys.stderr)
+                bars.append(stack.enter_context(bar))
+            bars[0].update(done - bars[0].pos)
+
+        found = measure_signal(
+            of,
+            units,
+            trials,
+            threads=threads,
+            device=device,
+            announce=announce,
+            advance=advance if sys.stderr.isatty() else None,
+        )
     if isinstance(of, Run):
         found = {"run": str(of.path)} | found
     click.echo(json.dumps(found) if as_json else _text(found))

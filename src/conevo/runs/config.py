@@ -255,6 +255,8 @@ def resolve(
     from conevo.worlds.registry import resolve as resolve_world
 
     layers: list[Layer] = [read_file(Path(file))] if file is not None else []
+    if not isinstance(overrides, Mapping | None):
+        raise UsageError(f"overrides = {overrides!r:.60}: must be a dict of settings")
     given = dict(overrides or {})
     single, short = split_keys(given, place, folder)
     if world is not None:

@@ -41,7 +41,9 @@ __all__ = ["TRIALS", "Unmeasured", "measure_signal", "signal_study"]
 
 GENOTYPES, PER_ROBOT, ALONE, TRIALS = 20, 3, 5, 50
 BATCH = 1000  # teams that are played at once
+MOST_TRIALS = 10_000  # whose fitness fits into memory in any world; reliability needs far fewer
 Announce = Callable[[str], None]
+Advance = Callable[[int, int], None]
 
 
 class Unmeasured(UsageError):
@@ -85,6 +87,7 @@ def measure_signal(
     threads: int | None = None,
     device: str | None = None,
     announce: Announce | None = None,
+    advance: Advance | None = None,
 ) -> Record:
     """Measure the signal of the first and the last populations of a run; writes nothing.
 
@@ -95,6 +98,7 @@ def measure_signal(
         trials: of each genotype.
         threads, device: as for ``Run.resume`` and ``conevo.evolve``; they change no result.
         announce: called with the cost before the start.
+        advance: called with the trials that are done, and those of the whole measurement.
 
     Returns:
         Plain data: task, method, credit, and signal, a row for each of the two:
@@ -117,8 +121,8 @@ def measure_signal(
         if isinstance(of, Run)
         else Lab.equip(of, threads, device or "cpu")
     )
-    if trials < 2:
-        raise UsageError(f"trials = {trials}: a signal takes two trials of each genotype, or more")
+    if not 2 <= trials <= MOST_TRIALS:
+        raise UsageError(f"trials = {trials}: a signal takes 2 to {MOST_TRIALS:,} trials")
     if units is not None and units < 2:
         raise UsageError(f"units = {units}: a signal takes two genotypes to compare, or more")
     states = _states(of, lab) if isinstance(of, Run) else {"first": lab.first_state()}
@@ -129,8 +133,16 @@ def measure_signal(
         "task": lab.config.task,
         "method": lab.config.method,
         "credit": lab.config.run.credit,
-        "signal": [_row(lab, one, trials) for one in subjects],
+        "signal": [
+            _row(lab, one, trials, _part_of(advance, k * trials, len(subjects) * trials))
+            for k, one in enumerate(subjects)
+        ],
     }
+
+
+def _part_of(advance: Advance | None, before: int, of: int) -> Callable[[int], None]:
+    """Return a function of the trials of one subject, which follow those of others."""
+    return lambda done: advance(before + done, of) if advance is not None else None
 
 
 def signal_study(run: Run, *, threads: int | None = None) -> Record:
@@ -209,10 +221,10 @@ def _price(lab: Lab, subjects: list[_Subject], trials: int) -> str:
     )
 
 
-def _row(lab: Lab, subject: _Subject, trials: int) -> Record:
+def _row(lab: Lab, subject: _Subject, trials: int, advance: Callable[[int], None]) -> Record:
     """Return the results of one subject."""
     state, run = subject.state, lab.config.run
-    fitness, is_clones = _try(lab, subject, trials)
+    fitness, is_clones = _try(lab, subject, trials, advance)
     if state.fitness.ndim == 2:
         fitness, unit = fitness[:, :, None], "clone team" if is_clones else "network"
         active = np.ones((len(state.genes), 1), dtype=np.bool_)
@@ -252,7 +264,9 @@ def _of_scheme(found: Repeatability, n_trials: int) -> Record:
     }
 
 
-def _try(lab: Lab, subject: _Subject, trials: int) -> tuple[npt.NDArray[np.float64], bool]:
+def _try(
+    lab: Lab, subject: _Subject, trials: int, advance: Callable[[int], None]
+) -> tuple[npt.NDArray[np.float64], bool]:
     """Return the fitness of every trial [K, P, (U,) M], and whether all teams were clones."""
     seed, batch = lab.config.run.seed, max(1, BATCH // subject.n_teams)
     found: list[npt.NDArray[np.float64]] = []
@@ -272,6 +286,7 @@ def _try(lab: Lab, subject: _Subject, trials: int) -> tuple[npt.NDArray[np.float
                 )
             found.append(np.asarray(graded, dtype=np.float64))
             is_clones = is_clones and bool((trial.teams == trial.teams[:, :1]).all())
+        advance(numbers.stop)
     return np.stack(found), is_clones
 
 
