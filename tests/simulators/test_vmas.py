@@ -129,7 +129,8 @@ def test_its_team_and_things_are_recorded_as_they_were_tested(tmp_path: Path) ->
     drawn = playback_of(seen)
     (food,) = drawn.things
     assert (food.name, food.x.values.shape[-1], food.size) == ("food", 4, 0.05)
-    assert drawn.bounds == (-1.0, -1.0, 1.0, 1.0)
+    assert drawn.bounds == pytest.approx((-1.035, -1.035, 1.035, 1.035))  # and a robot's radius
+    assert [state.name for state in food.states] == ["there", "taken"]
 
 
 def test_options_are_the_scenarios_keywords(capsys: pytest.CaptureFixture[str]) -> None:

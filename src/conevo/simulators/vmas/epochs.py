@@ -7,7 +7,6 @@ import re
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,7 +19,7 @@ from conevo.errors import ConevoError, UsageError, unknown_name
 from conevo.reading import parse_toml
 from conevo.simulators.tasks import TaskFacts
 from conevo.simulators.vmas.draws import Draws
-from conevo.simulators.vmas.things import places_of
+from conevo.simulators.vmas.things import places_of, scenario_text
 
 __all__ = ["Batch", "VmasEpochs", "flattened", "made", "policy_of"]
 
@@ -246,8 +245,7 @@ def _touch_alone(env: Environment) -> None:
 
 def _refuse_unknown(env: Environment, task: str, given: dict[str, Any]) -> None:
     """Raise UsageError for an option that a scenario does not read."""
-    file = Path(type(env.scenario).make_world.__code__.co_filename)
-    known = set(KEYWORD.findall(file.read_text("utf-8")))
+    known = set(KEYWORD.findall(scenario_text(env)))
     for key in given:
         if key not in known:
             raise unknown_name("option", key, known, f"of vmas:{task}")

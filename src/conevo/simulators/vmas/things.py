@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,11 +14,16 @@ from vmas.simulator.environment import Environment
 
 from conevo.playback.drawn import Drawn, Objects
 
-__all__ = ["drawn_of", "places_of"]
+__all__ = ["drawn_of", "places_of", "scenario_text"]
 
-ALONG = 15  # discs with which a line or a box that is not square is drawn
+ALONG = 25  # discs with which a line or a box that is not square is drawn
 LINE = 0.015
 ZOOM = 1.2  # VMAS' own, where a scenario has no ends
+
+
+def scenario_text(env: Environment) -> str:
+    """Return the text of a scenario's file."""
+    return Path(type(env.scenario).make_world.__code__.co_filename).read_text("utf-8")
 
 
 def things_of(env: Environment) -> list[Any]:
@@ -29,13 +35,20 @@ def places_of(env: Environment) -> dict[str, npt.NDArray[np.float32]]:
     """Return positions in the first environment.
 
     Returns:
-        x and y of robots [R]; things_x and things_y of all discs and squares of things.
+        x and y of robots [R]; of all discs and squares of things their positions things_x and
+        things_y, and things_taken, 1 where VMAS does not show the thing any more.
     """
     robots = np.stack([agent.state.pos[0].numpy() for agent in env.agents])
     found = {"x": robots[:, 0].copy(), "y": robots[:, 1].copy()}
     if things := things_of(env):
-        points = np.concatenate([_points(one) for one in things])
+        parts = [_points(one) for one in things]
+        points = np.concatenate(parts)
         found |= {"things_x": points[:, 0].copy(), "things_y": points[:, 1].copy()}
+        taken = [
+            [not bool(one.is_rendering[0])] * len(part)
+            for one, part in zip(things, parts, strict=True)
+        ]
+        found["things_taken"] = np.concatenate(taken).astype(np.float32)
     return found
 
 
@@ -80,6 +93,7 @@ def _size(shape: Any) -> float:
 
 def drawn_of(env: Environment) -> Drawn:
     """Return the drawing of a scenario: things of one name and look together."""
+    takes = "is_rendering" in scenario_text(env)  # it has things that are taken away
     objects, first = [], 0
     for (name, shape, size, colour), group in itertools.groupby(things_of(env), _look):
         things = list(group)
@@ -94,18 +108,20 @@ def drawn_of(env: Environment) -> Drawn:
                 size=size,
                 shape="square" if shape == "square" else "disc",
                 colours=(colour,),
+                state=f"things_taken{place}" if takes else "",
+                states=("there", "taken") if takes else (),
             )
         )
-    world = env.world
+    world, radius = env.world, max(_size(agent.shape) for agent in env.agents)
     x, y = (
-        float(end) if end is not None else ZOOM * float(env.scenario.viewer_zoom)
+        radius + (float(end) if end is not None else ZOOM * float(env.scenario.viewer_zoom))
         for end in (world.x_semidim, world.y_semidim)
     )
     return Drawn(
         objects=tuple(objects),
         seconds=float(world.dt),
         bounds=(-x, -y, x, y),
-        radius=max(_size(agent.shape) for agent in env.agents),
+        radius=radius,
     )
 
 
