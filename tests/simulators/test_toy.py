@@ -81,7 +81,7 @@ def test_it_keeps_the_rules_of_a_world_with_its_own_simulator(task: str) -> None
     assert found == []
 
 
-@pytest.mark.parametrize("task", ["toy:line", "toy:steps"])
+@pytest.mark.parametrize("task", ["toy:line", "toy:steps", "toy:line.v3"])
 def test_a_run_of_it_is_continued_bit_for_bit(task: str, tmp_path: Path) -> None:
     whole = evolved(tmp_path / "whole", 5, task)
     short = evolved(tmp_path / "short", 2, task).resume(generations=5)
@@ -146,6 +146,10 @@ def test_the_command_line_takes_it(tmp_path: Path, capsys: pytest.CaptureFixture
         assert code_of(command[0], *place, *command[1:]) == 0
     assert "toy/line, CONE" in capsys.readouterr().out
     assert code_of("test", out, "--scenarios", "2", "--set", "world.iterations=5") == 0
+    assert code_of("signal", "toy:line", "--preset", "smoke", "--units", "4", "--trials", "2") == 0
+    capsys.readouterr()
+    assert code_of("list", "worlds") == 0
+    assert "tasks of other packages: vmas:TASK, toy:TASK" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

@@ -16,8 +16,8 @@ from conevo.playback.drawn import Drawn, Objects
 from conevo.rng import fold_all, uniforms
 from conevo.simulators.actions import Continuous, Discrete
 from conevo.simulators.tasks import TaskEntry, TaskFacts, TaskParams, TaskWorld
+from conevo.worlds.families import FAMILIES
 from conevo.worlds.measures import Measure
-from conevo.worlds.registry import FAMILIES
 
 __all__ = ["TaskParams", "ToyWorld", "entry", "known"]
 
@@ -88,8 +88,8 @@ class ToyEpochs:
 
 def entry(task: str) -> TaskEntry:
     """Return the entry of a task."""
-    if task not in ("line", "steps"):
-        raise unknown_name("task", task, ["line", "steps"], "of toy")
+    if task not in (names := ("line", "steps", "line.v3")):
+        raise unknown_name("task", task, names, "of toy")
     return TaskEntry(
         name="toy",
         title="Toy",

@@ -70,6 +70,11 @@ def listing(
     elif rows:
         notes = list(_own_defaults(rows)) if what == "worlds" else []
         click.echo(table(list(rows[0]), [list(row.values()) for row in rows]))
+        if what == "worlds":
+            from conevo.worlds.families import FAMILIES
+
+            families = ", ".join(f"{one}:TASK" for one in FAMILIES)
+            notes.append(f"tasks of other packages: {families} (docs/neighbours.md)")
         for line in notes:
             click.echo(line)
     else:

@@ -100,12 +100,13 @@ def signal(
 def _is_run(what: str) -> bool:
     """Whether this is a run: a directory, or a name without a slash that is not a world's."""
     from conevo.runs.run import RUNS
+    from conevo.worlds.families import is_task
     from conevo.worlds.registry import WORLDS
 
     if Path(what).is_dir() or what.startswith(f"{RUNS}/"):
         return True
     worlds = {name for entry in WORLDS.values() for name in (entry.name, entry.short_name)}
-    return not ("/" in what or ".py" in what or what in worlds)
+    return not ("/" in what or ".py" in what or is_task(what) or what in worlds)
 
 
 def _found(what: str, settings: dict[str, Any]) -> Run:

@@ -24,6 +24,7 @@ from conevo.controllers.registry import refuse_foreign, suggested
 from conevo.errors import UsageError, unknown_name
 from conevo.parameters import WrongValue, refuse_unknown
 from conevo.reading import parse_toml, read_toml
+from conevo.worlds.families import is_task
 
 if TYPE_CHECKING:
     from conevo.evolution.methods.registry import MethodEntry
@@ -60,7 +61,7 @@ class Value:
     def as_file(self) -> Any:
         """The value if it is the name of a file, "prey.npz" or "FILE.py:ENVIRONMENT"."""
         text = self.value
-        if self.folder is None or not isinstance(text, str):
+        if self.folder is None or not isinstance(text, str) or is_task(text):
             return text
         name = text.rpartition(":")[0] if ".py:" in text else text
         is_file = Path(name).suffix or ("/" in name and (self.folder / name).is_file())

@@ -1,6 +1,6 @@
 """Tasks of other packages as worlds: a family of them is a module, a task is "FAMILY:TASK".
 
-``worlds.registry.FAMILIES`` names the module of each family. Its function ``entry(task)`` returns
+``worlds.families.FAMILIES`` names the module of each family. Its function ``entry(task)`` returns
 the ``tasks.TaskEntry`` of one of its tasks, whose ``world_class`` is a ``tasks.TaskWorld``. This
 package has the rest, as far as a family does not replace it::
 

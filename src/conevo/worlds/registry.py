@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from conevo.errors import UsageError, unknown_name
 from conevo.worlds.entry import WorldEntry
+from conevo.worlds.families import FAMILIES, is_task
 from conevo.worlds.rover import rocks
 from conevo.worlds.study import load_study
 
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
     from conevo.worlds.study import WorldStudy
 
 __all__ = [
-    "FAMILIES",
     "WORLDS",
     "WorldEntry",
     "colours_of",
@@ -87,9 +87,6 @@ WORLDS: dict[str, WorldEntry] = {
     )
 }
 
-# Modules that make the entries of other packages' tasks, "vmas:balance" (conevo.simulators).
-FAMILIES = {"vmas": "conevo.simulators.vmas.world"}
-
 # Versions that are still drawn and reported but no longer played, and the release that plays them.
 EARLIER = dict.fromkeys(("rover-v1", "pursuit-v1", "prey-v1", "gacc-v1"), "0.1.0")
 
@@ -107,8 +104,9 @@ def resolve(path: str, digest: str = "", is_whole: bool = True) -> tuple[WorldEn
         UsageError: no such world or environment, or no environment given; a file without a world,
             or one that has changed.
     """
-    if (family := _family(path)) is not None:
-        return _task(family, path, digest)
+    if is_task(path):
+        return _task(path, digest)
+    _refuse_near_task(path)
     file, _, environment = path.rpartition(":")
     if path.endswith(".py"):
         file, environment = path, ""
@@ -141,32 +139,23 @@ def resolve(path: str, digest: str = "", is_whole: bool = True) -> tuple[WorldEn
     return entry, environment
 
 
-def _family(path: str) -> str | None:
-    """Return the family of a task of another package, None for another world.
-
-    Raises:
-        UsageError: no such family, but the name of one is near.
-    """
-    family, colon, _ = path.partition(":")
-    if not colon:
-        family, slash, task = path.partition("/")
-        if slash and family in FAMILIES:
-            raise UsageError(f"world {path!r}: a task of {family} is named {family}:{task}")
-        return None
-    if family in FAMILIES:
-        return family
-    if ".py" not in path and get_close_matches(family, FAMILIES, n=1, cutoff=0.6):
-        raise unknown_name("family of tasks", family, FAMILIES)
-    return None
-
-
-def _task(family: str, path: str, digest: str) -> tuple[WorldEntry, str]:
+def _task(path: str, digest: str) -> tuple[WorldEntry, str]:
     """Return the entry of a task of another package, and its name."""
-    task = path.partition(":")[2]
+    family, _, task = path.partition(":")
     if digest:
         raise UsageError(f"run.world_digest belongs to a world in a file, not to {path!r}")
     entry: WorldEntry = import_module(FAMILIES[family]).entry(task)
     return entry, entry.environments[0]
+
+
+def _refuse_near_task(path: str) -> None:
+    """Raise UsageError if a path is nearly that of a task of another package."""
+    family, slash, task = path.partition("/")
+    if slash and family in FAMILIES:
+        raise UsageError(f"world {path!r}: a task of {family} is named {family}:{task}")
+    family, colon, _ = path.partition(":")
+    if colon and ".py" not in path and get_close_matches(family, FAMILIES, n=1, cutoff=0.6):
+        raise unknown_name("family of tasks", family, FAMILIES)
 
 
 def _named(name: str) -> WorldEntry:
