@@ -126,9 +126,9 @@ def test_no_more_is_fetched_from_a_device_than_is_read(apart, shape):
     there = OnDevice(flat)
     here = wp.array(flat, dtype=wp.int64, device="cpu")
     for n in (1, 3, 7):
-        assert np.array_equal(rolling._first(there, n, shape), whole[:n])
+        assert np.array_equal(arrays.first_parts(there, n, shape), whole[:n])
         assert there.fetched.pop() == n * prod(shape)
-        assert np.array_equal(rolling._first(here, n, shape), whole[:n])
-    kept = rolling._first(here, 1, shape)
+        assert np.array_equal(arrays.first_parts(here, n, shape), whole[:n])
+    kept = arrays.first_parts(here, 1, shape)
     here.fill_(-1)
     assert np.array_equal(kept, whole[:1])  # the next launch does not change the fetched array
