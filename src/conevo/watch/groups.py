@@ -15,11 +15,12 @@ from conevo.campaigns.progress import remaining_seconds
 from conevo.errors import UsageError
 from conevo.evolution.methods.registry import name_in
 from conevo.kernels.threads import usable_cores
+from conevo.runs.growing import Stamp, stamp
 from conevo.runs.outline import span
 from conevo.watch.comparisons import CurvePanel, panels_of
 from conevo.watch.settings import free_label
 from conevo.watch.subjects import Subject
-from conevo.watch.tail import Stamp, problem_of, readable, stamp
+from conevo.watch.tail import problem_of, readable
 
 __all__ = ["Experiment", "Followed", "Names", "FollowedRuns"]
 

@@ -18,6 +18,7 @@ from conevo.errors import UsageError
 from conevo.numbers import finite
 from conevo.runs import locks
 from conevo.runs.directory import CONFIG, LOCK, SEAL, SHAPING, kind_of, refuse_unreadable
+from conevo.runs.growing import stamp
 from conevo.runs.outline import Outline, budget_of, flattened, span
 from conevo.runs.progress import Done, seconds_left, share_of
 from conevo.runs.provenance import declared
@@ -25,7 +26,7 @@ from conevo.runs.run import Run
 from conevo.runs.shaping import Shaping
 from conevo.runs.store import GENERATIONS, PROVENANCE
 from conevo.watch.settings import CODE, FROM, Choices, choices_of
-from conevo.watch.tail import Log, Whole, problem_of, readable, stamp
+from conevo.watch.tail import Log, Whole, problem_of, readable
 from conevo.worlds.measures import Measure
 
 __all__ = ["Subject"]

@@ -6,23 +6,19 @@ Links, pipes and devices are never opened: all files read are in the watched fol
 from __future__ import annotations
 
 import math
-import os
-import stat
 from array import array
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 from conevo.errors import ConevoError, UsageError
-from conevo.reading import parse_json, read_part
-from conevo.runs.records import Generation
+from conevo.runs.growing import GrowingLog, Stamp, stamp
+from conevo.typing import Record
 
-__all__ = ["Generations", "Log", "Stamp", "Whole", "problem_of", "readable", "stamp"]
+__all__ = ["Generations", "Log", "Whole", "problem_of", "readable"]
 
 T = TypeVar("T")
-Stamp = tuple[int, int, int]  # last change (ns), size (bytes), inode
 
-CHUNK = 2**20  # bytes of a log that are read at once
 LARGEST = 1e100
 NUMBERS = (
     "team_evaluations",
@@ -37,15 +33,6 @@ NUMBERS = (
     "recombinations",
     "n_nonfinite",
 )
-
-
-def stamp(path: Path) -> Stamp | None:
-    """Return a value that changes whenever a file does, None if it is not a regular file."""
-    try:
-        found = os.lstat(path)
-    except (OSError, ValueError):
-        return None
-    return (found.st_mtime_ns, found.st_size, found.st_ino) if stat.S_ISREG(found.st_mode) else None
 
 
 class Whole(Generic[T]):
@@ -124,74 +111,22 @@ def _extend(
         column.append(value if value is not None and abs(value) < LARGEST else math.nan)
 
 
-class Log:
-    """A log of generations that grows: only new lines are read.
-
-    A torn last line does not count. Lines after a damaged one are not read until the file is
-    replaced.
+class Log(GrowingLog):
+    """A log of generations that grows, as columns.
 
     Attributes:
         generations: read so far.
-        problem: what is wrong with the file, "" if nothing is.
-        version: changes whenever the two others do.
-        is_behind: whether it has more to be read.
     """
 
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        self.version = 0
-        self.is_behind = False
-        self._stamp: Stamp | None = None
-        self._begin()
+    generations: Generations
 
-    def _begin(self) -> None:
-        self.generations, self.problem = Generations(), ""
-        self._offset, self._rest = 0, b""
-        self.version += 1
+    def clear(self) -> None:
+        """Forget all generations."""
+        self.generations = Generations()
 
-    @property
-    def written(self) -> float:
-        """Time of the last change to the file, seconds since 1970; 0 without a file."""
-        return self._stamp[0] / 1e9 if self._stamp else 0.0
-
-    def read(self, go_on: Callable[[], bool] = lambda: True) -> None:
-        """Read what is new, while ``go_on`` returns true."""
-        now, before = stamp(self.path), self._stamp
-        if now == before and not self.is_behind:
-            return
-        if before is not None and (now is None or not _has_grown(before, now, self._offset)):
-            self._begin()
-        self._stamp = now
-        self.is_behind = now is not None
-        while self.is_behind and go_on():
-            piece = read_part(self.path, self._offset, CHUNK)
-            self.is_behind = len(piece) == CHUNK
-            self._offset += len(piece)
-            if piece and not self.problem:
-                self._take(piece)
-
-    def _take(self, piece: bytes) -> None:
-        """Add the whole lines of a piece; keep the rest for the next time."""
-        *lines, self._rest = (self._rest + piece).split(b"\n")
-        self.version += 1
-        for line in lines:
-            n = len(self.generations)
-            try:
-                record = parse_json(line, self.path.name, Generation, f" in line {n + 1}")
-                if record["generation"] != n:
-                    raise UsageError(
-                        f"{self.path.name} is damaged in line {n + 1}: generation {n} expected"
-                    )
-            except UsageError as error:
-                self.problem = str(error)
-                return
-            self.generations.add(record)
-
-
-def _has_grown(before: Stamp, now: Stamp, offset: int) -> bool:
-    """Whether a file is the same one with more at its end, or not read to its end yet."""
-    same = before[2] == now[2] and now[1] >= max(before[1], offset)
-    return same and (now[1] > before[1] or now[0] == before[0])
+    def add(self, record: Record) -> None:
+        """Add a generation."""
+        self.generations.add(record)
 
 
 def readable(name: str) -> str:
