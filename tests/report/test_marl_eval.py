@@ -11,7 +11,8 @@ import pytest
 
 from conevo.campaigns.schema import SCHEMA
 from conevo.campaigns.tables import Tables
-from conevo.report.marl_eval import STEPS, export, left_out
+from conevo.report.marl_eval import STEPS, export, from_json, left_out, to_json
+from report.benchmarl import FRAMES, write
 
 GENERATIONS = 8
 BUDGET = 800  # team-steps
@@ -259,3 +260,26 @@ def test_a_measure_of_which_smaller_is_better_is_negated(campaign):
     assert less[f"step_{STEPS}"]["negated-first-capture"] == [1.0 - GENERATIONS]
     (more,) = data["rover-v2 simple smoke"]["simple-2"]["cone"].values()
     assert more["absolute_metrics"] == {"value": [5.0, 3.0]}
+
+
+def test_written_read_and_written_again_is_equal(campaign, tmp_path):
+    for seed in (2, 1):
+        for method in ("cone", "ccga"):
+            campaign.run(method, 1, seed)
+            campaign.run(method, 2, seed, measure="other_value", family="simple")
+    with campaign.tables() as tables:
+        data = export(tables)
+    path = tmp_path / "own.json"
+    path.write_text(json.dumps(data))
+    assert len(data) == 2
+    assert json.dumps(to_json(from_json(path))) == path.read_text()
+
+
+def test_a_file_of_benchmarl_is_read_and_written_as_it_is(tmp_path):
+    (path,) = write(tmp_path, {3: [10.0, 20.0]})
+    (one,) = found = from_json(path)
+    assert one[:4] == ("conevo", "pursuit_team_4", "mappo", "seed_3")
+    assert [point.steps for point in one.points] == [FRAMES, 2 * FRAMES]
+    assert one.points[1].values["return"] == [10.0, 20.0, 30.0]
+    assert one.absolute["return"] == [30.0]
+    assert to_json(found) == json.loads(path.read_text())

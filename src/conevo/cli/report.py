@@ -12,7 +12,16 @@ __all__ = ["report"]
 @click.command()
 @click.argument("name", metavar="CAMPAIGN")
 @click.option("--out", metavar="DIR", help="Output directory (default: report/ in the campaign).")
-def report(name: str, out: str | None) -> None:
+@click.option(
+    "--foreign", "files", metavar="FILE.json", multiple=True,
+    help="Results of another tool in marl-eval's form (BenchMARL: create_json), shown next to the "
+    "campaign's own; may be repeated.",
+)  # fmt: skip
+@click.option(
+    "--frames-are", "frames", metavar="team|robot",
+    help="The unit of the steps in these files: of a team (BenchMARL), or of each robot.",
+)  # fmt: skip
+def report(name: str, out: str | None, files: tuple[str, ...], frames: str | None) -> None:
     """Write a self-contained page, LaTeX tables, PDF and SVG figures, and their numbers as CSV.
 
     It covers all finished runs and lists what is missing. A report that was edited by hand is not
@@ -23,14 +32,23 @@ def report(name: str, out: str | None) -> None:
     import logging
 
     from conevo.cli.lookup import find_campaign, sealed
-    from conevo.errors import EnvironmentFailure
+    from conevo.errors import EnvironmentFailure, UsageError
     from conevo.report.files import write_report
+    from conevo.report.foreign import read_foreign
 
     logging.getLogger("matplotlib").setLevel(logging.ERROR)  # it caches fonts, or need not
+    if bool(files) != (frames is not None):
+        raise UsageError(
+            "--foreign needs --frames-are team (BenchMARL) or robot: the unit of its steps"
+            if files
+            else "--frames-are is about files of --foreign: give both, or neither"
+        )
+    others = read_foreign([Path(file) for file in files], frames) if frames else []
     found = find_campaign(name)
     with sealed(found) as tables:
         try:
-            page = write_report(found, Path(out) if out else found.paths.report, tables)
+            place = Path(out) if out else found.paths.report
+            page = write_report(found, place, tables, others)
         except EnvironmentFailure as error:
             advice = "" if out else "; choose another place with --out"
             raise EnvironmentFailure(f"{error}{advice}") from error

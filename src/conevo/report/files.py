@@ -21,7 +21,7 @@ import html
 import json
 import re
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from importlib import resources
 from pathlib import Path
 
@@ -33,6 +33,7 @@ from conevo.campaigns.tables import Tables
 from conevo.errors import UsageError
 from conevo.reading import DamagedFile, read_bytes, read_json
 from conevo.report.exhibits import Figure, Section, Table
+from conevo.report.foreign import Foreign
 from conevo.report.latex import document, figures_to_latex, to_latex
 from conevo.report.learning_curves import read_histories
 from conevo.report.marl_eval import export
@@ -43,6 +44,7 @@ from conevo.report.sections.champions import champions
 from conevo.report.sections.claims import claims
 from conevo.report.sections.comparisons import comparisons
 from conevo.report.sections.composed import composed
+from conevo.report.sections.foreign import foreign
 from conevo.report.sections.interventions import interventions
 from conevo.report.sections.learning import learning
 from conevo.report.sections.metrics import definitions, metrics
@@ -65,7 +67,9 @@ class Manifest(TypedDict):
     files: dict[str, str]
 
 
-def write_report(campaign: Campaign, out: Path, tables: Path | None = None) -> Path:
+def write_report(
+    campaign: Campaign, out: Path, tables: Path | None = None, others: Sequence[Foreign] = ()
+) -> Path:
     """Write the report of a campaign and return its page.
 
     A report that is there already is replaced as a whole, once the new one is complete.
@@ -74,6 +78,7 @@ def write_report(campaign: Campaign, out: Path, tables: Path | None = None) -> P
         campaign: with sealed tables.
         out: directory of the report.
         tables: the folder of the sealed tables, if not the campaign's own.
+        others: results of other tools, shown in a section of their own.
 
     Raises:
         UsageError: no tables; or ``out`` holds something else than an unchanged report.
@@ -81,7 +86,7 @@ def write_report(campaign: Campaign, out: Path, tables: Path | None = None) -> P
     """
     _refuse_changed(out)
     with Tables(tables or campaign.paths.tables) as opened:
-        sections = sections_of(opened, campaign)
+        sections = sections_of(opened, campaign, others)
         files = dict(_files(campaign.plan, sections))
         files["marl-eval.json"] = _json(export(opened))
     digests = {name: _digest(content) for name, content in sorted(files.items())}
@@ -99,15 +104,19 @@ def write_report(campaign: Campaign, out: Path, tables: Path | None = None) -> P
     return out / "index.html"
 
 
-def sections_of(tables: Tables, campaign: Campaign) -> list[Section]:
-    """Return the sections of a report in order."""
+def sections_of(
+    tables: Tables, campaign: Campaign, others: Sequence[Foreign] = ()
+) -> list[Section]:
+    """Return the sections of a report in order; ``others`` are results of other tools."""
     found = scopes(tables)
     spent = [spent_by(tables, scope.group) for scope in found]
     titles = headings([scope.group for scope in found], spent)
     groups = [_about(*one) for one in zip(found, titles, spent, strict=True)]
+    from_elsewhere = foreign(found, campaign, others)
     return [
         overview(tables, campaign),
         *groups,
+        *([from_elsewhere] if from_elsewhere else []),
         claims(tables),
         *([definitions()] if groups else []),
         repetition(tables, campaign),

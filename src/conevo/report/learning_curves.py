@@ -47,7 +47,7 @@ class Histories:
     Attributes:
         cells: of each run, [N].
         starts: first generation of each run, and G, [N + 1].
-        evaluations: [G] team evaluations spent, ascending within a run.
+        evaluations: [G] team evaluations (or team-steps) spent, ascending within a run.
         columns: name of one of ``COURSES`` -> [G], NaN for no value.
         castes: C names.
         shares: [G, C] share of the fittest team's robots in each caste.
@@ -77,8 +77,13 @@ class Histories:
         return np.array([round(most * k / n) for k in range(1, n + 1)], dtype=np.float64)
 
 
-def read_histories(tables: Tables, group: Group) -> Histories:
-    """Return the generations of a group's runs, by environment, method, variant and seed."""
+def read_histories(tables: Tables, group: Group, over: str = "evaluations") -> Histories:
+    """Return the generations of a group's runs, by environment, method, variant and seed.
+
+    Args:
+        tables, group: the runs.
+        over: the column that counts what is spent, or "team_steps".
+    """
     tables.query(
         "CREATE OR REPLACE TEMP TABLE chosen AS SELECT row_number() OVER (ORDER BY number,"
         " environment, method, variant, seed, run) - 1 AS place, runs.* FROM runs JOIN budgets"
@@ -94,7 +99,7 @@ def read_histories(tables: Tables, group: Group) -> Histories:
         " USING (place) GROUP BY place, environment, method, variant ORDER BY place"
     )[1]
     listed = ", ".join(f"{name}::DOUBLE AS {name}" for name in COURSES)
-    read = tables.arrays(f"SELECT evaluations, {listed} FROM history ORDER BY row")
+    read = tables.arrays(f"SELECT {over}::DOUBLE AS spent, {listed} FROM history ORDER BY row")
     names = [
         name
         for (name,) in tables.query(
@@ -105,12 +110,12 @@ def read_histories(tables: Tables, group: Group) -> Histories:
         "SELECT row, dense_rank() OVER (ORDER BY caste) - 1 AS caste, robots::DOUBLE AS robots"
         " FROM castes JOIN history USING (run, generation)"
     )
-    robots = np.zeros((len(read["evaluations"]), len(names)))
+    robots = np.zeros((len(read["spent"]), len(names)))
     np.add.at(robots, (parts["row"].astype(int), parts["caste"].astype(int)), parts["robots"])
     return Histories(
         cells=[Cell(row[0], Treatment(row[1], row[2])) for row in runs],
         starts=np.cumsum([0, *(row[3] for row in runs)]),
-        evaluations=read.pop("evaluations"),
+        evaluations=read.pop("spent"),
         columns=read,
         castes=names,
         shares=robots / np.maximum(robots.sum(axis=1, keepdims=True), 1),

@@ -1,4 +1,4 @@
-"""A campaign for marl-eval (Gorsane et al. 2022): raw results in the form its page documents.
+"""Raw results in the form that marl-eval documents (Gorsane et al. 2022): written and read.
 
 ::
 
@@ -17,26 +17,71 @@ step_k            the fittest team of the last generation that had ended by then
 absolute_metrics  the champion in its test, [scenarios]
 ================  ==============================================================================
 
-The library needs a full rectangle: every task of an environment has the same algorithms, runs of
-the same names and the same number of steps. Runs are named by their seeds. Choice: either the
-tasks that have all algorithms are taken, or the algorithms that all tasks have, whichever keeps
-more runs. Of these, the seeds that all have are taken, one run per seed. ``left_out`` names the
-rest. Choice: before its first generation has ended a run shows that generation's value. Choice:
-"_" becomes "-" in measures and "," becomes ";" in algorithms, because the library cuts names there.
+``export`` writes a campaign. The library needs a full rectangle: every task of an environment has
+the same algorithms, runs of the same names and the same number of steps. Runs are named by their
+seeds. Choice: either the tasks that have all algorithms are taken, or the algorithms that all tasks
+have, whichever keeps more runs. Of these, the seeds that all have are taken, one run per seed.
+``left_out`` names the rest. Choice: before its first generation has ended a run shows that
+generation's value. Choice: "_" becomes "-" in measures and "," becomes ";" in algorithms, because
+the library cuts names there.
+
+``from_json`` reads such a file, whoever wrote it. The library itself is never imported.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from typing_extensions import TypedDict
 
 from conevo.campaigns.tables import Tables
+from conevo.errors import shown
+from conevo.reading import DamagedFile, check, read_json
 
-__all__ = ["STEPS", "export", "left_out"]
+__all__ = ["STEPS", "Point", "RawResult", "export", "from_json", "left_out", "to_json"]
 
 STEPS = 20
 """Points of a learning curve."""
+
+
+ABSOLUTE, COUNT = "absolute_metrics", "step_count"
+Values = Mapping[str, list[float]]  # measure -> of the episodes of an evaluation
+
+
+class _Nested(TypedDict):
+    """Environment -> task -> algorithm -> run -> evaluation or absolute metrics -> values."""
+
+    results: dict[str, dict[str, dict[str, dict[str, dict[str, dict[str, Any]]]]]]
+
+
+class _Lists(TypedDict):
+    values: dict[str, list[float]]
+
+
+class Point(NamedTuple):
+    """One evaluation of a run: "step_3", its number of steps, and the values of each measure."""
+
+    name: str
+    steps: int
+    values: Values
+
+
+class RawResult(NamedTuple):
+    """The results of one run of a file.
+
+    run: "seed_1". points: evaluations by number of steps. absolute: of the final evaluation, or
+    whatever the writer keeps there: BenchMARL keeps the best single episode.
+    """
+
+    environment: str
+    task: str
+    algorithm: str
+    run: str
+    points: tuple[Point, ...]
+    absolute: Values
 
 
 class _Run(NamedTuple):
@@ -58,21 +103,72 @@ def export(tables: Tables) -> dict[str, Any]:
 
     Runs without a test or a generation, or with a value that is not finite, are left out.
     """
-    data: dict[str, Any] = {}
+    found: list[RawResult] = []
     for environment, cells in _environments(tables).items():
         kept = _rectangle(cells)
         if not kept:
             continue
         fewest = min(one.team_steps[-1] for one in _runs(kept))
         counts = [fewest * k // STEPS for k in range(1, STEPS + 1)]
-        data[environment] = {
-            task: {
-                algorithm: {f"seed_{one.seed}": _result(one, counts) for one in runs}
-                for algorithm, runs in algorithms.items()
-            }
+        found += [
+            _sample(environment, task, algorithm, one, counts)
             for task, algorithms in kept.items()
-        }
+            for algorithm, runs in algorithms.items()
+            for one in runs
+        ]
+    return to_json(found)
+
+
+def to_json(samples: Iterable[RawResult]) -> dict[str, Any]:
+    """Return results as plain data for JSON."""
+    data: dict[str, Any] = {}
+    for one in samples:
+        tasks = data.setdefault(one.environment, {})
+        steps: dict[str, Any] = {p.name: {COUNT: p.steps, **p.values} for p in one.points}
+        runs = tasks.setdefault(one.task, {}).setdefault(one.algorithm, {})
+        runs[one.run] = steps | {ABSOLUTE: dict(one.absolute)}
     return data
+
+
+def from_json(path: Path) -> list[RawResult]:
+    """Return the results in a file, in its order.
+
+    Raises:
+        DamagedFile: it is not of this form, or has no result.
+        EnvironmentFailure: it cannot be read.
+    """
+    data = read_json(path)
+    problem = f"{path} is not a file of raw results for marl-eval"
+    check({"results": data}, _Nested, problem)
+    found = [
+        _read(RawResult(environment, task, algorithm, run, (), {}), of, problem)
+        for environment, tasks in data.items()
+        for task, algorithms in tasks.items()
+        for algorithm, runs in algorithms.items()
+        for run, of in runs.items()
+    ]
+    if not found:
+        raise DamagedFile(f"{problem}: it has no run")
+    return found
+
+
+def _read(one: RawResult, of: Mapping[str, Mapping[str, Any]], problem: str) -> RawResult:
+    """Return a run with its evaluations and its absolute metrics."""
+    where = f"{problem}: {'.'.join(one[:4])}"
+    points = []
+    for name, values in of.items():
+        if name == ABSOLUTE:
+            continue
+        rest = dict(values)
+        count = rest.pop(COUNT, None)
+        if type(count) is not int or count < 0:
+            raise DamagedFile(f"{where}.{name}.{COUNT} = {shown(count)}: must be a whole number")
+        check({"values": rest}, _Lists, f"{where}.{name}")
+        points.append(Point(name, count, rest))
+    absolute = of.get(ABSOLUTE, {})
+    check({"values": absolute}, _Lists, f"{where}.{ABSOLUTE}")
+    points.sort(key=lambda point: point.steps)
+    return one._replace(points=tuple(points), absolute=absolute)
 
 
 def left_out(tables: Tables) -> list[str]:
@@ -151,11 +247,12 @@ def _runs(cells: Cells) -> list[_Run]:
     return [one for algorithms in cells.values() for runs in algorithms.values() for one in runs]
 
 
-def _result(one: _Run, counts: list[int]) -> dict[str, Any]:
-    """Return the steps and the absolute metrics of one run."""
+def _sample(environment: str, task: str, algorithm: str, one: _Run, counts: list[int]) -> RawResult:
+    """Return the results of one run at these numbers of steps."""
     ended = np.searchsorted(one.team_steps, counts, side="right") - 1
-    steps = {
-        f"step_{k}": {"step_count": count, one.measure: [one.values[max(at, 0)]]}
+    points = [
+        Point(f"step_{k}", count, {one.measure: [one.values[max(at, 0)]]})
         for k, (count, at) in enumerate(zip(counts, ended.tolist(), strict=True), start=1)
-    }
-    return steps | {"absolute_metrics": {one.measure: one.test}}
+    ]
+    absolute = {one.measure: one.test}
+    return RawResult(environment, task, algorithm, f"seed_{one.seed}", tuple(points), absolute)
