@@ -25,7 +25,7 @@ EXECUTED = (
     "README.md",
     *(
         f"docs/{name}.md"
-        for name in ("quickstart", "python", "worlds", "campaigns", "replay", "export")
+        for name in ("quickstart", "python", "worlds", "campaigns", "replay", "export", "track")
     ),
 )
 LINKED = (

@@ -17,18 +17,18 @@ QUICK = "--set run.generations=1 --set run.epochs=1 --set world.iterations=4 --t
 
 RUN = (
     "show run", "show run --json", "test run --scenarios 1 --threads 1", "list runs .",
-    "resume run --threads 1", "replay run --out page.html --threads 1",
+    "resume run --threads 1", "TRACK run", "replay run --out page.html --threads 1",
     "film run --poster 1 --size 200 --out poster.png --threads 1", "WATCH run",
     "export run --to team.py",
     "resume run --generations 3 --threads 1 --quiet",
 )  # fmt: skip
-HALF = ("resume half --threads 1 --quiet", "show half", "list runs .", "WATCH half")
+HALF = ("resume half --threads 1 --quiet", "show half", "list runs .", "WATCH half", "TRACK half")
 SHAPED = ("show shaped", "resume shaped --threads 1 --quiet", "list runs .", "WATCH shaped",
-          "test shaped --stages --scenarios 1 --threads 1")  # fmt: skip
+          "TRACK shaped", "test shaped --stages --scenarios 1 --threads 1")  # fmt: skip
 CAMPAIGN = (
     "campaign status tiny", "campaign status tiny --runs", "campaign start tiny --executor serial",
     "campaign retry tiny --executor serial", "campaign slurm tiny --hours 1", "report tiny",
-    "WATCH tiny", "query tiny SELECT+1", "campaign list", "campaign stop tiny",
+    "WATCH tiny", "TRACK tiny", "query tiny SELECT+1", "campaign list", "campaign stop tiny",
     "campaign start tiny --dry-run",
 )  # fmt: skip
 READERS: dict[str, tuple[str, ...]] = {

@@ -65,6 +65,8 @@ def call(command: str, folder: Path) -> tuple[int, str, str]:
             warnings.simplefilter("error", RuntimeWarning)
             if words[0] == "WATCH":
                 code = watch(folder / words[1])
+            elif words[0] == "TRACK":
+                code = track(folder / words[1])
             else:
                 sys.argv = ["conevo", *words]
                 main(words)
@@ -80,6 +82,28 @@ def call(command: str, folder: Path) -> tuple[int, str, str]:
             signal.signal(one, handler)
         os.chdir(here)
     return code, out.getvalue(), err.getvalue()
+
+
+def track(path: Path) -> int:
+    """Read all rows as a tracker does, without one."""
+    from conevo.campaigns.campaign import Campaign
+    from conevo.runs.directory import kind_of
+    from conevo.track.series import Series
+
+    try:
+        runs = [path]
+        if kind_of(path) == "campaign":
+            campaign = Campaign(path)
+            runs = [campaign.paths.run(label) for label in campaign.planned]
+        for run in runs:
+            series = Series(run)
+            rows = series.read()
+            json.dumps([[row.step, dict(row.values)] for row in rows], allow_nan=False)
+            json.dumps([series.about.settings, series.test()])
+    except ConevoError as error:
+        sys.stderr.write(f"conevo: error: {error}\n")
+        return error.exit_code
+    return 0
 
 
 def watch(path: Path) -> int:

@@ -85,4 +85,6 @@ def compare(order: Order, plan: Plan, dry_run: bool) -> int:
         quiet=order.quiet,
     )
     path = Path(order.out) if order.out else CAMPAIGNS / plan.name
-    return carry_on(create(plan, path), execution)
+    campaign = create(plan, path)
+    order.start_tracker(campaign.path)
+    return carry_on(campaign, execution)

@@ -33,6 +33,7 @@ VERBS = {
     "film": "Make a film of a run's fittest team (GIF, MP4).",
     "watch": "Follow runs live in the browser.",
     "export": "Export a run's fittest team to a file that runs without conevo.",
+    "track": "Send generations to TensorBoard, W&B or MLflow.",
     "behaviours": "Classify what robots do, each and together.",
     "signal": "Measure how well trials distinguish genotypes.",
     "campaign": "Start, monitor, stop and retry campaigns of many runs.",

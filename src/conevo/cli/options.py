@@ -65,7 +65,8 @@ class Order:
     """The options of a command line; fields have the options' names.
 
     Raises:
-        UsageError: options that are mutually exclusive, or an unknown device.
+        UsageError: options that are mutually exclusive, an unknown device, or a tracker that cannot
+            be used.
     """
 
     method: str | None
@@ -82,12 +83,17 @@ class Order:
     quiet: bool = False
     verbose: bool = False
     comparing: bool = False
+    track: str | None = None
 
     def __post_init__(self) -> None:
         from conevo.kernels.devices import refuse_unknown_device
         from conevo.runs.assignments import parse_assignments
 
         refuse_unknown_device(self.device)
+        if self.track is not None:
+            from conevo.track.trackers import kind_named
+
+            kind_named(self.track).refuse()
         self.style = style_of(self.as_json, self.quiet, self.verbose)
         self.overrides = parse_assignments(self.settings)
         names = (("method", self.method), ("preset", self.preset), ("seed", self.seed))
@@ -214,4 +220,16 @@ class Order:
         else:
             found = None if origin is None else find_last(origin)
             begun = start(configs[0], self.out, origin=found, of_champion=of_champion, **how)
+        self.start_tracker(begun.path)
         carry_on(begun, self.threads, self.style, self.limit)
+
+    def start_tracker(self, path: Path) -> None:
+        """Start the tracker of --track, if it is given, for a new run, shaping or campaign."""
+        if self.track is None:
+            return
+        from conevo.track.spawning import spawn
+        from conevo.track.trackers import kind_named
+
+        line = spawn(path, kind_named(self.track))
+        if self.style != "quiet":
+            click.echo(f"conevo: note: {line}", err=True)

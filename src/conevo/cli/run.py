@@ -38,6 +38,11 @@ __all__ = ["run"]
     "--seeds", type=click.IntRange(1, 10_000), metavar="N",
     help="Compare: N runs of each method (--method cone,mesp), as a campaign on all cores.",
 )  # fmt: skip
+@click.option(
+    "--track", metavar="TRACKER",
+    help="Start conevo track --follow for it: tensorboard, wandb or mlflow; does not change "
+    "results.",
+)  # fmt: skip
 @output_options
 def run(
     world: str | None,

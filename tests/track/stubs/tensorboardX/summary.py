@@ -1,0 +1,5 @@
+"""A summary of a text."""
+
+
+def text(tag, text):
+    return {tag: text}
