@@ -103,6 +103,42 @@ def test_an_epoch_that_is_done_ends_and_costs_no_more(task: str) -> None:
     assert np.array_equal(longer.performance["distance"], homing.performance["distance"])
 
 
+@pytest.mark.parametrize("task", ["toy:line", "toy:steps"])
+def test_all_teams_meet_the_same_scenarios_however_many_play_together(
+    task: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    a_world = world(task, iterations=30)
+    genes, teams = random_teams(a_world, 9)
+    made = simulator(a_world, conevo.controller(world=a_world))
+    keys = [fold(3, "epoch", k) for k in range(8)]
+    clones = made.evaluate(genes, np.repeat(teams[:1], 9, axis=0), a_world.scenarios(keys[:4]))
+    assert np.ptp(clones.fitness, axis=0).max() == 0
+    assert len(np.unique(clones.fitness[0], axis=0)) == 4
+    rounds = a_world.scenarios(keys)  # two, of four epochs
+    whole = made.evaluate(genes, teams[:8], rounds, rounds=2)
+    for size in (1, 5, 7):
+        monkeypatch.setattr("conevo.simulators.playing.MOST", size)
+        parts = made.evaluate(genes, teams[:8], rounds, rounds=2)
+        for name in ("fitness", "counts", "switches", "steps"):
+            assert getattr(parts, name).tobytes() == getattr(whole, name).tobytes()
+
+
+def test_the_budget_is_in_team_evaluations_and_early_ends_save_none(tmp_path: Path) -> None:
+    """A team that has reached the middle costs fewer team-steps, but as many evaluations."""
+    small, large = (
+        evolved(tmp_path / str(n), 50, **{"run.budget_evaluations": 400, "world.iterations": n})
+        for n in (30, 300)
+    )
+    for run in (small, large):
+        assert run.provenance["stopped_by"] == "budget"
+        last = run.generations()[-1]
+        assert 300 < last["team_evaluations"] <= 400
+    evaluations = [[one["team_evaluations"] for one in run.generations()] for run in (small, large)]
+    assert evaluations[0][:2] == evaluations[1][:2]
+    steps = [run.generations()[-1]["team_steps"] for run in (small, large)]
+    assert steps[0] < steps[1] < 10 * steps[0]
+
+
 def test_team_steps_are_those_that_were_played(tmp_path: Path) -> None:
     run = evolved(tmp_path / "run", 3)
     whole = [one["team_evaluations"] * 2 * 30 for one in run.generations()]

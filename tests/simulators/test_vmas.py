@@ -175,10 +175,33 @@ def test_torchs_functions_are_its_own_after_an_epoch() -> None:
 
 @pytest.mark.timing
 def test_many_epochs_side_by_side_are_fast() -> None:
-    """Team-steps of balance with networks, one thread, 4096 environments (measured: README)."""
-    a_world, made, genes, teams, _ = played("balance", 4096, iterations=5)
+    """Team-steps of balance with networks, one thread, 4096 environments, at least 80,000/s."""
+    a_world, made, genes, teams, _ = played("balance", 4096, iterations=25)
     scenarios = a_world.scenarios(keys(1))
-    made.evaluate(genes, teams, scenarios)
-    began = time.perf_counter()
-    made.evaluate(genes, teams, scenarios)
-    assert 4096 * 5 / (time.perf_counter() - began) > 80_000
+    made.evaluate(genes, teams, scenarios)  # makes the environments
+    speeds = []
+    for _ in range(3):
+        began = time.perf_counter()
+        steps = made.evaluate(genes, teams, scenarios).steps.sum()
+        speeds.append(steps / (time.perf_counter() - began))
+    assert max(speeds) >= 80_000
+
+
+@pytest.mark.exhaustive
+def test_clones_learn_to_balance_better_than_the_packages_controller(tmp_path: Path) -> None:
+    """HomCNE, 4 million team-steps, 256 fresh scenarios: better in two of three seeds."""
+    *_, modes = own = played("balance", 1, "scenario", iterations=100)
+    a_world, made, genes, teams, _ = own
+    fresh = a_world.scenarios([fold(9, "fresh", k) for k in range(256)])
+    bar = float(made.evaluate(genes, teams, fresh, modes).performance["reward"].mean())
+    sizes = {"run.budget_evaluations": 10_000, "run.epochs": 4, "run.n_tests": 256}
+    found = []
+    for seed in (1, 2, 3):
+        run = conevo.evolve(
+            "vmas:balance", "homcne", seed=seed, out=tmp_path / str(seed), overrides=sizes
+        )
+        assert run.generations()[-1]["team_steps"] < 4.2e6
+        assert run.test_result is not None
+        tested = run.test_result["champion"]["performance"]["reward"]["values"]
+        found.append(float(np.mean(tested)))
+    assert sum(one > bar for one in found) >= 2, (bar, found)
