@@ -12,6 +12,7 @@ from conevo.errors import EnvironmentFailure
 from conevo.track.series import Series
 from conevo.track.trackers import TRACKERS
 from conevo.track.tracking import Tracking
+from conevo.track.wandb import begin
 from simulators.extras import need
 from watch.followed import write_run
 
@@ -25,10 +26,18 @@ def _apart(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setenv("HOME", str(tmp_path))
     monkeypatch.setenv("WANDB_BASE_URL", "http://127.0.0.1:9")
+    end_wandb()  # it remembers the key of another test
 
 
 def send(path: Path, out: Path) -> None:
     Tracking(path, TRACKERS["wandb"], out, lambda _: None).once()
+
+
+def end_wandb() -> None:
+    """Wait until all is on the disk."""
+    import wandb
+
+    wandb.teardown()
 
 
 def records(content: bytes) -> Iterator[bytes]:
@@ -61,8 +70,9 @@ def logged(path: Path) -> list[dict[str, str]]:
 def test_a_run_is_kept_offline_under_its_id_once(tmp_path: Path) -> None:
     path = write_run(tmp_path / "run", 3)
     about = Series(path).about
-    for _ in range(2):
+    for _ in range(3):
         send(path, tmp_path / "out")
+        end_wandb()
         (file,) = (tmp_path / "out").rglob("*.wandb")
         assert file.name == f"run-{about.id}.wandb"
         rows = logged(file)
@@ -78,3 +88,33 @@ def test_a_dead_server_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     with pytest.raises(EnvironmentFailure, match=r"^Weights & Biases: .*127\.0\.0\.1:9") as caught:
         send(path, tmp_path / "out")
     assert "\n" not in str(caught.value)
+
+
+def test_a_previous_directory_stays_until_the_new_one_is_on_the_disk(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import wandb
+
+    ids = [{"run_id": digit * 12} for digit in "12"]
+    paths = [write_run(tmp_path / f"run-{k}", 3, about=one) for k, one in enumerate(ids)]
+    for path in paths:
+        send(path, tmp_path / "out")
+    before = set((tmp_path / "out").rglob("*.wandb"))
+    found: list[set[Path]] = []
+    end = wandb.teardown
+
+    def teardown() -> None:
+        found.append(set((tmp_path / "out").rglob("*.wandb")))
+        end()
+        assert all(len(logged(one)) == 3 for one in found[-1])
+
+    monkeypatch.setattr(wandb, "teardown", teardown)
+    of = [Series(path) for path in paths]
+    folders = [tmp_path / "out" / "wandb" / f"{s.about.name}-{s.about.id[:6]}" for s in of]
+    targets = [begin(s.about, folder) for s, folder in zip(of, folders, strict=True)]
+    for target, s in zip(targets, of, strict=True):
+        target.put(s.read())
+        target.close(False)
+    (all_there,) = found  # not while the second run was open
+    assert before < all_there
+    assert set((tmp_path / "out").rglob("*.wandb")) == all_there - before

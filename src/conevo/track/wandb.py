@@ -2,7 +2,7 @@
 
 The id of a run there is that of ``RunProfile``, so a series that is sent again is the same run.
 Online it is continued after its last step. Offline a new directory has the whole series, and the
-previous ones are removed once the new one has as much; uploading it replaces what was there.
+previous ones are removed once the new one is on the disk; uploading it replaces what was there.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from conevo.errors import EnvironmentFailure
 from conevo.terms import quoted
@@ -34,7 +34,14 @@ def begin(about: RunProfile, folder: Path) -> WandbRun:
 
 
 class WandbRun:
-    """A run there."""
+    """A run there.
+
+    ``finish`` returns before all is on the disk; only the end of W&B's process, which all runs
+    share, makes it sure. So previous directories are removed when no run is open any more.
+    """
+
+    _open: ClassVar[list[WandbRun]] = []
+    _replaced: ClassVar[list[Path]] = []  # directories that are to be removed
 
     def __init__(self, about: RunProfile, folder: Path) -> None:
         import wandb
@@ -62,6 +69,7 @@ class WandbRun:
                     init_timeout=PATIENCE,
                 ),
             )
+        self._open.append(self)
         self.next_step = int(self._run.starting_step)
         if mode == "online":
             self.place = self.see = str(self._run.url)
@@ -81,11 +89,17 @@ class WandbRun:
             self._run.summary.update(dict(values))
 
     def close(self, is_finished: bool) -> None:
-        """Wait until all is sent or written, then remove the previous directories."""
+        """End the run; remove previous directories when all new ones are on the disk."""
+        import wandb
+
+        self._open.remove(self)
         with _refusals():
             self._run.finish(exit_code=0)
-        for path in self._earlier:
-            shutil.rmtree(path, ignore_errors=True)
+            self._replaced.extend(self._earlier)
+            if self._replaced and not self._open:
+                wandb.teardown()
+                while self._replaced:
+                    shutil.rmtree(self._replaced.pop(), ignore_errors=True)
 
 
 def _is_logged_in() -> bool:
@@ -101,10 +115,11 @@ def _is_logged_in() -> bool:
 @contextmanager
 def _refusals() -> Iterator[None]:
     """Convert the errors of wandb, and those of the system, to one clear line."""
-    import wandb
-
     try:
         yield
-    except (wandb.Error, OSError) as error:
+    except Exception as error:
+        own = any(one.__module__.partition(".")[0] == "wandb" for one in type(error).__mro__)
+        if not (own or isinstance(error, OSError)):
+            raise
         reason = " ".join(str(error).split())[:300]
         raise EnvironmentFailure(f"Weights & Biases: {reason}") from error
