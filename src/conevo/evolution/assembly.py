@@ -175,7 +175,8 @@ def elite_teams(
     rank = generator.integers(n_elite, size=size, dtype=np.int32)
     for population in range(n_populations):
         rank[population, :, population] = np.arange(n_elite)[:, None]
-    choice = elite[np.arange(n_populations)[:, None], np.arange(n_slots), rank]
+    first = np.arange(0, elite.size, n_elite).reshape(n_populations, n_slots)
+    choice = elite.ravel()[first + rank]
     return rows(active, choice.reshape(-1, n_populations, n_slots), n_genotypes)
 
 
