@@ -81,6 +81,8 @@ def __getattr__(name: str) -> Any:
     """Load on first use, so that ``import conevo`` stays fast."""
     if name == "__version__":
         return import_module("conevo.runs.provenance").version("conevo")
+    if name == "adapters":  # environments of other packages: conevo.adapters.pettingzoo
+        return import_module("conevo.adapters")
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
