@@ -13,8 +13,8 @@ from conevo.cli.main import main
 from conevo.errors import UsageError
 from conevo.simulators import tasks
 from conevo.simulators.vmas import world as family
+from extras import need
 from simulators import toy
-from simulators.extras import need
 
 SCENARIOS = ("balance.py", "mpe/simple_tag.py", "debug/__init__.py")
 

@@ -21,8 +21,8 @@ from conevo.rng import fold
 from conevo.worlds.checks import findings, random_teams
 from conevo.worlds.registry import world
 from conevo.worlds.simulators import simulator
+from extras import need
 from runs.tiny import content
-from simulators.extras import need
 
 need("torch", "vmas")
 

@@ -10,8 +10,8 @@ import pytest
 from conevo.errors import EnvironmentFailure
 from conevo.track.trackers import TRACKERS
 from conevo.track.tracking import Tracking
+from extras import need
 from runs.tiny import evolve_tiny
-from simulators.extras import need
 from watch.followed import append, configure, record, write_run
 
 need("mlflow")

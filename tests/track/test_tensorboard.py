@@ -9,7 +9,7 @@ import pytest
 
 from conevo.track.trackers import TRACKERS
 from conevo.track.tracking import Tracking
-from simulators.extras import need
+from extras import need
 from watch.followed import append, record, write_run
 
 need("tensorboardX")

@@ -13,7 +13,7 @@ from conevo.track.series import Series
 from conevo.track.trackers import TRACKERS
 from conevo.track.tracking import Tracking
 from conevo.track.wandb import begin
-from simulators.extras import need
+from extras import need
 from watch.followed import write_run
 
 need("wandb")

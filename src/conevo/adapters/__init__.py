@@ -1,6 +1,7 @@
-"""Worlds as environments of other packages: ``pettingzoo``, ``gymnasium``, ``torchrl``, ``benchmarl``.
+"""Worlds as environments of PettingZoo, Gymnasium, TorchRL and BenchMARL.
 
-Each is a module of this folder that is loaded on first use, as its package may not be installed.
+Each package has a module of its name in this folder. It is loaded on first use, as the package may
+not be installed.
 """
 
 from __future__ import annotations

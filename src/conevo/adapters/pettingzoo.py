@@ -63,8 +63,6 @@ class TeamEnv(ParallelEnv, EzPickle):
         UsageError: a task, mode or parameter that is not allowed.
     """
 
-    metadata = {"render_modes": [], "is_parallelizable": True}
-
     def __init__(
         self,
         task: str,
@@ -79,7 +77,11 @@ class TeamEnv(ParallelEnv, EzPickle):
         )
         whole = length_in(params, max_cycles)
         self.teams = teams = SteppedTeams(task, 1, actions, whole, scenarios=1, threads=1)
-        self.metadata = {**TeamEnv.metadata, "name": versioned(teams.world)}
+        self.metadata = {
+            "name": versioned(teams.world),
+            "render_modes": [],
+            "is_parallelizable": True,
+        }
         self.render_mode = render_mode
         self.possible_agents = teams.agents
         self.agents: list[str] = []

@@ -10,8 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from conevo.errors import UsageError
+from conevo.worlds.families import is_task
 from conevo.worlds.measures import measures_of
-from conevo.worlds.registry import world
+from conevo.worlds.registry import WORLDS, world
 from conevo.worlds.spaces import ActionMode, Mode, group_of, input_bounds_of
 from conevo.worlds.stepper import Stepper
 
@@ -67,6 +68,11 @@ class SteppedTeams:
         threads: int | None = None,
         device: str = "cpu",
     ) -> None:
+        if is_task(task):
+            raise UsageError(
+                f"{task} is a task of another package: use its environment there. Worlds of conevo "
+                f"are {', '.join(entry.short_name for entry in WORLDS.values())}, or FILE.py"
+            )
         self.world = world(task, **params)
         self.actions = ActionMode(self.world, actions)
         self.stepper = Stepper(self.world, n, scenarios, n_threads=threads, device=device)
@@ -76,6 +82,7 @@ class SteppedTeams:
         self.low, self.high = bounds[:, 0], bounds[:, 1]
         self.measures = tuple(one.name for one in measures_of(self.world))
         self.iterations: int = self.world.params.iterations
+        self._is_on_cpu = self.stepper.device == "cpu"  # where these are views
         self._inputs: Floats = self.stepper.inputs.numpy()
         self._outputs: Floats = self.stepper.outputs.numpy()
         self._fitness: Floats = self.stepper.fitness.numpy()
@@ -123,8 +130,11 @@ class SteppedTeams:
             UsageError: actions that do not exist or do not fit.
         """
         self._outputs[:] = self.actions.outputs(actions)
+        if not self._is_on_cpu:
+            self.stepper.outputs.assign(self._outputs)
         self.stepper.step()
-        now = self._fitness.astype(np.float64)  # differences of float32 are exact
+        fitness = self._fitness if self._is_on_cpu else self.stepper.fitness.numpy()
+        now = fitness.astype(np.float64)
         rewards = now - self._before
         self._before = now
         return rewards
@@ -132,12 +142,14 @@ class SteppedTeams:
     @property
     def observations(self) -> Floats:
         """Sensor values [n, R, S] now, a copy."""
-        return self._inputs.copy()
+        return self._inputs.copy() if self._is_on_cpu else self.stepper.inputs.numpy()
 
     @property
     def has_ended(self) -> Mask:
         """Whether the epoch has ended, [n]."""
-        return self._clock >= self.iterations
+        clock = self._clock if self._is_on_cpu else self.stepper.clock.numpy()
+        ended: Mask = clock >= self.iterations
+        return ended
 
     def performance(self, at: Mask | None = None) -> dict[str, Doubles]:
         """Return each measure of performance [n] as if the epochs of some teams ended now."""
