@@ -12,6 +12,7 @@ __all__ = [
     "EnvironmentFailure",
     "UnknownName",
     "UsageError",
+    "in_a_line",
     "placed",
     "shown",
     "unknown_name",
@@ -48,6 +49,11 @@ def shown(value: object, most: int = 60) -> str:
     except (RecursionError, ValueError):  # nested too deeply, or an integer of very many digits
         text = f"a huge {type(value).__name__}"
     return text if len(text) <= most else f"{text[: most - 3]}..."
+
+
+def in_a_line(error: BaseException) -> str:
+    """Return the name and the words of an error of another program, in one line."""
+    return " ".join(f"{type(error).__name__}: {error}".split())
 
 
 def unknown_name(kind: str, name: str, allowed: Iterable[str], where: str = "") -> UnknownName:

@@ -33,8 +33,9 @@ OWN = {  # prefixes of their modules' names
     "world": "conevo_world_",
     "method": "conevo_method_",
     "labels": "conevo_labels_",
+    "others": "conevo_others_",
 }
-Sort = Literal["world", "method", "labels"]
+Sort = Literal["world", "method", "labels", "others"]
 _loading = threading.RLock()
 
 Entry = TypeVar("Entry")

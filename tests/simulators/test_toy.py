@@ -185,7 +185,7 @@ def test_the_command_line_takes_it(tmp_path: Path, capsys: pytest.CaptureFixture
     assert code_of("signal", "toy:line", "--preset", "smoke", "--units", "4", "--trials", "2") == 0
     capsys.readouterr()
     assert code_of("list", "worlds") == 0
-    assert "tasks of other packages: vmas:TASK, toy:TASK" in capsys.readouterr().out
+    assert "vmas:TASK, toy:TASK" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

@@ -58,19 +58,19 @@ class Continuous:
     Args:
         low, high: ends of the axes [R, O]; an axis that a robot lacks is 0 to 0.
         outputs: O names, of the axes.
-        directions: names of the positive and negative direction of the axes that count for labels,
-            which are the first ones; others, such as messages, do not count.
+        directions: names of the positive and the negative direction, if there is one, of the axes
+            that count for labels, which are the first ones; others, such as messages, do not count.
     """
 
     low: Floats
     high: Floats
     outputs: tuple[str, ...]
-    directions: tuple[tuple[str, str], ...]
+    directions: tuple[tuple[str, ...], ...]
 
     @property
     def names(self) -> tuple[str, ...]:
         """The labels of actions."""
-        return ("rest", *(name for pair in self.directions for name in pair))
+        return ("rest", *(name for axis in self.directions for name in axis))
 
     def of(self, outputs: Floats) -> Floats:
         """Return the actions of robots, given their outputs [B, R, O]."""
@@ -93,7 +93,8 @@ class Continuous:
         size = np.abs(share)
         axis = size.argmax(axis=2)[:, :, None]
         largest = np.take_along_axis(share, axis, axis=2)
-        label = np.where(np.abs(largest) < REST, 0, 1 + 2 * axis + (largest < 0))
+        first = np.cumsum([1, *map(len, self.directions)])  # label of each axis
+        label = np.where(np.abs(largest) < REST, 0, first[axis] + (largest < 0))
         return label[:, :, 0].astype(np.int64)
 
 

@@ -15,32 +15,27 @@ robot that spends most of its life with a label belongs to the caste of this nam
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from conevo.errors import UsageError, unknown_name
-from conevo.outside import source_of
+from conevo.errors import UsageError
+from conevo.simulators.functions import OwnFunction, function_in
 
-__all__ = ["OwnLabels", "labels_in"]
+__all__ = ["ACTIONS", "OwnLabels", "labels_in"]
+
+ACTIONS = "actions"  # the labels that a task has itself
 
 
 @dataclass(frozen=True)
-class OwnLabels:
+class OwnLabels(OwnFunction):
     """A user's function that labels actions.
 
     Attributes:
-        address: "FILE.py:FUNCTION".
-        digest: of the file's text and its imports, with the name of the function.
-        function: the function.
         names: of its labels.
     """
 
-    address: str
-    digest: str
-    function: Any
     names: tuple[str, ...]
 
     def of(self, observation: npt.NDArray[Any], action: npt.NDArray[Any]) -> npt.NDArray[np.int64]:
@@ -55,7 +50,7 @@ class OwnLabels:
         """
         b, r = observation.shape[:2]
         flat = observation.reshape(b * r, -1), action.reshape(b * r, *action.shape[2:])
-        found = np.asarray(self.function(*flat))
+        found = np.asarray(self.call(*flat))
         if found.shape != (b * r,) or found.dtype.kind not in "iu":
             raise UsageError(
                 f"{self.address} must return {b * r} whole numbers, one for each robot, not "
@@ -79,20 +74,11 @@ def labels_in(address: str, digest: str = "") -> OwnLabels:
     Raises:
         UsageError: the file cannot be run or has changed, or it has no such function with names.
     """
-    file, _, name = address.rpartition(":")
-    if not file.endswith(".py") or not name:
-        raise unknown_name("labels", address, ["actions"], "(and not FILE.py:FUNCTION)")
-    source = source_of(Path(file), "labels", digest.partition("-")[0])
-    functions = [key for key, one in vars(source.module).items() if hasattr(one, "names")]
-    function = getattr(source.module, name, None)
-    if function is None:
-        raise unknown_name("function", name, functions, f"in {file}")
-    names: Any = getattr(function, "names", None)
-    if not callable(function):
-        raise UsageError(f"{address} must be a function, not {type(function).__name__}")
+    found = function_in(address, "labels", ACTIONS, digest, mark="names")
+    names: Any = getattr(found.function, "names", None)
     if not (isinstance(names, tuple) and names and all(isinstance(one, str) for one in names)):
+        name = address.rpartition(":")[2]
         raise UsageError(
             f"{address} needs the names of its labels: {name}.names = ('near', 'far'), a tuple"
         )
-    whole = f"{source.files[0]}:{name}"
-    return OwnLabels(whole, f"{source.digest}-{name}", function, names)
+    return OwnLabels(found.address, found.digest, found.function, names)

@@ -41,7 +41,9 @@ class Epochs(Protocol):
         """Execute the actions of all robots.
 
         Returns:
-            Robots' next observations [B, R, S], their rewards [B, R], and which epochs end [B].
+            Robots' next observations [B, R, S], their rewards [B, R], and which epochs end [B], or
+            which robots have gone [B, R]: their rewards and actions count no more, and an epoch
+            ends when all of its robots have gone.
         """
 
     def heuristic(self, k: int, observed: Floats) -> npt.NDArray[Any]:
@@ -101,6 +103,15 @@ class TaskSimulator:
         """Packages with versions, task, and a digest of its settings."""
         return self.world.fingerprint
 
+    @property
+    def most(self) -> int:
+        """Epochs side by side, at most."""
+        return MOST
+
+    def epochs(self, n: int) -> Epochs:
+        """Return what plays n epochs side by side."""
+        return self.world.epochs(n)
+
     def is_shared(self, name: str) -> bool:
         """Scenarios have nothing in common."""
         return False
@@ -119,10 +130,11 @@ class TaskSimulator:
         keys = scenarios.seed.reshape(rounds, e)[part].reshape(n * e)
         modes = np.full(teams.shape[:2], -1, np.int32) if heuristic is None else heuristic
         team = np.repeat(np.arange(n), e)
+        most = min(MOST, self.most)
         parts = [
-            self._play(genes, teams[rows], keys[first : first + MOST], modes[rows])
-            for first in range(0, n * e, MOST)
-            for rows in [team[first : first + MOST]]
+            self._play(genes, teams[rows], keys[first : first + most], modes[rows])
+            for first in range(0, n * e, most)
+            for rows in [team[first : first + most]]
         ]
         fitness, counts, switches, steps, reached = (
             np.concatenate([part[k] for part in parts]).reshape(n, e, *parts[0][k].shape[1:])
@@ -169,27 +181,27 @@ class TaskSimulator:
         tally = _Tally.of(b, r, len(world.castes), len(world.facts.measures))
         chosen = _Chosen(world, keys, modes)
         networks = Networks(self.controller, genes, teams, len(actions.outputs))
-        epochs = world.epochs(b)
+        epochs = self.epochs(b)
         observed = epochs.begin(keys)
         before: npt.NDArray[np.int64] | None = None
-        alive = np.ones(b, bool)
+        alive = np.ones((b, r), bool)
         for t in range(world.params.iterations):
             inputs = self._inputs(observed)
             outputs = networks.think(inputs)
             action = chosen.of(t, epochs, observed, actions.of(outputs))
             label = actions.label(action) if own is None else own.of(observed, action)
-            tally.counts += (label[:, :, None] == np.arange(tally.counts.shape[2])) & _wide(
-                alive, 3
-            )
+            label = np.where(alive, label, -1)
+            tally.counts += label[:, :, None] == np.arange(tally.counts.shape[2])
             if before is not None:
-                tally.switches += (label != before) & _wide(alive, 2)
+                tally.switches += (label != before) & alive
             before = label
-            tally.steps += alive
+            is_played = alive.sum(axis=1) > 0
+            tally.steps += is_played
             observed, reward, ended = epochs.step(action)
-            tally.fitness += np.where(_wide(alive, 2), reward, np.float32(0))
+            tally.fitness += np.where(alive, reward, np.float32(0))
             if tally.measured.size:
-                tally.measured += np.where(_wide(alive, 2), epochs.measured(), np.float32(0))
-            alive = alive & ~ended
+                tally.measured += np.where(is_played[:, None], epochs.measured(), np.float32(0))
+            alive = alive & ~_wide(ended, 2)
             if watch is not None:
                 now: Arrays = {
                     "action": label[0].astype(np.int32),

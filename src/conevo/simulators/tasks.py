@@ -20,7 +20,8 @@ from conevo.parameters import parameters
 from conevo.playback.drawn import Drawn
 from conevo.reading import DamagedFile, parse_toml
 from conevo.simulators.actions import Actions
-from conevo.simulators.labels import OwnLabels, labels_in
+from conevo.simulators.functions import keep
+from conevo.simulators.labels import ACTIONS, OwnLabels, labels_in
 from conevo.worlds.entry import WorldEntry
 from conevo.worlds.measures import Measure
 from conevo.worlds.protocol import Scenarios, names_of
@@ -30,8 +31,6 @@ if TYPE_CHECKING:
     from conevo.simulators.playing import Epochs, TaskSimulator
 
 __all__ = ["Options", "TaskEntry", "TaskFacts", "TaskParams", "TaskWorld", "need", "versions"]
-
-ACTIONS = "actions"
 
 
 def _options_text(given: Any) -> Any:
@@ -80,18 +79,7 @@ class TaskParams:
     """digest of a file with labels; a run fills it in and checks it."""
 
     def __post_init__(self) -> None:
-        if self.labels == ACTIONS:
-            if self.labels_digest:
-                raise UsageError(f"world.labels_digest belongs to a file, not to {self.labels!r}")
-            return
-        found = labels_in(self.labels, self.labels_digest)
-        if self.labels_digest not in ("", found.digest):
-            raise UsageError(
-                f"labels {self.labels!r} have changed: the digest is {found.digest}, not "
-                f"{self.labels_digest}"
-            )
-        object.__setattr__(self, "labels", found.address)
-        object.__setattr__(self, "labels_digest", found.digest)
+        keep(self, "labels", ACTIONS, labels_in)
 
     @property
     def keywords(self) -> dict[str, Any]:
@@ -218,8 +206,9 @@ class TaskWorld:
     def fingerprint(self) -> str:
         """Packages with versions, task, and a digest of its settings."""
         values = asdict(self.params)
-        if values["labels_digest"]:
-            values["labels"] = ""  # a file counts by its digest
+        for key in values:
+            if values.get(f"{key}_digest"):
+                values[key] = ""  # a file counts by its digest
         text = json.dumps(values, sort_keys=True)
         digest = hashlib.blake2b(text.encode(), digest_size=6).hexdigest()
         return f"{self.facts.versions}: {self.environment} {digest}"

@@ -5,7 +5,10 @@ from __future__ import annotations
 __all__ = ["FAMILIES", "is_task"]
 
 # The module that makes the entry of each task of a family (conevo.simulators).
-FAMILIES = {"vmas": "conevo.simulators.vmas.world"}
+FAMILIES = {
+    "pettingzoo": "conevo.simulators.pettingzoo.world",
+    "vmas": "conevo.simulators.vmas.world",
+}
 
 
 def is_task(path: str) -> bool:

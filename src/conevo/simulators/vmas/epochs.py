@@ -15,7 +15,7 @@ import torch
 from vmas import make_env
 from vmas.simulator.environment import Environment
 
-from conevo.errors import ConevoError, UsageError, unknown_name
+from conevo.errors import ConevoError, UsageError, in_a_line, unknown_name
 from conevo.reading import parse_toml
 from conevo.simulators.tasks import TaskFacts
 from conevo.simulators.vmas.draws import Draws
@@ -219,8 +219,9 @@ def made(task: str, options: str, n: int, number: int = 0) -> Environment:
     except ConevoError:
         raise
     except Exception as error:
-        words = " ".join(f"{type(error).__name__}: {error}".split())
-        raise UsageError(f"vmas:{task} cannot be made with options {options!r}: {words}") from error
+        raise UsageError(
+            f"vmas:{task} cannot be made with options {options!r}: {in_a_line(error)}"
+        ) from error
     _refuse_unknown(env, task, given)
     _touch_alone(env)
     return env

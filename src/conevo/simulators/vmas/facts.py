@@ -10,7 +10,7 @@ import numpy as np
 import torch
 from vmas.simulator.environment import Environment
 
-from conevo.errors import ConevoError, UsageError
+from conevo.errors import ConevoError, UsageError, in_a_line
 from conevo.rng import stream
 from conevo.simulators.actions import Continuous
 from conevo.simulators.tasks import TaskFacts, versions
@@ -102,8 +102,7 @@ def _tried(env: Environment, keys: list[int], n_inputs: int) -> list[dict[str, t
     except ConevoError:
         raise
     except Exception as error:
-        words = " ".join(f"{type(error).__name__}: {error}".split())
-        raise UsageError(f"a scenario of VMAS cannot be played: {words}") from error
+        raise UsageError(f"a scenario of VMAS cannot be played: {in_a_line(error)}") from error
     if len(keys) > 1 and not _are_same(before, batch.used):
         raise SharedDraw("the task draws numbers that have no address")
     return [
