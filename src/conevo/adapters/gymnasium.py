@@ -19,6 +19,7 @@ import numpy.typing as npt
 from conevo.adapters.extras import lacking
 from conevo.adapters.teams import SteppedTeams, versioned
 from conevo.errors import UsageError, unknown_name
+from conevo.worlds.stepper import MOST_WORLDS, whole
 
 try:
     from gymnasium import spaces
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
 
 __all__ = ["TeamVectorEnv"]
 
+ARGUMENTS = ("num_teams", "per", "actions", "autoreset_mode", "scenarios", "threads")
 PER = ("robot", "team")
 
 
@@ -44,8 +46,8 @@ class TeamVectorEnv(VectorEnv):
     reward is their mean.
 
     Nobody terminates; all are truncated after the last iteration. Then the infos have the measures
-    of ``performance``, each [sub-environments], in ``final_info`` if the autoreset mode is
-    SAME_STEP. There ``final_obs`` is an array of all last observations.
+    of ``performance``, each [num_envs] with a mask, in the form of Gymnasium's own vector
+    environments: in the autoreset mode SAME_STEP they are in ``final_info``, next to ``final_obs``.
 
     Args:
         task: "pursuit/team-3", "pursuit-v2/team-3", or "FILE.py:ENVIRONMENT".
@@ -53,7 +55,7 @@ class TeamVectorEnv(VectorEnv):
         per: "robot" or "team".
         actions: "discrete", "continuous" or "outputs"; see ``conevo.worlds.spaces.ActionMode``.
         autoreset_mode: when a team starts again: SAME_STEP, NEXT_STEP, or DISABLED for
-            ``reset(options={"reset_mask": mask})`` by the caller.
+            ``reset(options={"reset_mask": mask})`` by the caller before the next step.
         scenarios: number of scenarios in the pool, or their keys; ``reset(seed=...)`` draws
             others.
         threads: CPU threads; by default the faster of one and all.
@@ -87,7 +89,13 @@ class TeamVectorEnv(VectorEnv):
             known = [one.value for one in AutoresetMode]
             raise unknown_name("autoreset mode", str(autoreset_mode), known) from None
         self.teams = teams = SteppedTeams(
-            task, num_teams, actions, params, scenarios=scenarios, threads=threads
+            task,
+            whole(num_teams, "num_teams", MOST_WORLDS),
+            actions,
+            params,
+            scenarios=scenarios,
+            threads=threads,
+            arguments=ARGUMENTS,
         )
         self._n, self._r = num_teams, len(teams.agents)
         self._robots = 1 if per == "robot" else self._r  # of a sub-environment
@@ -103,7 +111,8 @@ class TeamVectorEnv(VectorEnv):
         self.single_action_space = self._actions_of_one()
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
-        self._must_start = np.zeros(self._n, bool)
+        self._has_ended = np.zeros(self._n, bool)  # and not been reset
+        self._is_begun = False
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -120,12 +129,17 @@ class TeamVectorEnv(VectorEnv):
             UsageError: a seed, an option or a mask that does not fit.
         """
         given = options or {}
-        if unknown := given.keys() - {"reset_mask"}:
-            name = sorted(map(str, unknown))[0]
-            raise UsageError(f"options of reset are 'reset_mask', not {name!r}")
+        for name in given.keys() - {"reset_mask"}:
+            raise unknown_name("option", str(name), ["reset_mask"], "of reset")
         at = self._of_teams(given["reset_mask"]) if "reset_mask" in given else None
+        if at is not None and (seed is not None or not self._is_begun):
+            raise UsageError("a seed, and the first reset, are for all teams: leave out reset_mask")
+        if seed is not None:
+            seed = whole(seed, "seed", 2**64 - 1, 0)
         self.teams.reset(at, seed)
-        self._must_start[slice(None) if at is None else at] = False
+        super().reset(seed=seed)
+        self._is_begun = True
+        self._has_ended[slice(None) if at is None else at] = False
         return self._observed(), {}
 
     def step(
@@ -145,32 +159,23 @@ class TeamVectorEnv(VectorEnv):
         Raises:
             UsageError: actions that do not exist or do not fit.
         """
-        teams, begun = self.teams, self._must_start
-        chosen = np.asarray(actions)
-        size = () if teams.actions.mode == "discrete" else (len(teams.world.outputs),)
-        try:
-            chosen = chosen.reshape(self._n, self._r, *size)
-        except ValueError:
-            wanted = list(self.action_space.shape)
-            raise UsageError(f"actions must be {wanted}, not {list(chosen.shape)}") from None
-        rewards = teams.step(chosen)
-        if self._autoreset == AutoresetMode.NEXT_STEP and begun.any():
-            teams.reset(begun)  # their actions are not used
-            rewards[begun] = 0.0
-        ended = teams.has_ended
+        teams, before = self.teams, self._has_ended
+        if self._autoreset == AutoresetMode.DISABLED and before.any():
+            raise UsageError(
+                f"{before.sum()} of {self._n} teams have ended: reset them before the next step, "
+                f"with options={{'reset_mask': truncations}}"
+            )
+        rewards = teams.step(self._by_team(actions))
+        if self._autoreset == AutoresetMode.NEXT_STEP and before.any():
+            teams.reset(before)  # this step had no effect on them
+        ended = self._has_ended = teams.has_ended
         infos: dict[str, Any] = {}
         if ended.any():
             infos = self._reached(ended)
             if self._autoreset == AutoresetMode.SAME_STEP:
-                mask = self._of_all(ended)
-                infos = {
-                    "final_obs": self._observed(),
-                    "_final_obs": mask,
-                    "final_info": infos,
-                    "_final_info": mask,
-                }
+                infos = self._final(ended, infos)
                 teams.reset(ended)
-        self._must_start = ended
+                self._has_ended = np.zeros_like(ended)
         reward = rewards.reshape(self.num_envs, self._robots).mean(axis=1)
         terminated = np.zeros(self.num_envs, bool)
         return self._observed(), reward, terminated, self._of_all(ended), infos
@@ -183,6 +188,15 @@ class TeamVectorEnv(VectorEnv):
             return spaces.Box(low, high, dtype=np.float32)
         n = len(mode.names)
         return spaces.Discrete(n) if self._robots == 1 else spaces.MultiDiscrete([n] * self._robots)
+
+    def _by_team(self, actions: Any) -> npt.NDArray[Any]:
+        """Return actions [n, R, ...] of those [num_envs, ...]."""
+        chosen, teams = np.asarray(actions), self.teams
+        wanted = self.action_space.shape
+        if chosen.shape != wanted:
+            raise UsageError(f"actions must be {list(wanted)}, not {list(chosen.shape)}")
+        size = () if teams.actions.mode == "discrete" else (len(teams.world.outputs),)
+        return chosen.reshape(self._n, self._r, *size)
 
     def _observed(self) -> npt.NDArray[np.float32]:
         return self.teams.observations.reshape(self.num_envs, -1)
@@ -211,3 +225,11 @@ class TeamVectorEnv(VectorEnv):
         for name, values in self.teams.performance(ended).items():
             found[name], found[f"_{name}"] = self._of_all(np.where(ended, values, 0.0)), mask
         return {"performance": found, "_performance": mask}
+
+    def _final(self, ended: npt.NDArray[np.bool_], infos: dict[str, Any]) -> dict[str, Any]:
+        """Return the infos of sub-environments that are reset in the same step."""
+        mask, seen = self._of_all(ended), np.full(self.num_envs, None, dtype=object)
+        observed = self._observed()
+        for k in np.flatnonzero(mask).tolist():
+            seen[k] = observed[k]
+        return {"final_obs": seen, "_final_obs": mask, "final_info": infos, "_final_info": mask}

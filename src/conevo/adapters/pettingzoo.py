@@ -10,15 +10,19 @@
 
 from __future__ import annotations
 
+from difflib import get_close_matches
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from conevo.adapters.extras import lacking
+from conevo.adapters.picture import Camera
 from conevo.adapters.teams import SteppedTeams, fresh_seed, length_in, versioned
-from conevo.errors import UsageError
+from conevo.errors import UsageError, unknown_name
+from conevo.playback.look import SPEED
 from conevo.rng import fold
+from conevo.worlds.stepper import whole
 
 try:
     from gymnasium import logger, spaces
@@ -36,6 +40,9 @@ __all__ = ["TeamEnv", "env", "parallel_env"]
 Observations = dict[str, npt.NDArray[np.float32]]
 Infos = dict[str, dict[str, Any]]
 
+ARGUMENTS = ("actions", "max_cycles", "render_mode")
+RENDER_MODES = ("rgb_array",)
+
 
 class TeamEnv(ParallelEnv, EzPickle):
     """One team, all of whose robots act at once.
@@ -47,12 +54,14 @@ class TeamEnv(ParallelEnv, EzPickle):
     - ``reset(seed=s)`` plays the first scenario of a run with this seed, and each ``reset()`` the
       next one. ``reset(options={"key": k})`` plays the scenario of a key. Without any seed it is
       drawn by the system.
+    - A copy, also a pickled one, is a new environment with the same arguments.
 
     Args:
         task: "pursuit/team-3", "pursuit-v2/team-3", or "FILE.py:ENVIRONMENT".
         actions: "discrete", "continuous" or "outputs"; see ``conevo.worlds.spaces.ActionMode``.
         max_cycles: length of an epoch; the same as ``iterations``.
-        render_mode: None or "rgb_array".
+        render_mode: "rgb_array" if ``render()`` is to return pictures. Every step keeps a copy of
+            the team's state for them.
         params: parameters of the world.
 
     Attributes:
@@ -75,16 +84,24 @@ class TeamEnv(ParallelEnv, EzPickle):
         EzPickle.__init__(
             self, task, actions=actions, max_cycles=max_cycles, render_mode=render_mode, **params
         )
+        if render_mode not in (None, *RENDER_MODES):
+            raise unknown_name("render mode", str(render_mode), RENDER_MODES)
         whole = length_in(params, max_cycles)
-        self.teams = teams = SteppedTeams(task, 1, actions, whole, scenarios=1, threads=1)
+        self.teams = teams = SteppedTeams(
+            task, 1, actions, whole, scenarios=1, threads=1, arguments=ARGUMENTS
+        )
         self.metadata = {
             "name": versioned(teams.world),
-            "render_modes": [],
+            "render_modes": [*RENDER_MODES],
+            "render_fps": SPEED,
             "is_parallelizable": True,
         }
         self.render_mode = render_mode
+        self._camera = Camera(teams) if render_mode else None
         self.possible_agents = teams.agents
+        self._team = frozenset(teams.agents)
         self.agents: list[str] = []
+        self._is_begun = False
         self.action_names = teams.actions.names
         self.observation_spaces = {
             agent: spaces.Box(teams.low, teams.high, dtype=np.float32) for agent in teams.agents
@@ -115,19 +132,18 @@ class TeamEnv(ParallelEnv, EzPickle):
             UsageError: a seed, an option or a key that is not allowed.
         """
         given = options or {}
-        if unknown := given.keys() - {"key"}:
-            raise UsageError(f"options of reset are 'key', not {sorted(map(str, unknown))[0]!r}")
+        for name in given.keys() - {"key"}:  # wrappers may pass options of their own
+            if get_close_matches(str(name), ["key"]):
+                raise unknown_name("option", str(name), ["key"], "of reset")
         if seed is not None:
-            if not 0 <= seed < 2**64:
-                raise UsageError(f"seed = {seed!r}: must be from 0 to 2**64 - 1")
-            self._seed, self._epoch = int(seed), 0
+            self._seed, self._epoch = whole(seed, "seed", 2**64 - 1, 0), 0
         if "key" in given:
             self.teams.play(given["key"])
         else:
             self.teams.play(fold(self._seed, "epoch", 0, self._epoch))
             self._epoch += 1
-        self.agents = list(self.possible_agents)
-        return self._observed(), {agent: {} for agent in self.agents}
+        self.agents, self._is_begun = list(self.possible_agents), True
+        return self._seen(), {agent: {} for agent in self.agents}
 
     def step(
         self, actions: dict[str, Any]
@@ -139,19 +155,20 @@ class TeamEnv(ParallelEnv, EzPickle):
             the epoch has ended.
 
         Raises:
-            UsageError: an agent without an action, or an action that does not exist.
+            UsageError: before the first reset; an agent without an action, an action of an agent
+                that is not in the team, or one that does not exist.
         """
         agents, teams = self.agents, self.teams
         if not agents:
+            if not self._is_begun:
+                raise UsageError("reset the environment before the first step")
             return {}, {}, {}, {}, {}
-        try:
-            chosen = np.array([[actions[agent] for agent in agents]])
-        except KeyError as error:
-            raise UsageError(f"agent {error} has no action: all robots act at once") from error
-        rewards = teams.step(chosen)[0].tolist()
-        has_ended = bool(teams.has_ended[0])
+        if actions.keys() != self._team:
+            raise self._refusal(actions)
+        rewards = teams.step(np.array([[actions[agent] for agent in agents]]))[0].tolist()
+        has_ended = bool(teams.clock[0] >= teams.iterations)
+        seen = self._seen()
         infos: Infos = {agent: {} for agent in agents}
-        seen = self._observed()
         if has_ended:
             reached = {name: float(values[0]) for name, values in teams.performance().items()}
             infos = {agent: {"performance": dict(reached)} for agent in agents}
@@ -169,15 +186,36 @@ class TeamEnv(ParallelEnv, EzPickle):
         return self.teams.observations.ravel()
 
     def render(self) -> npt.NDArray[np.uint8] | None:
-        """Return None: nothing is drawn without a render mode."""
-        logger.warn("render() without a render mode: make the environment with render_mode=...")
-        return None
+        """Return a picture [height, width, 3] of the world now; None without a render mode.
+
+        Robots have the colours of their actions, as in a film.
+
+        Raises:
+            UsageError: before the first reset; a world that cannot be drawn.
+        """
+        if self._camera is None:
+            logger.warn("nothing is drawn: make the environment with render_mode='rgb_array'")
+            return None
+        if not self._is_begun:
+            raise UsageError("reset the environment before it is drawn")
+        return self._camera.picture()
 
     def close(self) -> None:
         """Do nothing: no window is open."""
 
-    def _observed(self) -> Observations:
+    def _seen(self) -> Observations:
+        """Return the observations of now."""
+        if self._camera is not None:
+            self._camera.look()
         return dict(zip(self.agents, self.teams.observations[0], strict=True))
+
+    def _refusal(self, actions: dict[str, Any]) -> UsageError:
+        """Return the error for actions that are not those of all agents."""
+        for agent in actions:
+            if agent not in self.agents:
+                return unknown_name("agent", str(agent), self.agents)
+        lacking = next(agent for agent in self.agents if agent not in actions)
+        return UsageError(f"agent {lacking!r} has no action: all robots act at once")
 
 
 def action_space(teams: SteppedTeams) -> spaces.Space[Any]:

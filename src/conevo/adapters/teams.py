@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import re
 import secrets
+from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from conevo.errors import UsageError
+from conevo.errors import UsageError, shown, unknown_name
 from conevo.worlds.families import is_task
 from conevo.worlds.measures import measures_of
-from conevo.worlds.registry import WORLDS, world
+from conevo.worlds.registry import WORLDS, resolve, world
 from conevo.worlds.spaces import ActionMode, Mode, group_of, input_bounds_of
 from conevo.worlds.stepper import Stepper
 
@@ -42,6 +43,8 @@ class SteppedTeams:
         scenarios: number of scenarios in the pool, or their keys.
         threads: CPU threads; by default the faster of one and all.
         device: as for ``Stepper``.
+        arguments: names that the caller takes in addition to parameters, for the error that names
+            the nearest right one.
 
     Attributes:
         world: the world.
@@ -67,13 +70,9 @@ class SteppedTeams:
         scenarios: int | Sequence[int],
         threads: int | None = None,
         device: str = "cpu",
+        arguments: Sequence[str] = (),
     ) -> None:
-        if is_task(task):
-            raise UsageError(
-                f"{task} is a task of another package: use its environment there. Worlds of conevo "
-                f"are {', '.join(entry.short_name for entry in WORLDS.values())}, or FILE.py"
-            )
-        self.world = world(task, **params)
+        self.world = _world(task, params, arguments)
         self.actions = ActionMode(self.world, actions)
         self.stepper = Stepper(self.world, n, scenarios, n_threads=threads, device=device)
         group, r = group_of(self.world), self.world.n_robots
@@ -101,7 +100,7 @@ class SteppedTeams:
         Raises:
             UsageError: a mask or a seed that does not fit.
         """
-        if seed is None and not self._is_seeded:
+        if seed is None and at is None and not self._is_seeded:
             seed = fresh_seed()
         self.stepper.reset(at, seed=seed)
         self._is_seeded = True
@@ -145,17 +144,44 @@ class SteppedTeams:
         return self._inputs.copy() if self._is_on_cpu else self.stepper.inputs.numpy()
 
     @property
+    def clock(self) -> npt.NDArray[np.int32]:
+        """Iterations played [n], not to be changed."""
+        return self._clock if self._is_on_cpu else self.stepper.clock.numpy()
+
+    @property
     def has_ended(self) -> Mask:
         """Whether the epoch has ended, [n]."""
-        clock = self._clock if self._is_on_cpu else self.stepper.clock.numpy()
-        ended: Mask = clock >= self.iterations
-        return ended
+        return self.clock >= self.iterations
 
     def performance(self, at: Mask | None = None) -> dict[str, Doubles]:
         """Return each measure of performance [n] as if the epochs of some teams ended now."""
         self.stepper.finish(at)
         values = self.stepper.performance.numpy().astype(np.float64)
         return dict(zip(self.measures, values.T, strict=True))
+
+
+def _world(task: str, params: dict[str, Any], arguments: Sequence[str]) -> World:
+    """Return the world of a task.
+
+    Raises:
+        UsageError: as for ``SteppedTeams``.
+    """
+    if not isinstance(task, str):
+        raise UsageError(f"task = {shown(task)}: must be a name, as in 'pursuit/team-3'")
+    if is_task(task):
+        raise UsageError(
+            f"{task} is a task of another package: use its environment there. Worlds of conevo "
+            f"are {', '.join(entry.short_name for entry in WORLDS.values())}, or FILE.py"
+        )
+    entry, _ = resolve(task)
+    known = [field.name for field in fields(entry.params_class)]
+    for name in params:
+        if name not in known:
+            raise unknown_name("argument", name, [*arguments, *known], f"for {task}")
+    made = world(task, **params)
+    if not hasattr(made, "simulation"):
+        raise UsageError(f"{task} has a simulator of its own, which cannot be stepped from outside")
+    return made
 
 
 def fresh_seed() -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import asdict
 from typing import Any
 
@@ -12,10 +13,10 @@ from conevo.errors import UsageError
 from conevo.playback.drawn import Drawn
 from conevo.playback.quantized import Channel
 from conevo.worlds.measures import Measure, measures_of
-from conevo.worlds.protocol import Outcome, Simulator, World
+from conevo.worlds.protocol import Outcome, Scenarios, Simulator, World
 from conevo.worlds.registry import inherited
 
-__all__ = ["params_of", "recorded"]
+__all__ = ["facts_of", "params_of", "recorded", "scene_of"]
 
 
 def recorded(
@@ -57,30 +58,52 @@ def recorded(
     channels["sensors"] = Channel.of(inputs)
     channels["hidden"] = Channel.of(hidden * has_network[:, None], bits=8)
     channels["outputs"] = Channel.of(_sigmoid(outputs) * has_network[:, None], bits=8)
-    for name in vars(scenes):
-        if name not in scenes.unseen:
-            is_shared = simulator.is_shared(name)
-            values = getattr(scenes, name)
-            channels[f"scene/{name}"] = Channel.of(values if is_shared else values[0])
+    channels |= scene_of(scenes, simulator.is_shared)
     names = ("", *world.heuristics)
-    about = {
+    about = facts_of(world) | {
         "kernel_hash": simulator.fingerprint,
-        "world": world.name,
-        "environment": world.environment,
-        "task": f"{world.name}/{world.environment}",
         "scenario": scenario,
         "iterations": world.params.iterations,
-        "n_robots": world.n_robots,
-        "params": params_of(world),
         "controller": _controller(simulator.controller),
-        "inputs": list(world.inputs),
-        "outputs": list(world.outputs),
-        "actions": list(world.actions),
-        "castes": list(world.castes),
         "fitness": [float(value) for value in outcome.fitness[0, 0]],
         "heuristic": [names[mode + 1] for mode in modes],
         "neurons": [np.flatnonzero(slots >= 0).tolist() for slots in team],
         "performance": {name: float(v[0, 0]) for name, v in outcome.performance.items()},
+    }
+    return about, channels, outcome
+
+
+def scene_of(scenes: Scenarios, is_shared: Callable[[str], bool]) -> dict[str, Channel]:
+    """Return the channels of the first of some scenarios.
+
+    Args:
+        scenes: the scenarios.
+        is_shared: whether they all have an array in common, by its name.
+    """
+    seen = (name for name in vars(scenes) if name not in scenes.unseen)
+    values = {name: getattr(scenes, name) for name in seen}
+    return {
+        f"scene/{name}": Channel.of(array if is_shared(name) else array[0])
+        for name, array in values.items()
+    }
+
+
+def facts_of(world: World) -> dict[str, Any]:
+    """Return the facts about a world, the same in all of its epochs.
+
+    Raises:
+        UsageError: a ``drawn`` that is not a ``Drawn``.
+    """
+    about: dict[str, Any] = {
+        "world": world.name,
+        "environment": world.environment,
+        "task": f"{world.name}/{world.environment}",
+        "n_robots": world.n_robots,
+        "params": params_of(world),
+        "inputs": list(world.inputs),
+        "outputs": list(world.outputs),
+        "actions": list(world.actions),
+        "castes": list(world.castes),
         "units": {one.name: _worth(one) for one in measures_of(world)},
     }
     if like := inherited(type(world)):
@@ -90,7 +113,7 @@ def recorded(
         if not isinstance(drawn, Drawn):
             raise UsageError(f"world {world.name}: drawn must be a Drawn, not {drawn!r:.60}")
         about["drawn"] = drawn.plain
-    return about, channels, outcome
+    return about
 
 
 def params_of(world: World) -> dict[str, Any]:

@@ -193,8 +193,13 @@ class ActionMode:
         n = len(self.names)
         if given.dtype.kind not in "iu":
             raise UsageError(f"an action must be an integer from 0 to {n - 1}, not {given.dtype}")
-        if given.size and (given.min() < 0 or given.max() >= n):
+        try:
+            if given.size and given.min() < 0:
+                raise IndexError
+            found: Floats = self.table.take(given, axis=0)
+        except IndexError:
             bad = given[(given < 0) | (given >= n)].flat[0]
-            raise UsageError(f"action {bad}: must be from 0 to {n - 1} ({', '.join(self.names)})")
-        found: Floats = self.table[given]
+            raise UsageError(
+                f"action {bad}: must be from 0 to {n - 1} ({', '.join(self.names)})"
+            ) from None
         return found

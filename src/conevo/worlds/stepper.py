@@ -22,7 +22,7 @@ from conevo.worlds.on_device import WorldOnDevice
 from conevo.worlds.protocol import World
 from conevo.worlds.step_kernel import FINISH, RESET, StepJob, step_kernel
 
-__all__ = ["Stepper"]
+__all__ = ["MOST_WORLDS", "Stepper", "whole"]
 
 POOL = 256  # scenarios
 MOST_WORLDS = 2**20
@@ -62,6 +62,8 @@ class Stepper(WorldOnDevice):
         clock: [n] int32, iterations played.
         scenario: [n] int32, index of the world's scenario in the pool.
         keys: of the pool's scenarios.
+        recorded: names of the arrays that ``Rollout.record`` keeps of each iteration.
+        recorded_at_end: names of those that it keeps at the end.
 
     Raises:
         UsageError: the world does not meet the engine's requirements; the device's name, a key or a
@@ -80,7 +82,9 @@ class Stepper(WorldOnDevice):
         lanes: int | None = None,
     ) -> None:
         super().__init__(world, n_threads, device, lanes)
-        self.n = _whole(n, "n", MOST_WORLDS)
+        self.n = whole(n, "n", MOST_WORLDS)
+        self.recorded = self._simulation.recorded
+        self.recorded_at_end = self._simulation.recorded_at_end
         with engine.building:
             kernel = step_kernel(self._simulation)
         engine.build(kernel, self.device, self.lanes)
@@ -113,13 +117,13 @@ class Stepper(WorldOnDevice):
             UsageError: a number or a key is not allowed.
         """
         scenarios = self._scenarios if scenarios is None else scenarios
-        seed = _whole(seed, "seed", 2**64 - 1, 0)
+        seed = whole(seed, "seed", 2**64 - 1, 0)
         if isinstance(scenarios, Sequence | np.ndarray):
-            keys = tuple(_whole(key, "a scenario's key", 2**64 - 1, 0) for key in scenarios)
+            keys = tuple(whole(key, "a scenario's key", 2**64 - 1, 0) for key in scenarios)
         else:
-            n_scenarios = _whole(scenarios, "scenarios", MOST_SCENARIOS)
+            n_scenarios = whole(scenarios, "scenarios", MOST_SCENARIOS)
             keys = tuple(fold(seed, "epoch", 0, k) for k in range(n_scenarios))
-        _whole(len(keys), "the number of scenarios", MOST_SCENARIOS)
+        whole(len(keys), "the number of scenarios", MOST_SCENARIOS)
         drawn = self.world.scenarios(keys)
         self._refuse_faulty(drawn)
         self._scenarios, self.keys = scenarios, keys
@@ -247,8 +251,12 @@ class Stepper(WorldOnDevice):
         return np.broadcast_to(given, self.n).astype(np.int32)
 
 
-def _whole(given: Any, what: str, most: int, least: int = 1) -> int:
-    """Return a whole number between two others, both allowed."""
+def whole(given: Any, what: str, most: int, least: int = 1) -> int:
+    """Return a whole number between two others, both allowed.
+
+    Raises:
+        UsageError: it is another number, or none.
+    """
     is_whole = isinstance(given, int | np.integer) and not isinstance(given, bool)
     if not is_whole or not least <= given <= most:
         raise UsageError(f"{what} = {given!r}: must be an integer from {least} to {most}")

@@ -29,9 +29,17 @@ class Scene:
         playback: to be painted.
         size: width and height of the picture in px, in the proportion of the playback's bounds.
         colour_by: "action" or "caste".
+        before: a scene of an earlier part of the same epoch, in the same size; its floor and its
+            still things are not painted again.
     """
 
-    def __init__(self, playback: Playback, size: tuple[int, int], colour_by: str) -> None:
+    def __init__(
+        self,
+        playback: Playback,
+        size: tuple[int, int],
+        colour_by: str,
+        before: Scene | None = None,
+    ) -> None:
         self.playback, self._size, self._colour_by = playback, size, colour_by
         x0, y0, x1, y1 = playback.bounds
         self._scale = max(size) / max(x1 - x0, y1 - y0)
@@ -47,9 +55,10 @@ class Scene:
             for one in playback.things
         ]
         self._still = next((group for group in self._groups if group.is_still), None)
-        self._floor = self._painted_floor()
-        self._ground = self._floor.copy()
-        self._phase: npt.NDArray[np.int64] | None = None  # of the still things on the ground
+        self._floor: Image.Image = before._floor if before else self._painted_floor()
+        self._ground: Image.Image = (before._ground if before else self._floor).copy()
+        # Of the still things on the ground.
+        self._phase: npt.NDArray[np.int64] | None = before._phase if before else None
 
     def at(self, t: int) -> Image.Image:
         """Return the world after iteration t."""
