@@ -217,7 +217,7 @@ def test_actions_are_those_of_the_world() -> None:
         ({"actions": "discreet"}, "mode of actions 'discreet'; did you mean 'discrete'"),
         ({"scenarios": 0}, "scenarios = 0: must be an integer from 1"),
         ({"device": "abacus"}, "abacus"),
-        ({"pray": "heuristic"}, "'world.pray'; did you mean 'world.prey'"),
+        ({"pray": "heuristic"}, "unknown argument 'pray' for .* did you mean 'prey'"),
         ({"seed": -1}, "seed = -1: must be from 0"),
     ],
 )
