@@ -1,4 +1,4 @@
-"""Team-steps per second of tasks of other packages, with networks, on one thread.
+"""Team-steps per second of tasks of other packages, with networks, on one thread by default.
 
 A team-step is one iteration of one epoch with all its robots. Teams have random genotypes, every
 robot different. Epochs that have ended are still simulated until all have, but do not count. The
@@ -10,6 +10,7 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Callable
+from importlib.util import find_spec
 
 import numpy as np
 
@@ -24,12 +25,13 @@ from machine import alternate, machine, spread, table
 SEED = 2009
 TASKS = ("vmas:dispersion", "vmas:balance", "vmas:discovery")
 ITERATIONS = 50
+PACKAGES = ("vmas", "torch", "pettingzoo", "mpe2")  # those that are installed are named
 
 
-def workload(task: str, n: int, iterations: int) -> Callable[[], tuple[float, float]]:
+def workload(task: str, n: int, iterations: int, threads: int) -> Callable[[], tuple[float, float]]:
     """Return a function that plays ``n`` teams: team-steps/s, and the share of controllers."""
     world = build_world(task, iterations=iterations)
-    made = simulator(world, controller(world=world), 1)
+    made = simulator(world, controller(world=world), threads)
     genes, teams = random_teams(world, n)
     scenarios = world.scenarios([fold(SEED, "epoch", 0, 0)])
 
@@ -56,9 +58,9 @@ def workload(task: str, n: int, iterations: int) -> Callable[[], tuple[float, fl
     return measure
 
 
-def thinking(n: int, kind: type) -> Callable[[], float]:
-    """Return a function that lets n robots of dispersion think: milliseconds."""
-    world = build_world(TASKS[0])
+def thinking(task: str, n: int, kind: type) -> Callable[[], float]:
+    """Return a function that lets n robots of a task think: milliseconds."""
+    world = build_world(task)
     genes, teams = random_teams(world, n)
     n_outputs, rows = len(world.outputs), teams[:, 0]
     blocks = [
@@ -83,12 +85,13 @@ def main() -> None:
     parser.add_argument("--task", nargs="+", default=TASKS)
     parser.add_argument("--teams", type=int, nargs="+", default=[64, 512, 4096])
     parser.add_argument("--iterations", type=int, default=ITERATIONS)
+    parser.add_argument("--threads", type=int, default=1)
     parser.add_argument("--repeats", type=int, default=3)
     options = parser.parse_args()
 
-    print(machine("conevo", "numpy", "vmas", "torch"))
+    print(machine("conevo", "numpy", *filter(find_spec, PACKAGES)))
     work = {
-        (task, n): workload(task, n, options.iterations)
+        (task, n): workload(task, n, options.iterations, options.threads)
         for task in options.task
         for n in options.teams
     }
@@ -97,11 +100,16 @@ def main() -> None:
         speeds, shares = zip(*found, strict=True)
         rows.append([task, n, *spread(speeds, digits=1), f"{100 * np.median(shares):.0f} %"])
     head = ["task", "teams", "thousand team-steps/s", "lowest - highest", "controllers"]
-    print(f"\n{options.iterations} iterations, {options.repeats} repeats in turns; medians\n")
+    print(
+        f"\n{options.iterations} iterations, {options.threads} threads, "
+        f"{options.repeats} repeats in turns; medians\n"
+    )
     print(table(head, rows))
 
     kinds = {"one after another": networks._Elman, "forward": networks._Any}
-    times = alternate({name: thinking(4096, kind) for name, kind in kinds.items()}, 21)
+    times = alternate(
+        {name: thinking(options.task[0], 4096, kind) for name, kind in kinds.items()}, 21
+    )
     print("\n4096 robots think once, 21 repeats in turns\n")
     print(
         table(

@@ -36,6 +36,14 @@ def test_a_label_is_the_axis_with_the_largest_share_of_its_range() -> None:
     assert FORCES.names[int(of_small[0, 1])] == "left"
 
 
+def test_an_axis_without_a_negative_direction_has_one_label() -> None:
+    ends = np.array([[0, -1, 0]], np.float32), np.array([[1, 1, 2]], np.float32)
+    pushes = Continuous(*ends, ("a", "b", "c"), (("a",), ("b up", "b down"), ("c",)))
+    actions = np.array([[(0, 0, 0)], [(1, 0.5, 0)], [(0, -1, 0)], [(0.5, 0, 2)]], np.float32)
+    found = [pushes.names[label] for label in pushes.label(actions)[:, 0]]
+    assert found == ["rest", "a", "b down", "c"]
+
+
 def test_a_discrete_action_is_the_highest_output_that_the_robot_has() -> None:
     moves = Discrete(("stay", "left", "right"), np.array([3, 2]))
     outputs = np.array([[[0, 1, 2], [0, 0, 9]]], np.float32)

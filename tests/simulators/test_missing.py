@@ -13,6 +13,7 @@ from conevo.cli.main import main
 from conevo.errors import UsageError
 from conevo.simulators import tasks
 from conevo.simulators.vmas import world as family
+from conevo.worlds.registry import resolve
 from extras import need
 from simulators import toy
 
@@ -53,6 +54,19 @@ def test_the_extra_is_named(
         assert f"vmas:balance needs the package {package}, which is not installed" in error
         assert "pip install 'conevo[vmas]'" in error
     assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize(
+    ("task", "package", "extra"),
+    [("mpe2.simple_tag_v3", "mpe2", "mpe2"), ("of_my_own", "pettingzoo", "pettingzoo")],
+)
+def test_the_extra_of_pettingzoo_or_of_its_tasks_is_named(
+    task: str, package: str, extra: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tasks, "find_spec", lambda name: None)
+    words = rf"pettingzoo:{task} needs the package {package}, .*'conevo\[{extra}\]'"
+    with pytest.raises(UsageError, match=words):
+        resolve(f"pettingzoo:{task}")
 
 
 @pytest.mark.parametrize(

@@ -159,6 +159,15 @@ def test_a_robot_that_leaves_acts_no_more() -> None:
     assert (seen["inputs"][5:, 0, :4] == 0).all()
 
 
+def test_agents_may_act_one_after_another_in_each_cycle() -> None:
+    found = []
+    for task in (ZOO, f"{ZOO}_in_cycles"):
+        options = "leaves = 4"
+        a_world, made, genes, teams, _ = played(task, 3, iterations=20, options=options, team="w")
+        found.append(bits(made.evaluate(genes, teams, a_world.scenarios(keys(2)))))
+    assert found[0] == found[1]
+
+
 @pytest.mark.parametrize("noise", ["process", "clock", "earlier"])
 def test_a_task_that_does_not_do_the_same_again_is_refused(noise: str) -> None:
     with pytest.raises(UsageError, match=r"reset\(seed=1\) it does not do the same again"):

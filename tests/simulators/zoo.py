@@ -22,7 +22,7 @@ class raw_env(ParallelEnv):
             conevo plays before a run.
     """
 
-    metadata: dict[str, Any] = {"name": "zoo"}  # noqa: RUF012
+    metadata: dict[str, Any] = {"name": "zoo", "is_parallelizable": True}  # noqa: RUF012
 
     def __init__(self, noise: str = "own", leaves: int = -1, crash: str = "") -> None:
         self.noise, self.leaves, self.crash = noise, leaves, crash

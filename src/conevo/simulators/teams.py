@@ -3,7 +3,7 @@
 The others act at random, or by a function in a file::
 
     def flee(agent, observation, uniforms):
-        return np.where(observation[:, 2] > 0, 1, 2)
+        return np.where(observation[:, 8] > 0, 1, 2)
 
 It gets the name of an agent, its observations [K, S] in K epochs, and random numbers in [0, 1)
 [K, A], and returns its actions: [K] by number, or [K, A] of A axes. Each of them must depend on its

@@ -71,23 +71,21 @@ def entry(task: str) -> TaskEntry:
         UsageError: a package is not installed, or has no such task.
     """
     full = f"{FAMILY}:{task}"
-    need(full, FAMILY, "pettingzoo")
     package = task.partition(".")[0]
-    if package in EXTRAS:
-        need(full, EXTRAS[package], package)
+    own = [package] if package in EXTRAS else []
+    need(full, EXTRAS.get(package, FAMILY), *own, FAMILY)
     if not _is_module(task):
         known = [name for one in EXTRAS for name in _tasks_of(one)]
         lacking = [one for one in EXTRAS if find_spec(one) is None]
         where = f"(of {', '.join(lacking)}, which is not installed, none is known)"
         raise unknown_name("task", task, known, where if lacking else "of PettingZoo")
-    own = {"iterations": 25} if package == "mpe2" else {}
     return TaskEntry(
         name=FAMILY,
         title=f"PettingZoo {task}",
         summary=f"task {task} with PettingZoo's interface",
         source="Terry et al. 2021",
         environments=(task,),
-        defaults={task: DEFAULTS.get(task, own)},
+        defaults={task: DEFAULTS.get(task, CYCLES if package == "mpe2" else {})},
         params_name="TeamParams",
         world_name="PettingZooWorld",
         module=__name__,
