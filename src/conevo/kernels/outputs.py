@@ -56,10 +56,10 @@ def sigmoid(a: float) -> float:
 
 
 def sigmoid_of(a: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
-    """Return ``sigmoid`` of every element, bit for bit."""
+    """Return ``sigmoid`` of every element, bit for bit. It takes arrays of jax, too."""
     f: Any = np.float32
     half = f(0.5)
-    h = np.clip(a * half, -f(LIMIT), f(LIMIT))
+    h = (a * half).clip(-f(LIMIT), f(LIMIT))
     q = h * h
     p = f(P11) + q * f(P13)
     for c in (P9, P7, P5, P3, P1):

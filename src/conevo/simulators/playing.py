@@ -17,7 +17,7 @@ from conevo.worlds.protocol import Outcome, Scenarios
 if TYPE_CHECKING:
     from conevo.simulators.tasks import TaskWorld
 
-__all__ = ["Epochs", "TaskSimulator"]
+__all__ = ["Chosen", "Epochs", "Minds", "TaskSimulator"]
 
 Floats = npt.NDArray[np.float32]
 Ints = npt.NDArray[np.int32]
@@ -54,6 +54,17 @@ class Epochs(Protocol):
 
     def places(self) -> Arrays:
         """Return positions in the first epoch: "x" and "y" [R], and arrays that are drawn."""
+
+
+class Minds(Protocol):
+    """The controllers of B teams of R robots; see ``networks.Networks``."""
+
+    def think(self, inputs: Floats) -> Floats:
+        """Return the outputs [B, R, O] of all robots, given their inputs [B, R, S]."""
+
+    @property
+    def hidden(self) -> Floats:
+        """The activation of each part [B, R, U], 0 in empty slots."""
 
 
 @dataclass
@@ -111,6 +122,23 @@ class TaskSimulator:
     def epochs(self, n: int) -> Epochs:
         """Return what plays n epochs side by side."""
         return self.world.epochs(n)
+
+    def players(
+        self, genes: Floats, teams: Ints, keys: Keys, modes: Ints, is_watched: bool
+    ) -> tuple[Minds, Epochs]:
+        """Return the controllers of teams and their epochs; see ``_play``.
+
+        A family whose package can play an epoch in one call replaces this.
+
+        Args:
+            genes: pool of genotypes.
+            teams: pool rows of the parts [B, R, U].
+            keys: of scenarios [B].
+            modes: [B, R] index of a heuristic controller, -1 for the robot's own.
+            is_watched: whether hidden activations and places are asked for.
+        """
+        n_outputs = len(self.world.outputs)
+        return Networks(self.controller, genes, teams, n_outputs), self.epochs(len(keys))
 
     def is_shared(self, name: str) -> bool:
         """Scenarios have nothing in common."""
@@ -179,15 +207,14 @@ class TaskSimulator:
         own = world.params.own_labels
         b, r = modes.shape
         tally = _Tally.of(b, r, len(world.castes), len(world.facts.measures))
-        chosen = _Chosen(world, keys, modes)
-        networks = Networks(self.controller, genes, teams, len(actions.outputs))
-        epochs = self.epochs(b)
+        chosen = Chosen(world, keys, modes)
+        minds, epochs = self.players(genes, teams, keys, modes, watch is not None)
         observed = epochs.begin(keys)
         before: npt.NDArray[np.int64] | None = None
         alive = np.ones((b, r), bool)
         for t in range(world.params.iterations):
             inputs = self._inputs(observed)
-            outputs = networks.think(inputs)
+            outputs = minds.think(inputs)
             action = chosen.of(t, epochs, observed, actions.of(outputs))
             label = actions.label(action) if own is None else own.of(observed, action)
             label = np.where(alive, label, -1)
@@ -208,7 +235,7 @@ class TaskSimulator:
                     "fitness": tally.fitness[0].copy(),
                     "inputs": inputs[0].copy(),
                     "outputs": outputs[0].copy(),
-                    "hidden": networks.hidden[0].copy(),
+                    "hidden": minds.hidden[0].copy(),
                     "performance": tally.performance()[0],
                 }
                 watch(now | epochs.places())
@@ -224,7 +251,7 @@ class TaskSimulator:
         return np.concatenate([observed, one], axis=2)
 
 
-class _Chosen:
+class Chosen:
     """The actions of robots, some of which have a heuristic controller."""
 
     def __init__(self, world: TaskWorld, keys: Keys, modes: Ints) -> None:
@@ -234,9 +261,12 @@ class _Chosen:
         self._keys = fold_all(keys.copy(), "random actions")[:, None, None]
 
     def of(
-        self, t: int, epochs: Epochs, observed: Floats, action: npt.NDArray[Any]
+        self, t: int, epochs: Epochs | None, observed: Floats, action: npt.NDArray[Any]
     ) -> npt.NDArray[Any]:
-        """Return the actions of iteration t, given those of the robots' own controllers."""
+        """Return the actions of iteration t, given those of the robots' own controllers.
+
+        Without epochs, no robot may have a controller of the package.
+        """
         b, r = self._modes.shape
         if action.dtype.kind == "f":  # of an epoch that has ended, or gone wrong
             action = np.where(np.isfinite(action), action, self._actions.nothing(b))
@@ -247,6 +277,7 @@ class _Chosen:
                 places = np.arange(r)[:, None], np.arange(self._width)
                 other = self._actions.drawn(uniforms(self._keys, t, *places))
             else:
+                assert epochs is not None
                 other = epochs.heuristic(kind - RANDOM - 1, observed)
             action = np.where(_wide(self._modes == kind, action.ndim), other, action)
         return action

@@ -61,6 +61,27 @@ class TeamFacts(TaskFacts):
     agents: tuple[Agent, ...] = ()
     team: tuple[int, ...] = ()
 
+    @cached_property
+    def width(self) -> int:
+        """W, numbers of an action of the agent that has most."""
+        spaces = (agent.space for agent in self.agents)
+        return max(1 if isinstance(space, int) else len(space[0]) for space in spaces)
+
+    def of_all(self, actions: npt.NDArray[Any], others: dict[int, npt.NDArray[Any]]) -> Floats:
+        """Return the actions of all agents [B, agents, W].
+
+        Args:
+            actions: of robots [B, R] or [B, R, A].
+            others: of the other agents by their place, each [B] or [B, A].
+        """
+        found = np.zeros((len(actions), len(self.agents), self.width), np.float32)
+        own = actions if actions.ndim == 3 else actions[:, :, None]
+        found[:, list(self.team), : own.shape[2]] = own
+        for place, action in others.items():
+            wide = action if action.ndim == 2 else action[:, None]
+            found[:, place, : wide.shape[1]] = wide
+        return found
+
 
 @parameters("world")
 class TeamParams(TaskParams):

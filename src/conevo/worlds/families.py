@@ -6,6 +6,7 @@ __all__ = ["FAMILIES", "is_task"]
 
 # The module that makes the entry of each task of a family (conevo.simulators).
 FAMILIES = {
+    "jaxmarl": "conevo.simulators.jaxmarl.world",
     "pettingzoo": "conevo.simulators.pettingzoo.world",
     "vmas": "conevo.simulators.vmas.world",
 }

@@ -18,7 +18,8 @@ import numpy.typing as npt
 
 from conevo.errors import UsageError, in_a_line, unknown_name
 from conevo.reading import parse_toml
-from conevo.simulators.pettingzoo.things import TaskLook, look_of, places_of
+from conevo.simulators.particles import TaskLook
+from conevo.simulators.pettingzoo.things import look_of, places_of
 
 __all__ = ["Found", "Task", "begin", "find", "places", "step"]
 
@@ -211,7 +212,7 @@ def step(actions: Floats, playing: npt.NDArray[np.bool_]) -> Seen:
     return observed, rewards, gone
 
 
-def places() -> dict[str, Floats]:
+def places() -> Floats:
     """Return the positions of agents and things in the first episode; nothing if unknown."""
     return places_of(_playing[0].env)
 

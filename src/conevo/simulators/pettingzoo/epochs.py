@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from conevo.simulators.particles import placed
 from conevo.simulators.pettingzoo import episodes
 from conevo.simulators.pettingzoo.workers import LOCK, Worker, ask_all, workers
 from conevo.simulators.playing import TaskSimulator
@@ -60,16 +61,12 @@ class PettingZooEpochs:
 
     def __init__(self, world: PettingZooWorld, n: int, n_workers: int) -> None:
         self._world, self._n, self._t = world, n, 0
-        facts = world.facts
         self._task = (world.environment, world.params.options)
         used = min(n, n_workers)
         ends = [n * k // used for k in range(used + 1)]
         self._parts: list[tuple[Worker, slice]] = [
             (worker, slice(*ends[k : k + 2])) for k, worker in enumerate(workers(used))
         ]
-        self._width = max(
-            1 if isinstance(agent.space, int) else len(agent.space[0]) for agent in facts.agents
-        )
         self._playing = np.ones(n, np.bool_)
 
     def begin(self, keys: Keys) -> Floats:
@@ -84,12 +81,7 @@ class PettingZooEpochs:
     def step(self, actions: npt.NDArray[Any]) -> tuple[Floats, Floats, Bools]:
         """Execute actions [B, R] or [B, R, A] of robots; see ``playing.Epochs``."""
         facts = self._world.facts
-        whole = np.zeros((self._n, len(facts.agents), self._width), np.float32)
-        given = actions if actions.ndim == 3 else actions[:, :, None]
-        whole[:, list(facts.team), : given.shape[2]] = given
-        for place, action in self._others.of(self._t, self._seen).items():
-            own = action if action.ndim == 2 else action[:, None]
-            whole[:, place, : own.shape[1]] = own
+        whole = facts.of_all(actions, self._others.of(self._t, self._seen))
         self._t += 1
         asked = [(worker, (whole[part], self._playing[part])) for worker, part in self._parts]
         found = self._ask(episodes.step, asked)
@@ -110,18 +102,7 @@ class PettingZooEpochs:
         """Return positions in the first epoch; robots in a row where the task has none."""
         facts = self._world.facts
         (found,) = self._ask(episodes.places, [(self._parts[0][0], ())])
-        if not found:
-            row = (np.arange(facts.n_robots, dtype=np.float32) + 1) / np.float32(facts.n_robots + 1)
-            return {"x": row, "y": np.full_like(row, 0.5)}
-        robots = found["agents"][list(facts.team)]
-        others = np.delete(found["agents"], list(facts.team), axis=0)
-        things = np.concatenate([others, found["landmarks"]])
-        return {
-            "x": robots[:, 0].copy(),
-            "y": robots[:, 1].copy(),
-            "things_x": things[:, 0].copy(),
-            "things_y": things[:, 1].copy(),
-        }
+        return placed(found, facts.team)
 
     def _ask(self, function: Any, asked: list[tuple[Worker, Any]]) -> list[Any]:
         """Return the results of a function that workers call."""

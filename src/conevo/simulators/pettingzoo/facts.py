@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 import functools
-import itertools
 
 from conevo.errors import UsageError
-from conevo.playback.drawn import Drawn, Objects
+from conevo.simulators.particles import drawn_of
 from conevo.simulators.pettingzoo import episodes
-from conevo.simulators.pettingzoo.things import TaskLook
 from conevo.simulators.pettingzoo.workers import ask_all, workers
 from conevo.simulators.teams import Agent, TeamFacts, actions_of, team_of
 
 __all__ = ["facts_of"]
-
-REACH = 2.0  # Choice: half the side of the drawn part of a particle world, which has no end
 
 
 @functools.lru_cache(maxsize=32)
@@ -44,29 +40,4 @@ def facts_of(task: str, options: str, prefixes: str, versions: str) -> TeamFacts
         drawn=None if found.look is None else drawn_of(found.look, team),
         agents=agents,
         team=team,
-    )
-
-
-def drawn_of(look: TaskLook, team: tuple[int, ...]) -> Drawn:
-    """Return the drawing of a task: other agents, then landmarks, alike ones together."""
-    others = [one for k, one in enumerate(look.agents) if k not in team]
-    objects, first = [], 0
-    for thing, alike in itertools.groupby([*others, *look.landmarks]):
-        last = first + len(list(alike))
-        place = f"[{first}:{last}]"
-        first = last
-        objects.append(
-            Objects(
-                thing.name,
-                f"things_x{place}",
-                f"things_y{place}",
-                size=thing.size,
-                colours=(thing.colour,),
-            )
-        )
-    return Drawn(
-        objects=tuple(objects),
-        seconds=look.seconds,
-        bounds=(-REACH, -REACH, REACH, REACH),
-        radius=max(look.agents[k].size for k in team),
     )

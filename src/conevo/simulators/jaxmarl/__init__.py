@@ -1,0 +1,1 @@
+"""Tasks of JaxMARL as worlds; see ``world``."""
