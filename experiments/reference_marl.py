@@ -19,7 +19,7 @@ Choice: actor and critic have two hidden layers of 64 tanh units. The robots sha
 gets the sensors of one robot. Each batch of 16,000 team-steps serves for eight passes in
 minibatches of 4,000. Learning rate 3e-4, discount 0.99, entropy coefficient 0.01, everything else
 as in BenchMARL. None of this was tuned for a task. Prey are heuristic: a random team catches shaped
-prey in at most one of fifty epochs, which is too rare to learn from.
+prey in two or three of a hundred epochs, which is too rare to learn from.
 """
 
 from __future__ import annotations

@@ -158,7 +158,7 @@ def test_the_script_of_references_writes_what_a_report_reads(
 
 @pytest.mark.exhaustive
 def test_mappo_learns_to_catch_heuristic_prey(tmp_path: Path) -> None:
-    """Two million team-steps, about ten minutes; random predators reach 50 of 1000 iterations."""
+    """Two million team-steps, about ten minutes; random predators reach about 20 of 1000."""
     import reference_marl
 
     one = reference_marl.reference("pursuit/team-3")

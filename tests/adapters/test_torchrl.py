@@ -218,7 +218,9 @@ def test_actions_are_those_of_the_world() -> None:
         ({"scenarios": 0}, "scenarios = 0: must be an integer from 1"),
         ({"device": "abacus"}, "abacus"),
         ({"pray": "heuristic"}, "unknown argument 'pray' for .* did you mean 'prey'"),
-        ({"seed": -1}, "seed = -1: must be from 0"),
+        ({"rewards": "fitness"}, "unknown argument 'rewards' for .* did you mean 'reward'"),
+        ({"seed": -1}, "seed = -1: must be an integer from 0"),
+        ({"n": 0}, "num_envs = 0: must be an integer from 1"),
     ],
 )
 def test_bad_settings_are_one_line(settings: dict[str, Any], line: str) -> None:

@@ -22,6 +22,7 @@ from conevo.adapters.teams import SteppedTeams, fresh_seed
 from conevo.errors import UsageError, unknown_name
 from conevo.worlds.measures import measures_of
 from conevo.worlds.spaces import group_of
+from conevo.worlds.stepper import MOST_WORLDS, whole
 
 try:
     import torch
@@ -37,6 +38,9 @@ if TYPE_CHECKING:
 __all__ = ["TeamBatchEnv"]
 
 REWARDS = ("fitness", "performance")
+ARGUMENTS = (
+    "num_envs", "actions", "seed", "scenarios", "reward", "scale", "threads", "device",
+)  # fmt: skip
 
 
 class TeamBatchEnv(EnvBase):
@@ -101,12 +105,13 @@ class TeamBatchEnv(EnvBase):
             raise UsageError(f"scale = {scale!r}: must be a finite number")
         teams = SteppedTeams(
             task,
-            num_envs,
+            whole(num_envs, "num_envs", MOST_WORLDS),
             actions,
             params,
             scenarios=scenarios,
             threads=threads,
             device=str(device),
+            arguments=ARGUMENTS,
         )
         super().__init__(device=torch.device(teams.stepper.device), batch_size=[num_envs])
         self.teams = teams
@@ -164,9 +169,7 @@ class TeamBatchEnv(EnvBase):
 
     def _set_seed(self, seed: int | None) -> None:
         """Let the next reset of all teams draw another pool of scenarios."""
-        if seed is not None and not 0 <= seed < 2**64:
-            raise UsageError(f"seed = {seed!r}: must be from 0 to 2**64 - 1")
-        self._seed = fresh_seed() if seed is None else int(seed)
+        self._seed = fresh_seed() if seed is None else whole(seed, "seed", 2**64 - 1, 0)
 
     def _reset(self, tensordict: TensorDictBase | None = None, **_: Any) -> TensorDictBase:
         mask = None if tensordict is None else tensordict.get("_reset", None)
