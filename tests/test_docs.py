@@ -32,7 +32,10 @@ LINKED = (
     *EXECUTED,
     "CONTRIBUTING.md",
     "examples/README.md",
-    *(f"docs/{name}.md" for name in ("api", "cite", "index", "platforms", "results", "settings")),
+    *(
+        f"docs/{name}.md"
+        for name in ("adapters", "api", "cite", "index", "platforms", "results", "settings")
+    ),
 )
 MARKED = re.compile(r"<!-- ([a-z]+): (\S+) -->\n```\w+\n(.*?)```\n", re.DOTALL)
 
