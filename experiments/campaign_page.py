@@ -1,16 +1,17 @@
 """Put the results of a campaign into its page.
 
-    python experiments/campaign_page.py CAMPAIGN FOLDER
+    python experiments/campaign_page.py CAMPAIGN FOLDER [--method METHOD] [--foreign FILE.json ...]
 
 writes the report of a finished campaign into ``FOLDER/report``, and tables between the markers of
-``FOLDER/README.md``: runs and their cost, performance, comparisons with CONE, castes and the claims
-of the thesis.
+``FOLDER/README.md``: runs and their cost, performance, comparisons of one method (CONE) with the
+others, castes and, if the page has a place for them, the claims of the thesis. Results of other
+tools, with steps of teams, join the report.
 """
 
 from __future__ import annotations
 
+import argparse
 import shutil
-import sys
 from pathlib import Path
 from statistics import fmean, stdev
 from typing import Any
@@ -23,6 +24,7 @@ from conevo.evolution.methods.registry import METHODS
 from conevo.numbers import plus_minus
 from conevo.report.claims import verdicts
 from conevo.report.files import write_report
+from conevo.report.foreign import read_foreign
 from conevo.report.statistics import compare, holm
 from conevo.runs.run import Run
 
@@ -92,19 +94,19 @@ def performance_table(tables: Tables) -> str:
     return pages.table(head, rows)
 
 
-def comparison_table(tables: Tables) -> str:
-    """Return CONE against each other method; Holm's correction is over the four of a task."""
+def comparison_table(tables: Tables, method: str) -> str:
+    """Return a method against each other one; Holm's correction is over those of a task."""
     rows: list[list[Any]] = []
     for task, of in by_cell(tables.values()).items():
-        others = [method for method in of if method != "cone"]
-        found = [compare(of["cone"], of[method]) for method in others]
+        others = [other for other in of if other != method]
+        found = [compare(of[method], of[other]) for other in others]
         corrected = holm([one.p_mann_whitney for one in found])
-        for method, one, ranked in zip(others, found, corrected, strict=True):
+        for other, one, ranked in zip(others, found, corrected, strict=True):
             interval = "-" if one.low is None else f"{one.low:.4g} to {one.high:.4g}"
             rows.append(
                 [
                     task,
-                    METHODS[method].title,
+                    METHODS[other].title,
                     f"{one.n_a}, {one.n_b}",
                     f"{one.difference:+.4g}",
                     interval,
@@ -114,7 +116,8 @@ def comparison_table(tables: Tables) -> str:
                     f"{one.a12:.2f}",
                 ]
             )
-    head = ["task", "CONE minus", "n", "difference", "95 % interval (Welch)", "p, t-test"]
+    minus = f"{METHODS[method].title} minus"
+    head = ["task", minus, "n", "difference", "95 % interval (Welch)", "p, t-test"]
     return pages.table([*head, "p, Welch", "p, Mann-Whitney, Holm", "A12"], rows)
 
 
@@ -155,17 +158,24 @@ def made_with(campaign: Campaign) -> str:
 
 def main() -> None:
     """Write the report and the page."""
-    campaign = Campaign(Path(sys.argv[1]))
-    folder = Path(sys.argv[2])
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("campaign", type=Path)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--method", default="cone", choices=METHODS)
+    parser.add_argument("--foreign", type=Path, nargs="+", default=[])
+    args = parser.parse_args()
+    campaign, folder = Campaign(args.campaign), args.folder
+    others = read_foreign(args.foreign, "team") if args.foreign else []
     shutil.copyfile(campaign.paths.plan, folder / "plan.toml")
     page = folder / "README.md"
     with sealed(campaign) as sources, Tables(sources) as tables:
-        write_report(campaign, folder / "report", sources)
+        write_report(campaign, folder / "report", sources, others)
         pages.put(made_with(campaign) + "\n" + cost_table(tables), page, "cost")
         pages.put(performance_table(tables), page, "performance")
-        pages.put(comparison_table(tables), page, "comparisons")
+        pages.put(comparison_table(tables, args.method), page, "comparisons")
         pages.put(caste_table(tables), page, "castes")
-        pages.put(claims_table(tables), page, "claims")
+        if "<!-- claims -->" in page.read_text():
+            pages.put(claims_table(tables), page, "claims")
 
 
 if __name__ == "__main__":
