@@ -25,7 +25,14 @@ from machine import alternate, machine, spread, table
 SEED = 2009
 TASKS = ("vmas:dispersion", "vmas:balance", "vmas:discovery")
 ITERATIONS = 50
-PACKAGES = ("vmas", "torch", "pettingzoo", "mpe2")  # those that are installed are named
+PACKAGES = (
+    "vmas",
+    "torch",
+    "pettingzoo",
+    "mpe2",
+    "jaxmarl",
+    "jax",
+)  # those that are installed are named
 
 
 def workload(task: str, n: int, iterations: int, threads: int) -> Callable[[], tuple[float, float]]:

@@ -12,6 +12,7 @@ import conevo
 from conevo.cli.main import main
 from conevo.errors import UsageError
 from conevo.simulators import tasks
+from conevo.simulators.jaxmarl import world as jaxmarl_family
 from conevo.simulators.vmas import world as family
 from conevo.worlds.registry import resolve
 from extras import need
@@ -67,6 +68,28 @@ def test_the_extra_of_pettingzoo_or_of_its_tasks_is_named(
     words = rf"pettingzoo:{task} needs the package {package}, .*'conevo\[{extra}\]'"
     with pytest.raises(UsageError, match=words):
         resolve(f"pettingzoo:{task}")
+
+
+@pytest.mark.parametrize("package", ["jaxmarl", "jax"])
+def test_the_extra_of_jaxmarl_is_named(package: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    present = {"jaxmarl", "jax"} - {package}
+    monkeypatch.setattr(tasks, "find_spec", lambda name: name in present or None)
+    with pytest.raises(UsageError, match=rf"needs the package {package}, .*'conevo\[jaxmarl\]'"):
+        resolve("jaxmarl:MPE_simple_spread_v3")
+
+
+def test_the_tasks_of_jaxmarl_are_read_and_not_loaded(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = "raise SystemExit\nregistered_envs = ['MPE_simple_v3', 'hanabi']\n"
+    (tmp_path / "registration.py").write_text(text)
+    found = ModuleSpec("jaxmarl", None, is_package=True)
+    found.submodule_search_locations = [str(tmp_path)]
+    for module in (tasks, jaxmarl_family):
+        monkeypatch.setattr(module, "find_spec", lambda name: found)
+    assert resolve("jaxmarl:hanabi")[1] == "hanabi"
+    with pytest.raises(UsageError, match=r"unknown task 'simple_v3' of JaxMARL.*'MPE_simple_v3'"):
+        resolve("jaxmarl:simple_v3")
 
 
 @pytest.mark.parametrize(
