@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -18,6 +19,8 @@ NEEDS = {
     "PettingZoo": ("pettingzoo",),
     "Stable-Baselines3 and SuperSuit": ("pettingzoo", "stable_baselines3", "supersuit"),
     "Gymnasium": ("gymnasium",),
+    "TorchRL": ("torchrl",),
+    "BenchMARL": ("benchmarl",),
 }
 
 
@@ -54,6 +57,7 @@ def test_an_example_prints_the_output_on_the_page(number: int, tmp_path: Path) -
     done = subprocess.run(
         [sys.executable, "-W", "error::DeprecationWarning:__main__", "-c", text],
         cwd=tmp_path, capture_output=True, text=True, check=False,
+        env=os.environ | {"RL_LOGGING_LEVEL": "WARNING"},  # TorchRL's notes are on standard output
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert SCRIPT.shape(done.stdout) == SCRIPT.shape(output)
