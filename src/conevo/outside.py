@@ -67,7 +67,8 @@ def source_of(path: Path, kind: Sort, digest: str = "") -> Source:
     Raises:
         UsageError: a file cannot be read or run, or they have another digest.
     """
-    texts = _texts(path, kind)
+    with _loading:  # Python 3.11 parses in one thread at a time: python/cpython issue 106905
+        texts = _texts(path, kind)
     found = _digest(texts)
     if digest not in ("", found):
         others = ", ".join(file.name for file in list(texts)[1:])

@@ -154,7 +154,7 @@ def test_names_have_the_version_at_the_end() -> None:
         ("pursuit/team-33", {}, r"unknown environment 'team-33' .*did you mean 'team-10'\?"),
         ("persuit/team-3", {}, r"unknown world 'persuit'.*did you mean 'pursuit'\?"),
         ("pursuit-v1/team-3", {}, "this version of conevo plays pursuit-v2, no longer pursuit-v1"),
-        (3, {}, "task = 3: must be a name, as in 'pursuit/team-3'"),
+        (3, {}, "task = 3: must be a name, 'WORLD/ENVIRONMENT'"),
         ("vmas:balance", {}, "vmas:balance is a task of another package: use its environment"),
         ("pursuit/team-3", {"pray": "heuristic"}, r"unknown argument 'pray' .*mean 'prey'\?"),
         ("pursuit/team-3", {"render_mod": 1}, r"'render_mod' .*did you mean 'render_mode'\?"),

@@ -6,7 +6,9 @@ from pathlib import Path
 from typing import Any
 
 from conevo.campaigns.campaign import Campaign, create
-from conevo.campaigns.plan_file import read_plan
+from conevo.campaigns.plan import Plan
+from conevo.campaigns.plan_file import read_plan, read_preset
+from extras import need
 
 TINY = """
 [campaign]
@@ -43,3 +45,10 @@ def write_plan(
 def tiny_campaign(folder: Path, head: str = "studies = []", **parts: Any) -> Campaign:
     """Write out a campaign of tiny runs, four by default; nothing is started."""
     return create(read_plan(write_plan(folder, head, **parts)), folder / "tiny")
+
+
+def preset(name: str) -> Plan:
+    """Return a plan of conevo's; skip the test where the package of its tasks is missing."""
+    if name == "neighbours":
+        need("torch", "vmas")
+    return read_preset(name)

@@ -3,8 +3,8 @@ from pathlib import Path
 
 import pytest
 
-from campaigns.plans import write_plan
-from conevo.campaigns.plan_file import preset_names, read_plan, read_preset
+from campaigns.plans import preset, write_plan
+from conevo.campaigns.plan_file import preset_names, read_plan
 from conevo.errors import UsageError
 from conevo.runs.layers import PRESETS
 
@@ -274,7 +274,7 @@ def test_a_change_of_defaults_after_planning_is_noticed(tmp_path):
 
 @pytest.mark.parametrize("name", preset_names())
 def test_experiments_of_the_thesis_can_be_written_out_at_every_scale(name):
-    plan = read_preset(name)
+    plan = preset(name)
     assert plan.title
     assert plan.preset in PRESETS
     for scale in SCALES:

@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 import conevo.campaigns.plan_file
+from campaigns.plans import preset
 from conevo.campaigns.plan_file import preset_names, read_preset
 from conevo.worlds.pursuit.world import PursuitWorld
-from extras import need
 
 PAGE = Path(__file__).resolve().parent.parent.parent / "docs" / "campaigns.md"
 PRESETS = Path(conevo.campaigns.plan_file.__file__).parent / "presets"
@@ -60,13 +60,6 @@ def questions():
     return {cells[0].strip("`"): cells[2] for cells in table("preset")}
 
 
-def asked(name):
-    """Return the preset of an open question; skip it where its tasks' package is missing."""
-    if name == "neighbours":
-        need("torch", "vmas")
-    return read_preset(name)
-
-
 def team_steps(plan):
     """Return the team-steps of a plan's evolution, without studies and tests."""
     total = 0
@@ -113,7 +106,7 @@ def test_a_preset_produces_the_results_that_the_page_lists():
 
 @pytest.mark.parametrize("name", questions())
 def test_an_open_question_has_the_cost_that_its_plan_and_the_page_state(name):
-    plan = asked(name)
+    plan = preset(name)
     lines = (PRESETS / f"{name}.toml").read_text().partition("\n\n[")[0].splitlines()
     comment = " ".join(line.strip("# ") for line in lines)
     assert comment.startswith("Decides ")
@@ -127,7 +120,7 @@ def test_an_open_question_has_the_cost_that_its_plan_and_the_page_state(name):
 @pytest.mark.parametrize("name", questions())
 def test_an_open_question_can_be_asked_at_any_scale(name):
     for scale in ("smoke", "desk", "night", "thesis"):
-        runs = asked(name).at(scale, seeds=1).write_out()
+        runs = preset(name).at(scale, seeds=1).write_out()
         assert len({run.run_ids for run in runs}) == len(runs)  # no two cells are the same
         if scale == "smoke":
             assert {run.configs()[0].run.budget_evaluations for run in runs} == {430}

@@ -167,7 +167,7 @@ def _world(task: str, params: dict[str, Any], arguments: Sequence[str]) -> World
         UsageError: as for ``SteppedTeams``.
     """
     if not isinstance(task, str):
-        raise UsageError(f"task = {shown(task)}: must be a name, as in 'pursuit/team-3'")
+        raise UsageError(f"task = {shown(task)}: must be a name, 'WORLD/ENVIRONMENT'")
     if is_task(task):
         raise UsageError(
             f"{task} is a task of another package: use its environment there. Worlds of conevo "
