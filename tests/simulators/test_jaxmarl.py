@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 
 import conevo
-from conevo.cli.main import main
 from conevo.controllers.registry import controller
 from conevo.errors import UsageError
 from conevo.replay.playback import playback_of
@@ -25,6 +24,7 @@ from conevo.worlds.registry import world
 from conevo.worlds.simulators import simulator
 from extras import need
 from runs.tiny import content
+from simulators.refusals import check_refused
 
 need("jax", "jaxmarl")
 
@@ -273,12 +273,7 @@ def test_options_are_the_tasks_keywords() -> None:
 def test_a_task_that_is_not_one_is_refused_in_one_line(
     task: str, words: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    with pytest.raises(SystemExit, match="2"):
-        main(["run", f"jaxmarl:{task}", "--out", str(tmp_path / "run")])
-    out, error = capfd.readouterr()
-    assert words in error
-    assert (out, error.count("\n")) == ("", 1)
-    assert not (tmp_path / "run").exists()
+    check_refused(f"jaxmarl:{task}", words, tmp_path / "run", capfd)
 
 
 def test_jax_is_loaded_for_such_a_task_only_and_leaves_streams_and_environment() -> None:

@@ -27,6 +27,7 @@ from conevo.worlds.registry import world
 from conevo.worlds.simulators import simulator
 from extras import need
 from runs.tiny import content
+from simulators.refusals import check_refused
 
 need("mpe2", "pettingzoo")
 
@@ -325,12 +326,7 @@ def test_heuristics_are_nothing_and_random() -> None:
 def test_a_task_that_is_not_one_is_refused_in_one_line(
     task: str, words: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    with pytest.raises(SystemExit, match="2"):
-        main(["run", f"pettingzoo:{task}", "--out", str(tmp_path / "run")])
-    out, error = capfd.readouterr()
-    assert words in error
-    assert (out, error.count("\n")) == ("", 1)
-    assert not (tmp_path / "run").exists()
+    check_refused(f"pettingzoo:{task}", words, tmp_path / "run", capfd)
 
 
 def test_options_are_the_tasks_keywords() -> None:

@@ -58,7 +58,7 @@ DECLARED = {
     "scene": ("    places: wp.array[float]", "    places: float", "structure",
               "Scene.places must be an array"),
     "outputs": ('"dx", "dy")', '"dx", "dy", *"abcde")', "structure",
-                "controller 'srn' has at most 8 outputs, and light-v1 has 9"),
+                "controller 'srn' has at most 8 outputs, and light-v1/dark-1 has 9"),
     "sensors": ('("light x", "light y")', '("light x")', "structure",
                 "inputs must be a tuple of names, as in ('rest',), not 'light x'"),
     "same": ('"light y"', '"light x"', "structure", "inputs has 'light x' twice"),

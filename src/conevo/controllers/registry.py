@@ -160,5 +160,5 @@ def refuse_misfit(controller: Controller, world: Any) -> None:
     if len(world.outputs) > controller.max_outputs:
         raise UsageError(
             f"controller {controller.name!r} has at most {controller.max_outputs} outputs, and "
-            f"{world.name} has {len(world.outputs)}"
+            f"{world.name}/{world.environment} has {len(world.outputs)}"
         )
