@@ -16,11 +16,14 @@ from typing import Any
 import pytest
 
 import conevo
+from conevo.campaigns.plan_file import read_plan
 from conevo.cli.main import main
 from conevo.errors import UsageError
 from conevo.evolution.methods.registry import METHODS
 from conevo.evolution.methods.registry import resolve as resolve_method
 from conevo.runs.config import resolve
+from conevo.runs.lab import layout_of
+from conevo.runs.settings import settings_of
 from conevo.runs.start import start
 from runs.tiny import TASK, content, tiny_settings
 
@@ -358,3 +361,80 @@ def test_an_error_in_the_file_is_named_with_its_line(
 def test_the_registry_finds_the_example() -> None:
     entry = resolve_method(f"{EXAMPLE}:{NAME}")
     assert (entry.name, entry.title, entry.file) == (NAME, "random search", str(EXAMPLE))
+
+
+# --- controllers of a method ----------------------------------------------------------------------
+
+
+@pytest.fixture
+def choosy(mine: Path) -> str:
+    """The address of a method that works with two controllers only."""
+    text = mine.read_text()
+    mine.write_text(
+        text.replace('    name="random', '    controllers=("gru", "ctrnn"),\n    name="random')
+    )
+    return f"{mine}:{NAME}"
+
+
+def test_a_method_chooses_its_controller(choosy: str, tmp_path: Path) -> None:
+    config = resolve(TASK, choosy)
+    assert config.controller.name == "gru"
+    assert "controller.name" not in config.changed
+    other = resolve(TASK, choosy, overrides={"controller.name": "ctrnn"})
+    assert other.controller.name == "ctrnn"
+    assert "controller.name" in other.changed
+    (kind,) = [one for _, one, _ in settings_of(config) if one.name == "name"]
+    assert (kind.default, kind.allowed) == ("gru", "gru, ctrnn")
+    (tmp_path / "own.toml").write_text(config.to_toml())
+    assert resolve(file=tmp_path / "own.toml").run_id == config.run_id
+    layout = layout_of(config.build_world(), config.controller)
+    assert (layout.n_inputs, layout.n_outputs) == (16, 5)
+
+
+def test_another_controller_is_refused_in_one_line(
+    choosy: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "own.toml").write_text(
+        f'[run]\nworld = "{TASK}"\nmethod = "{choosy}"\n[controller]\nname = "srn"\n'
+    )
+    words = "method 'random-search' only works with gru or ctrnn"
+    with pytest.raises(UsageError) as caught:
+        resolve(file=tmp_path / "own.toml")
+    place = tmp_path / "own.toml"
+    assert str(caught.value) == f"controller.name = 'srn' in {place}: {words}"
+    with pytest.raises(UsageError, match=f"'srn' in overrides: {words}"):
+        resolve(TASK, choosy, overrides={"controller.name": "srn"})
+    command = ["run", TASK, "--method", choosy, "--set", "controller.name=srn"]
+    with pytest.raises(SystemExit) as ended:
+        main([*command, "--out", str(tmp_path / "run")])
+    assert ended.value.code == 2
+    assert capsys.readouterr().err.count("\n") == 1
+    assert not (tmp_path / "run").exists()
+    with pytest.raises(UsageError, match=words):
+        plan_of(tmp_path, choosy).write_out()
+
+
+def plan_of(folder: Path, method: str) -> Any:
+    """Return a plan that has the method with a controller that it does not work with."""
+    file = folder / "plan.toml"
+    file.write_text(
+        f'[campaign]\nname = "some"\nseeds = 1\n[factors]\nworld = ["{TASK}"]\n'
+        f'method = ["{method}", "homcne"]\n"controller.name" = ["gru", "srn"]\n'
+    )
+    return read_plan(file)
+
+
+def test_controllers_that_are_not_names_are_refused(mine: Path) -> None:
+    mine.write_text(
+        mine.read_text().replace('    name="random', '    controllers="gru",\n    name="random')
+    )
+    with pytest.raises(UsageError, match="its controllers 'gru' must be a tuple of names"):
+        resolve(TASK, f"{mine}:{NAME}")
+
+
+def test_an_unknown_controller_of_a_method_names_the_nearest(mine: Path) -> None:
+    mine.write_text(
+        mine.read_text().replace('    name="random', '    controllers=("gur",),\n    name="random')
+    )
+    with pytest.raises(UsageError, match="unknown controller 'gur'; did you mean 'gru'"):
+        resolve(TASK, f"{mine}:{NAME}")

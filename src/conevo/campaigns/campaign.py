@@ -39,6 +39,7 @@ from conevo.campaigns.plan import Plan, PlannedRun
 from conevo.campaigns.plan_file import read_plan
 from conevo.campaigns.worker import planned_runs
 from conevo.errors import UsageError, unknown_name
+from conevo.evolution.methods.registry import resolve as resolve_method
 from conevo.reading import read_json
 from conevo.runs import locks
 from conevo.runs.directory import LOCK, Directory, appearing, as_json
@@ -109,13 +110,16 @@ def _build_worlds(runs: Iterable[PlannedRun]) -> None:
         UsageError: a mistake in a user's world, such as an index outside its array.
         EnvironmentFailure: compiled kernels cannot be written.
     """
-    from conevo.controllers.registry import DEFAULT, controller
+    from conevo.controllers.registry import controller
+    from conevo.runs.settings import controller_of
     from conevo.worlds.checking import refuse_wild_indices
     from conevo.worlds.simulators import simulator
 
-    for address, name in sorted(
-        {(r.world, str(r.overrides.get("controller.name", DEFAULT))) for r in runs}
-    ):
+    chosen = {
+        (r.world, str(r.overrides.get("controller.name", controller_of(resolve_method(r.method)))))
+        for r in runs
+    }
+    for address, name in sorted(chosen):
         entry, environment = resolve_world(address)
         built = entry.build(environment, entry.params(environment))
         simulator(built, controller(name, world=built))

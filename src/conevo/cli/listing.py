@@ -27,7 +27,11 @@ WHAT = ("worlds", "controllers", "methods", "presets", "settings", "runs")
 @click.argument("subject", metavar="[WORLD/ENVIRONMENT | FOLDER]", required=False)
 @click.option("--method", metavar="NAME", help="Method of the settings or presets (default: cone).")
 @click.option("--preset", metavar="NAME", help="Preset of the settings (default: desk).")
-@click.option("--controller", metavar="NAME", help="Controller of the settings (default: srn).")
+@click.option(
+    "--controller",
+    metavar="NAME",
+    help="Controller of the settings (default: the method's, or srn).",
+)
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON array.")
 def listing(
     what: str,
@@ -112,11 +116,19 @@ def _entries(what: str) -> Rows:
     from conevo.controllers.registry import CONTROLLERS
     from conevo.evolution.methods.registry import METHODS
 
-    name = what.removesuffix("s")
+    if what == "controllers":
+        return [{"controller": entry.name} | _about(entry) for entry in CONTROLLERS.values()]
     return [
-        {name: entry.name, "title": entry.title, "what": entry.summary, "source": entry.source}
-        for entry in (CONTROLLERS if what == "controllers" else METHODS).values()
+        {"method": entry.name}
+        | _about(entry)
+        | {"controllers": ", ".join(entry.controllers) or "any"}
+        for entry in METHODS.values()
     ]
+
+
+def _about(entry: Any) -> dict[str, str]:
+    """Return the facts about a controller or method that its entry has."""
+    return {"title": entry.title, "what": entry.summary, "source": entry.source}
 
 
 def _runs(folder: str | None) -> Rows:

@@ -44,12 +44,17 @@ class Layout:
         n_hidden: hidden neurons of every controller at the start.
         max_hidden: U, numbered slots for hidden neurons; the most that a controller can have.
         n_genes: G, genes of one neuron.
+        n_inputs: S, inputs of a robot; 0 if they are not known. Methods that evolve the topology of
+            networks need it.
+        n_outputs: O, outputs of a robot, likewise.
     """
 
     n_robots: int
     n_hidden: int
     max_hidden: int
     n_genes: int
+    n_inputs: int = 0
+    n_outputs: int = 0
 
     def __post_init__(self) -> None:
         """Refuse sizes of which a team cannot be made."""
@@ -57,6 +62,8 @@ class Layout:
             raise UsageError(
                 f"a layout needs n_robots, n_hidden, n_genes >= 1, max_hidden >= n_hidden: {self}"
             )
+        if min(self.n_inputs, self.n_outputs) < 0:
+            raise UsageError(f"a layout needs n_inputs, n_outputs >= 0: {self}")
 
 
 @dataclass(frozen=True)

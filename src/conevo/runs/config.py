@@ -23,10 +23,11 @@ A configuration file has four tables. ``[run]`` also has three names::
     genotypes = 20
 
 Settings missing in ``[controller]`` are those that the world suggests, else the controller's
-defaults. The world may be in a file, ``world = "FILE.py:ENVIRONMENT"``, and so may the method,
-``method = "FILE.py:NAME"``; ``world_digest`` and ``method_digest`` next to them are checked if they
-are given. Paths are relative to the folder of the configuration file; a run has copies of the files
-(``runs.inputs``). No preset has sizes for a method in a file: its own defaults apply.
+defaults. Its name is by default the one that the method asks for, else "srn". The world may be in a
+file, ``world = "FILE.py:ENVIRONMENT"``, and so may the method, ``method = "FILE.py:NAME"``;
+``world_digest`` and ``method_digest`` next to them are checked if they are given. Paths are
+relative to the folder of the configuration file; a run has copies of the files (``runs.inputs``).
+No preset has sizes for a method in a file: its own defaults apply.
 """
 
 from __future__ import annotations
@@ -40,7 +41,6 @@ from typing import TYPE_CHECKING, Any
 
 import tomli_w
 
-from conevo.controllers.registry import DEFAULT
 from conevo.errors import UsageError, placed, shown
 from conevo.runs.layers import (
     Layer,
@@ -53,7 +53,12 @@ from conevo.runs.layers import (
     split_keys,
 )
 from conevo.runs.outline import LENGTH, Outline, identify, outline_of
-from conevo.runs.settings import RunSettings, refuse_contradiction
+from conevo.runs.settings import (
+    RunSettings,
+    controller_of,
+    refuse_contradiction,
+    refuse_other_controller,
+)
 
 if TYPE_CHECKING:
     from conevo.controllers.protocol import Controller
@@ -169,7 +174,7 @@ class RunConfig:
         parts = {name: type(part) for name, part in built.items()}
         names = (self.preset, self.entry, self.environment, self.method_entry)
         base = read_preset(*names, self.controller.name)
-        changed = tuple(_changed(parts, built, base))
+        changed = tuple(_changed(parts, built, base, self.method_entry))
         return dataclasses.replace(self, run=run, changed=changed)
 
     @property
@@ -281,9 +286,11 @@ def resolve(
         entry, environment = resolve_world(names["world"], names["world_digest"])
     with placed("run.method", places.get("method")):
         method_entry = resolve_method(names["method"], names["method_digest"])
-    controller, controller_place = _take_controller([*layers, single])
+    by_default = controller_of(method_entry)
+    controller, controller_place = _take_controller([*layers, single], by_default)
     with placed("controller.name", controller_place):
         controller_class = find(controller).settings_class
+    refuse_other_controller(method_entry, controller, controller_place)
     parts: dict[str, type] = {
         "run": RunSettings,
         "world": entry.params_class,
@@ -308,7 +315,7 @@ def resolve(
         world_params=built["world"],
         controller=built["controller"],
         method_config=built["method"],
-        changed=tuple(_changed(parts, built, base)),
+        changed=tuple(_changed(parts, built, base, method_entry)),
     )
     built_world = config.build_world()  # refuses parameters that do not fit together
     refuse_misfit(config.controller, built_world)
@@ -339,9 +346,9 @@ def _take_names(
     return names | chosen, {name: places[name] for name in places.keys() - chosen.keys()}
 
 
-def _take_controller(layers: list[Layer]) -> tuple[str, str]:
+def _take_controller(layers: list[Layer], default: str) -> tuple[str, str]:
     """Remove the name from the layers' [controller] tables; return the last one and its place."""
-    name, place = DEFAULT, ""
+    name, place = default, ""
     for layer in layers:
         found = layer.get("controller", {}).pop("name", None)
         if found is not None and not isinstance(found.value, str):
@@ -362,11 +369,13 @@ def _refuse_label(preset: str, base: Layer, file: Layer, place: str) -> None:
         )
 
 
-def _changed(parts: Mapping[str, type], built: Mapping[str, Any], base: Layer) -> Iterator[str]:
+def _changed(
+    parts: Mapping[str, type], built: Mapping[str, Any], base: Layer, method: MethodEntry
+) -> Iterator[str]:
     """Yield the settings that differ from the preset's, without the seed and digests."""
     for section, part in parts.items():
         preset = base.get(section, {})
-        if section == "controller" and built[section].name != DEFAULT:
+        if section == "controller" and built[section].name != controller_of(method):
             yield "controller.name"
         for field in dataclasses.fields(part):
             plain = preset[field.name].value if field.name in preset else field.default

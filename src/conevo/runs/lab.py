@@ -41,7 +41,14 @@ __all__ = [
 def layout_of(world: World, controller: Controller) -> Layout:
     """Return the sizes of a method's problem, given by a world and its robots' controller."""
     genome = genome_of(controller, world)
-    return Layout(world.n_robots, genome.n_parts, genome.max_parts, genome.n_genes)
+    return Layout(
+        n_robots=world.n_robots,
+        n_hidden=genome.n_parts,
+        max_hidden=genome.max_parts,
+        n_genes=genome.n_genes,
+        n_inputs=len(world.inputs),
+        n_outputs=len(world.outputs),
+    )
 
 
 @dataclass(frozen=True)

@@ -30,18 +30,21 @@ from typing import (
 from annotated_types import Ge, Le
 
 from conevo.controllers.registry import CONTROLLERS, DEFAULT, suggested
-from conevo.errors import UsageError
+from conevo.errors import UsageError, shown
 from conevo.parameters import parameters
 
 if TYPE_CHECKING:
+    from conevo.evolution.methods.registry import MethodEntry
     from conevo.runs.config import RunConfig
 
 __all__ = [
     "RunSettings",
     "Setting",
+    "controller_of",
     "declared",
     "preset_purpose",
     "refuse_contradiction",
+    "refuse_other_controller",
     "settings_of",
 ]
 
@@ -141,6 +144,26 @@ def refuse_contradiction(run: RunSettings, method: Any, n_robots: int) -> None:
         )
 
 
+def controller_of(method: MethodEntry) -> str:
+    """Return the name of the controller that a method breeds unless the settings choose another."""
+    return method.controllers[0] if method.controllers else DEFAULT
+
+
+def refuse_other_controller(method: MethodEntry, controller: str, place: str) -> None:
+    """Raise UsageError if a method does not breed the genotypes of a controller.
+
+    Args:
+        method: of the run.
+        controller: its name.
+        place: where it was chosen, for the message.
+    """
+    if method.controllers and controller not in method.controllers:
+        raise UsageError(
+            f"controller.name = {shown(controller)} {place}: method {method.name!r} only works "
+            f"with {' or '.join(method.controllers)}"
+        )
+
+
 def declared(part: type[Any]) -> list[Setting]:
     """Return the settings of a dataclass, in the order of its fields."""
     hints = get_type_hints(part, include_extras=True)
@@ -168,7 +191,7 @@ def settings_of(config: RunConfig) -> list[tuple[str, Setting, Any]]:
         replace(one, default=of_environment.get(one.name, one.default)) for one in found["world"]
     ]
     found["controller"] = [
-        Setting("name", DEFAULT, "", ", ".join(CONTROLLERS), "kind of controller"),
+        _kind_of_controller(config.method_entry),
         *(replace(one, default=own.get(one.name, one.default)) for one in found["controller"]),
     ]
     return [
@@ -176,6 +199,12 @@ def settings_of(config: RunConfig) -> list[tuple[str, Setting, Any]]:
         for section, settings in found.items()
         for setting in settings
     ]
+
+
+def _kind_of_controller(method: MethodEntry) -> Setting:
+    """Return the setting that chooses a controller."""
+    allowed = ", ".join(method.controllers or CONTROLLERS)
+    return Setting("name", controller_of(method), "", allowed, "kind of controller")
 
 
 def preset_purpose(preset: str) -> str:

@@ -26,6 +26,8 @@ class MethodEntry:
         title: its name as published.
         summary: a description in one line.
         source: the publication that describes it.
+        controllers: the controllers whose genotypes it breeds, its default first; empty for a
+            method that breeds those of any controller.
     """
 
     name: str
@@ -34,6 +36,7 @@ class MethodEntry:
     source: str
     config_name: str
     method_name: str
+    controllers: tuple[str, ...] = ()
     module: str = ""
     file: str = ""
     files: tuple[str, ...] = ()

@@ -9,6 +9,7 @@ import re
 from dataclasses import is_dataclass
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 from conevo.evolution.methods.entry import MethodEntry
 from conevo.outside import entry_of, takes
@@ -30,6 +31,9 @@ def _problem(entry: MethodEntry, module: ModuleType) -> str:
     if not is_dataclass(getattr(module, entry.config_name)):
         return f"{entry.config_name} must be a dataclass, of the method's parameters"
     made = getattr(module, entry.method_name)
+    controllers: Any = entry.controllers
+    if not (isinstance(controllers, tuple) and all(isinstance(one, str) for one in controllers)):
+        return f'its controllers {controllers!r} must be a tuple of names, as in ("srn",)'
     missing = [name for name in FUNCTIONS if not callable(getattr(made, name, None))]
     if missing:
         return f"{entry.method_name} has no {', no '.join(missing)}"
