@@ -1,10 +1,25 @@
 """Fixtures that several folders of tests share."""
 
 import os
+import shutil
+import sys
+import tempfile
 from contextlib import contextmanager
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+
+CHILDREN = Path(__file__).parent / "children"
+HEADERS = "CONEVO_TEST_HEADERS"
+if is_first := not os.environ.get(HEADERS):  # not a worker of xdist, nor pytest within a test
+    os.environ[HEADERS] = tempfile.mkdtemp(prefix="conevo-headers-")
+    paths = (str(CHILDREN), os.environ.get("PYTHONPATH"))
+    os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, paths))
+    sys.path.insert(0, str(CHILDREN))  # some tests pass it on
+    spec = spec_from_file_location("conevo_test_headers", CHILDREN / "sitecustomize.py")
+    spec.loader.exec_module(module_from_spec(spec))  # for this process, too
 
 if os.environ.get("CONEVO_TEST_WARP_MODE"):  # "debug": array accesses out of bounds are errors
     import warp
@@ -18,6 +33,12 @@ def pytest_configure():
     Processes that tests start, and kill, do sync.
     """
     os.fsync = os.fstat  # refuses a handle that is not open, as the real one does
+
+
+def pytest_unconfigure():
+    """Remove the headers that the processes of the tests have shared."""
+    if is_first:
+        shutil.rmtree(os.environ.pop(HEADERS), ignore_errors=True)
 
 
 def pytest_collection_modifyitems(config, items):
@@ -52,16 +73,19 @@ def two_cards(monkeypatch):
 
 @pytest.fixture
 def cpu_blocks():
-    """Return a context in which Warp runs a block's lanes on the CPU (its experimental fibers)."""
+    """Return a context in which Warp runs a block's lanes on the CPU (its experimental fibers).
+
+    Only tests do so. Their kernels are not optimised, which compiles in a third of the time.
+    """
     import warp as wp
 
     @contextmanager
     def switched_on():
-        before = wp.config.enable_cpu_blocks
-        wp.config.enable_cpu_blocks = True
+        before = wp.config.enable_cpu_blocks, wp.config.optimization_level
+        wp.config.enable_cpu_blocks, wp.config.optimization_level = True, 0
         try:
             yield
         finally:
-            wp.config.enable_cpu_blocks = before
+            wp.config.enable_cpu_blocks, wp.config.optimization_level = before
 
     return switched_on

@@ -239,7 +239,8 @@ def test_following_the_recipes_adds_worlds_a_method_and_a_controller(tmp_path):
         elif mark == "preset":
             with (package / "runs" / "presets" / f"{name}.toml").open("a") as file:
                 file.write(f"\n{text}")
-    environment = os.environ | {"PYTHONPATH": str(tmp_path / "src")}
+    paths = (str(tmp_path / "src"), str(ROOT / "tests" / "children"))
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(paths)}
 
     def run(*arguments, code=0):
         done = subprocess.run(
@@ -265,7 +266,7 @@ def test_following_the_recipes_adds_worlds_a_method_and_a_controller(tmp_path):
     for folder, words, least in (
         # Eight for each world, but three are for Warp; nine for the method, ten for the controller.
         ("tests/contracts", "light-v1 or spread-v1 or random or complex-5 and linear", 32),
-        ("tests/runs", "kills and (light and homcne or random and rover)", 2),
+        ("tests/runs/test_resume.py", "kills and (light and homcne or random and rover)", 2),
     ):
         output = run("pytest", "-q", "-p", "no:cacheprovider", folder, "-k", words)
         found = re.search(r"(\d+) passed", output)

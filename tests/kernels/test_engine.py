@@ -20,6 +20,7 @@ from conevo.worlds.rollout import Rollout
 from conevo.worlds.simulators import has_own_simulator
 
 PACKAGE = Path(conevo.__file__).parent
+CHILDREN = Path(__file__).parents[1] / "children"
 PLAY = """
 import json, sys
 import numpy as np
@@ -41,7 +42,8 @@ print(json.dumps({"hash": rollout.fingerprint, "seen": sums}))
 
 def play(source: Path, cache: Path) -> dict:
     """Run the package at ``source`` in its own process, with compiled kernels in ``cache``."""
-    environment = os.environ | {"PYTHONPATH": str(source), "WARP_CACHE_PATH": str(cache)}
+    paths = os.pathsep.join((str(source), str(CHILDREN)))  # the headers of all children are shared
+    environment = os.environ | {"PYTHONPATH": paths, "WARP_CACHE_PATH": str(cache)}
     done = subprocess.run(
         [sys.executable, "-c", PLAY], env=environment, capture_output=True, text=True, check=True
     )
