@@ -11,6 +11,7 @@ import json
 import sys
 import tempfile
 from collections.abc import Iterator
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -74,49 +75,47 @@ def teams_of(sizes: tuple[int, int, int], robots: int, n: int) -> tuple[Any, Any
     return pool, rows
 
 
-def of_worlds() -> Iterator[tuple[str, str]]:
-    """Yield the outcomes of random teams in every world, and the record of one of them."""
-    for path, sizes in WORLDS.items():
-        world = conevo.world(path, iterations=ITERATIONS)
-        rollout = conevo.Rollout(world, n_threads=2)
-        pool, teams = teams_of(sizes, world.n_robots, 6)
-        kinds = np.full(teams.shape[:2], -1, np.int32)
-        kinds[4] = np.arange(world.n_robots) % len(world.heuristics)
-        kinds[5, 0] = 0
-        scenarios = world.scenarios([3, 4, 5])
-        seen = rollout.evaluate(pool, teams, scenarios, kinds)
-        name = Path(path).name
-        performance = [seen.performance[key] for key in sorted(seen.performance)]
-        yield f"{name} evaluate", digest(seen.fitness, seen.counts, seen.switches, *performance)
-        record = rollout.record(pool, teams[1], world.scenarios([3]))
-        kept = [key for key in sorted(record) if key not in ("inputs", "sums", "outputs", "hidden")]
-        yield f"{name} record", digest(*(record[key] for key in kept))
+def of_world(path: str) -> Iterator[tuple[str, str]]:
+    """Yield the outcomes of random teams in a world, and the record of one of them."""
+    sizes, world = WORLDS[path], conevo.world(path, iterations=ITERATIONS)
+    rollout = conevo.Rollout(world, n_threads=2)
+    pool, teams = teams_of(sizes, world.n_robots, 6)
+    kinds = np.full(teams.shape[:2], -1, np.int32)
+    kinds[4] = np.arange(world.n_robots) % len(world.heuristics)
+    kinds[5, 0] = 0
+    scenarios = world.scenarios([3, 4, 5])
+    seen = rollout.evaluate(pool, teams, scenarios, kinds)
+    name = Path(path).name
+    performance = [seen.performance[key] for key in sorted(seen.performance)]
+    yield f"{name} evaluate", digest(seen.fitness, seen.counts, seen.switches, *performance)
+    record = rollout.record(pool, teams[1], world.scenarios([3]))
+    kept = [key for key in sorted(record) if key not in ("inputs", "sums", "outputs", "hidden")]
+    yield f"{name} record", digest(*(record[key] for key in kept))
 
 
-def of_methods() -> Iterator[tuple[str, str]]:
-    """Yield the results of five generations of a tiny run of every method."""
-    for task, world in RUNS.items():
-        for method in METHODS:
-            known = conevo.METHODS[method].config_class.__dataclass_fields__
-            settings = {"run.generations": 5, "run.epochs": 2, "run.fittest_epochs": 2} | world
-            settings |= {"method.genotypes": 6, "run.n_tests": 2, "run.n_validations": 2}
-            settings |= {f"method.{k}": v for k, v in RESTLESS.items() if k in known}
-            with tempfile.TemporaryDirectory() as folder:
-                run = conevo.evolve(task, method, "smoke", 7, f"{folder}/run", overrides=settings)
-                lines = [line | {"seconds": 0} for line in run.generations()]
-                team, tested = run.champion, run.test_result
-            assert team is not None
-            assert tested is not None
-            tables = [*lines, tested["champion"], tested["generation_0"]]
-            likes = [{key: table.pop(key) for key in LIKES if key in table} for table in tables]
-            told = written([lines, tested])
-            yield f"{task} {method}", digest(team.genes, team.active, team.fitness, told)
-            yield f"{task} {method} favourites", digest(written(likes))
+def of_method(task: str, method: str) -> Iterator[tuple[str, str]]:
+    """Yield the results of five generations of a tiny run of a method."""
+    known = conevo.METHODS[method].config_class.__dataclass_fields__
+    settings = {"run.generations": 5, "run.epochs": 2, "run.fittest_epochs": 2} | RUNS[task]
+    settings |= {"method.genotypes": 6, "run.n_tests": 2, "run.n_validations": 2}
+    settings |= {f"method.{k}": v for k, v in RESTLESS.items() if k in known}
+    with tempfile.TemporaryDirectory() as folder:
+        run = conevo.evolve(task, method, "smoke", 7, f"{folder}/run", overrides=settings)
+        lines = [line | {"seconds": 0} for line in run.generations()]
+        team, tested = run.champion, run.test_result
+    assert team is not None
+    assert tested is not None
+    tables = [*lines, tested["champion"], tested["generation_0"]]
+    likes = [{key: table.pop(key) for key in LIKES if key in table} for table in tables]
+    told = written([lines, tested])
+    yield f"{task} {method}", digest(team.genes, team.active, team.fitness, told)
+    yield f"{task} {method} favourites", digest(written(likes))
 
 
 def outcomes() -> dict[str, str]:
     """Return the digest of everything."""
-    return dict([*of_worlds(), *of_methods()])
+    runs = (of_method(task, method) for task in RUNS for method in METHODS)
+    return dict(chain(*map(of_world, WORLDS), *runs))
 
 
 if __name__ == "__main__":
