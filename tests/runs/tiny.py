@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import multiprocessing
 import os
 import random
 import signal
@@ -10,14 +11,18 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 import conevo
+from conevo.cli.main import main
 from conevo.worlds.registry import resolve as resolve_world
 
+FORKS = multiprocessing.get_context("forkserver")  # loads Warp once for all processes
+FORKS.set_forkserver_preload(["conevo.cli.main", "conevo.runs.start", "conevo.worlds.rollout"])
 TASK = "rover/complex-1"
 TASKS = [f"{entry.short_name}/{entry.environments[-1]}" for entry in conevo.WORLDS.values()]
 TINY: dict[str, Any] = {
@@ -85,26 +90,27 @@ def wait_for(condition: Callable[[], bool], seconds: float = 60) -> None:
 
 
 def kill_twice(path: Path, arguments: list[str]) -> list[int]:
-    """Make a run of 60 generations, killed in two of the first 45; return these two."""
-    kills = sorted(random.choices(range(45), k=2))
+    """Make a run of 40 generations, killed in two of the first 25; return these two."""
+    kills = sorted(random.choices(range(25), k=2))
     for generation in kills:
-        process = spawn(*arguments, "--quiet")
+        process = FORKS.Process(target=main, args=([*arguments, "--quiet", "--threads", "1"],))
+        process.start()
         wait_for(lambda: is_past(path, process, generation))  # noqa: B023 (called at once)
         time.sleep(random.uniform(0, 0.02))
         process.kill()
-        assert process.wait() == -signal.SIGKILL, process.communicate()
+        process.join()
+        assert process.exitcode == -signal.SIGKILL
         assert conevo.Run(path).status == "interrupted"
         arguments = ["resume", str(path)]
     return kills
 
 
-def is_past(path: Path, process: subprocess.Popen[str], generation: int) -> bool:
+def is_past(path: Path, process: subprocess.Popen[str] | BaseProcess, generation: int) -> bool:
     """Whether a process has ended, or runs and has finished a number of generations."""
     lock, log = path / "lock", path / "generations.jsonl"
     is_running = lock.exists() and lock.read_text() == f"process {process.pid}"
-    return process.poll() is not None or (
-        is_running and log.read_bytes().count(b"\n") >= generation
-    )
+    ended = process.poll() if isinstance(process, subprocess.Popen) else process.exitcode
+    return ended is not None or (is_running and log.read_bytes().count(b"\n") >= generation)
 
 
 def content(path: Path) -> dict[str, Any]:

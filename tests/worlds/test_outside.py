@@ -109,9 +109,9 @@ def test_a_world_outside_evolves_and_resumes_after_kills_bit_for_bit(
     light: Path, tmp_path: Path
 ) -> None:
     task = f"{light}:dark-1"
-    whole = evolve_tiny(tmp_path / "whole", "cone", task, run__generations=60)
+    whole = evolve_tiny(tmp_path / "whole", "cone", task, run__generations=40)
     path = tmp_path / "killed"
-    kills = kill_twice(path, command(path, "cone", task, run__generations=60))
+    kills = kill_twice(path, command(path, "cone", task, run__generations=40))
     conevo.Run(path).resume(threads=2)
     assert content(path) == content(whole.path), kills
     assert conevo.Run(path).test(4)["labels"] == whole.test(4)["labels"]
