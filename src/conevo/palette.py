@@ -80,6 +80,8 @@ METHODS: dict[str, Look] = {
     "cone-3": Look(7, "#8f755a", "#6b4e30"),
     "cone-es": Look(8, "#cfacfb", "#7e1c67"),
     "hom-es": Look(9, "#a5bd9c", "#7fa75c"),
+    "esp": Look(10, "#c3ddf2", "#3f7fb5"),
+    "cosyne": Look(11, "#f7d8a8", "#b9822b"),
 }
 """The look of every method of the registry."""
 

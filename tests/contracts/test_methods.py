@@ -49,10 +49,13 @@ def variants():
         entry = resolve(name)
         names = {field.name for field in fields(entry.config_class)}
         small = {"genotypes": GENOTYPES, "elite_portion": 0.5, "pairs": 2 * ROUNDS}
-        small |= dict.fromkeys(("stagnation_v", "stagnation_w", "stagnation_y"), 1)
+        small |= dict.fromkeys(("stagnation_v", "stagnation_w", "stagnation_y", "stagnation"), 1)
         config = {key: value for key, value in small.items() if key in names}
         if "evaluation" not in names:
-            yield name, config | ({"rounds": ROUNDS} if "pairs" in names else {})
+            config |= {"rounds": ROUNDS} if "rounds" in names else {}
+            yield name, config
+            if "team" in names:
+                yield name, config | {"team": "whole"}
             continue
         for evaluation in ("systematic", "shared"):
             yield name, {**config, "evaluation": evaluation, "rounds": ROUNDS}
@@ -69,7 +72,7 @@ IDS = [
             None,
             [
                 name_in(name),
-                config.get("evaluation", "single"),
+                config.get("evaluation", config.get("team", "single")),
                 config.get("type_c"),
                 config.get("sd"),
             ],
@@ -78,6 +81,13 @@ IDS = [
     for name, config in VARIANTS
 ]
 every_variant = pytest.mark.parametrize(("name", "config"), VARIANTS, ids=IDS)
+
+
+ADAPTS = ("stagnation_y", "stagnation")  # settings of methods whose controllers change size
+
+
+def adapts(config):
+    return any(name in config for name in ADAPTS)
 
 
 def build(name, config):
@@ -290,8 +300,7 @@ def test_genotypes_stay_in_range_and_empty_slots_empty(name, config):
         assert not state.genes[~state.active].any()
         assert state.active.sum(axis=1).tolist() == state.progress.n_hidden.tolist()
         sizes.update(state.progress.n_hidden.tolist())
-    adapts = "stagnation_y" in config
-    assert (sizes == {3}) == (not adapts)
+    assert (sizes == {3}) == (not adapts(config))
     assert min(sizes) >= 2
 
 
@@ -304,14 +313,19 @@ def test_every_genotype_is_tried_the_promised_number_of_times(name, config):
         if state.phase != "genotypes":
             continue
         own = np.arange(state.genes[..., 0].size).reshape(state.genes.shape[:3])
-        if config.get("evaluation") == "shared":
+        if config.get("evaluation", "shared" if "rounds" in config else "") == "shared":
             played = np.bincount(trials.teams[trials.teams >= 0], minlength=own.size)
-            expected = np.where(state.active[:, :, None], ROUNDS, 0)
+            clones = LAYOUT.n_robots // len(state.active)  # R if all robots have one network
+            expected = np.where(state.active[:, :, None], ROUNDS * clones, 0)
             np.testing.assert_array_equal(played.reshape(own.shape), expected + 0 * own)
             assert len(trials.teams) == ROUNDS * GENOTYPES
             continue
         # Robot r of team n scores n + r / 8: fitness identifies the robot and the team on trial.
         told = learner.tell(state, trials, Scores(n + r / 8, 0.0 * n))
+        if config.get("team") == "whole":  # a genotype is one of each population
+            np.testing.assert_array_equal(trials.teams[:, :, 0], own[:, 0].T)
+            np.testing.assert_array_equal(told.fitness, [np.arange(GENOTYPES) + 1 / 8] * 3)
+            continue
         tried = told.fitness[np.isfinite(told.fitness)]
         team = np.floor(tried).astype(int)
         assert sorted(team) == list(range(len(trials.teams)))
@@ -334,7 +348,7 @@ def test_the_phases_of_a_generation(name, config):
     phases = {state.phase for state in states}
     has_type_c = name.startswith("cone") and config.get("type_c") != "off"
     assert ("elites" in phases) == has_type_c
-    assert ("lesion" in phases) == ("stagnation_y" in config)
+    assert ("lesion" in phases) == adapts(config)
 
 
 @populations

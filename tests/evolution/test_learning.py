@@ -1,5 +1,7 @@
 """Every method learns a separable function through ask and tell, without a world."""
 
+from dataclasses import fields
+
 import numpy as np
 import pytest
 
@@ -10,10 +12,11 @@ LAYOUT = Layout(n_robots=3, n_hidden=3, max_hidden=3, n_genes=5)
 CASES = [
     *((name, {"genotypes": 60}, 40) for name in ("homcne", "hetcne")),
     *((name, {"pairs": 50}, 40) for name in ("cone-es", "hom-es")),
+    *((name, {"team": team}, 60) for name in ("esp", "cosyne") for team in ("clones", "whole")),
     *(
         (name, {"genotypes": 20, "evaluation": evaluation, "rounds": 5}, 40)
-        for name in METHODS
-        if name not in ("homcne", "hetcne", "cone-es", "hom-es")
+        for name, entry in METHODS.items()
+        if "evaluation" in {field.name for field in fields(entry.config_class)}
         for evaluation in ("systematic", "shared")
     ),
 ]
@@ -22,7 +25,7 @@ CASES = [
 @pytest.mark.parametrize(("name", "config", "generations"), CASES)
 def test_error_halves(name, config, generations):
     target = np.random.default_rng(0).uniform(-1, 1, (3, 3, 5))
-    if name in ("homcne", "hetcne", "hom-es"):
+    if name in ("homcne", "hetcne", "hom-es") or config.get("team") == "clones":
         target[:] = target[0]  # clones can only learn one target
     if "genotypes" in config:
         config = config | {"elite_portion": 0.25}

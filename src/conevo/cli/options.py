@@ -26,8 +26,8 @@ PLACE = "on the command line"
 settings_only = all_of(
     click.option(
         "--method", metavar="NAME",
-        help="cone (default), mesp, ccga, hetcne, homcne, cone-1..3, cone-es, hom-es, or "
-        "FILE.py:NAME.",
+        help="cone (default), mesp, ccga, hetcne, homcne, cone-1..3, cone-es, hom-es, esp, "
+        "cosyne, or FILE.py:NAME.",
     ),
     click.option(
         "--preset", metavar="NAME", help="smoke (seconds), desk (minutes, default), night, thesis."

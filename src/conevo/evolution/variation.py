@@ -11,10 +11,21 @@ from typing import Annotated
 import numpy as np
 from annotated_types import Ge, Gt, Le
 
+from conevo.evolution.population import ranking
 from conevo.evolution.protocol import FloatArray, IntArray
 from conevo.parameters import parameters
 
-__all__ = ["VariationConfig", "across", "breed", "crossover", "mutate", "perturb", "within"]
+__all__ = [
+    "VariationConfig",
+    "across",
+    "breed",
+    "crossover",
+    "mutate",
+    "perturb",
+    "replaced",
+    "upward",
+    "within",
+]
 
 
 @parameters("method")
@@ -91,6 +102,36 @@ def across(
     rank = np.arange(n_children) % elites.shape[1]
     a, b = (elites[pairs[:, side][:, None], rank] for side in (0, 1))
     return crossover(a, b, generator)
+
+
+def upward(elites: FloatArray, generator: np.random.Generator) -> tuple[FloatArray, FloatArray]:
+    """Return both children [S, L, G] of each elite and a random fitter one.
+
+    Moriarty and Miikkulainen 1996 (SANE), Gomez and Miikkulainen 1997 (ESP). Choice: the fittest,
+    which has no fitter one, mates with the second.
+
+    Args:
+        elites: [S, L, G], the fittest first, L >= 2.
+        generator: the source of partners and crossover points.
+    """
+    n_units, n_elite, _ = elites.shape
+    mate = generator.integers(np.maximum(np.arange(n_elite), 1), size=(n_units, n_elite))
+    mate[:, 0] = 1
+    return crossover(elites, elites[np.arange(n_units)[:, None], mate], generator)
+
+
+def replaced(genes: FloatArray, fitness: FloatArray, children: FloatArray) -> FloatArray:
+    """Return units [S, M, G] in which children [S, C, G] have replaced the least fit genotypes.
+
+    Args:
+        genes: [S, M, G].
+        fitness: [S, M]; one that is not finite is the least fit.
+        children: C <= M of them, the first in place of the least fit.
+    """
+    order = ranking(fitness)[:, ::-1][:, : children.shape[1]]
+    found = genes.copy()
+    np.put_along_axis(found, order[..., None].astype(np.intp), children, axis=1)
+    return found
 
 
 def mutate(

@@ -107,6 +107,24 @@ METHODS: dict[str, MethodEntry] = {
             config_name="HomEsConfig",
             method_name="ConeEs",
         ),
+        MethodEntry(
+            name="esp",
+            title="ESP",
+            summary="a sub-population per hidden neuron of one network, bursts on stagnation",
+            source="Gomez and Miikkulainen 1997, 1999; Nitschke 2009, section 2.3.3",
+            module="conevo.evolution.methods.esp",
+            config_name="EspConfig",
+            method_name="Esp",
+        ),
+        MethodEntry(
+            name="cosyne",
+            title="CoSyNE",
+            summary="a sub-population per connection weight of one network, permuted by fitness",
+            source="Gomez, Schmidhuber and Miikkulainen 2008",
+            module="conevo.evolution.methods.cosyne",
+            config_name="CosyneConfig",
+            method_name="Cosyne",
+        ),
     )
 }
 
