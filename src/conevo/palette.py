@@ -82,6 +82,7 @@ METHODS: dict[str, Look] = {
     "hom-es": Look(9, "#a5bd9c", "#7fa75c"),
     "esp": Look(10, "#c3ddf2", "#3f7fb5"),
     "cosyne": Look(11, "#f7d8a8", "#b9822b"),
+    "neat": Look(12, "#9838f9", "#7f0cf2"),
 }
 """The look of every method of the registry."""
 

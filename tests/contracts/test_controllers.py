@@ -27,6 +27,7 @@ SETTINGS = {
     ),
     "gru": ({"n_hidden": 16, "max_hidden": 32, "weight_scale": 1.5},),
     "ctrnn": ({"n_hidden": 16, "max_hidden": 32, "weight_scale": 1.5, "slowest": 1.0},),
+    "graph": ({"max_hidden": 0}, {"max_hidden": 31, "weight_scale": 3.0}),
 }
 CASES = [
     pytest.param((path, name, settings), id=f"{Path(path).name}-{name}-{k}")

@@ -12,12 +12,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from conevo.controllers.registry import controller
 from conevo.evolution import METHODS, Layout, Scores, method
 from conevo.evolution.generation import Populations
 from conevo.evolution.methods.registry import name_in, resolve
 from conevo.runs.checkpoint import difference, load_like, refuse_unkept, save
 
 LAYOUT = Layout(n_robots=3, n_hidden=3, max_hidden=5, n_genes=4)
+SIZES = {"graph": {"max_hidden": 2}}  # of controllers that some methods need
 GENOTYPES = 6
 ROUNDS = 4
 EXCHANGE = {  # every option of the exchange between populations
@@ -50,6 +52,7 @@ def variants():
         names = {field.name for field in fields(entry.config_class)}
         small = {"genotypes": GENOTYPES, "elite_portion": 0.5, "pairs": 2 * ROUNDS}
         small |= dict.fromkeys(("stagnation_v", "stagnation_w", "stagnation_y", "stagnation"), 1)
+        small |= {"new_node": 0.5, "new_connection": 0.5}
         config = {key: value for key, value in small.items() if key in names}
         if "evaluation" not in names:
             config |= {"rounds": ROUNDS} if "rounds" in names else {}
@@ -94,6 +97,16 @@ def build(name, config):
     return method(name, **config)
 
 
+def layout_of(learner):
+    """Return sizes that the method accepts: those of its own controller if it needs one."""
+    entry = METHODS.get(learner.name)
+    if entry is None or not entry.controllers:
+        return LAYOUT
+    name, (inputs, outputs) = entry.controllers[0], (10, 2)
+    genome = controller(name, **SIZES.get(name, {})).genome(inputs, outputs)
+    return Layout(3, genome.n_parts, genome.max_parts, genome.n_genes, inputs, outputs)
+
+
 def judge(trials):
     """Return scores that depend on the networks and fall with time: controllers stagnate."""
     networks = trials.networks().astype(np.float64)
@@ -103,7 +116,7 @@ def judge(trials):
 
 def run(learner, generations, root=3, score=judge, state=None):
     """Return the states after every request."""
-    state = learner.init(LAYOUT, root) if state is None else state
+    state = learner.init(layout_of(learner), root) if state is None else state
     states = [state]
     while state.progress.generation < generations:
         trials = learner.ask(state)
@@ -169,13 +182,14 @@ def test_state_is_plain_and_keeps_its_types(name, config):
 @every_variant
 def test_teams_are_rows_of_a_pool_of_genotypes_in_range(name, config):
     learner = build(name, config)
+    layout = layout_of(learner)
     for state in run(learner, 8):
         trials = learner.ask(state)
         assert trials.generation == state.progress.generation
         assert trials.teams.dtype == np.int32
         assert trials.genes.dtype == np.float32
-        assert trials.teams.shape[1:] == (LAYOUT.n_robots, LAYOUT.max_hidden)
-        assert trials.genes.shape[1:] == (LAYOUT.n_genes,)
+        assert trials.teams.shape[1:] == (layout.n_robots, layout.max_hidden)
+        assert trials.genes.shape[1:] == (layout.n_genes,)
         assert ((trials.teams >= -1) & (trials.teams < len(trials.genes))).all()
         assert (trials.teams >= 0).any(axis=2).all()  # nobody is without a neuron
         assert np.abs(trials.genes).max() <= 1
@@ -223,7 +237,9 @@ def test_a_stored_state_resumes_bit_for_bit(name, config, tmp_path):
     states = run(learner, 6)
     for stop in (1, len(states) // 2):
         save(tmp_path / "state.npz", states[stop], {"method": name})
-        stored = load_like(learner.init(LAYOUT, 3), tmp_path / "state.npz", {"method": name})
+        stored = load_like(
+            learner.init(layout_of(learner), 3), tmp_path / "state.npz", {"method": name}
+        )
         assert_same(stored, states[stop])
         assert_same(run(learner, 6, state=stored)[-1], states[-1])
 
@@ -287,7 +303,7 @@ populations = pytest.mark.parametrize(
     [
         pytest.param(name, config, id=label)
         for (name, config), label in zip(VARIANTS, IDS, strict=True)
-        if isinstance(build(name, config).init(LAYOUT, 1), Populations)
+        if isinstance(build(name, config).init(layout_of(build(name, config)), 1), Populations)
     ],
 )
 

@@ -73,6 +73,7 @@ def test_thesis_preset_has_the_sizes_of_the_thesis() -> None:
         task = f"{world}/{WORLDS[world].environments[0]}"
         teams = resolve(task, "homcne", "thesis").method_config.genotypes
         assert {2 * resolve(task, name, "thesis").method_config.pairs for name in OURS} == {teams}
+        assert resolve(task, "neat", "thesis").method_config.genotypes == teams
     run = resolve(TASK, "cone", "thesis").run
     assert (run.generations, run.epochs) == (250, 10)
 

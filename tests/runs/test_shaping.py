@@ -59,6 +59,10 @@ def genes(path: Path) -> np.ndarray:
             return archive["field.genes"]
         if archive["field.progress.fittest_active"].any():
             return archive["field.progress.fittest_genes"]
+        if "field.graphs.genes" in archive:  # clones of the first genotype
+            first, on = archive["field.graphs.genes"][0], archive["field.graphs.enabled"][0]
+            first[:, : on.shape[1]] *= on
+            return np.broadcast_to(first, archive["field.progress.fittest_genes"].shape)
         return archive["field.mean"] + archive["field.deviations"]
 
 

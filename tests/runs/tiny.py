@@ -19,6 +19,8 @@ import numpy as np
 
 import conevo
 from conevo.cli.main import main
+from conevo.controllers.registry import CONTROLLERS
+from conevo.runs.settings import controller_of
 from conevo.worlds.registry import resolve as resolve_world
 
 FORKS = multiprocessing.get_context("forkserver")  # loads Warp once for all processes
@@ -40,6 +42,7 @@ TINY: dict[str, Any] = {
 }
 # Windows of one generation, so that thresholds and controller sizes change within five.
 RESTLESS = {"stagnation_v": 1, "stagnation_w": 1, "stagnation_y": 1, "gst": 1.0, "sst": 1.0}
+RESTLESS |= {"new_node": 0.5, "new_connection": 0.5}
 
 
 def tiny_settings(method: str, task: str = TASK, **changes: Any) -> dict[str, Any]:
@@ -48,6 +51,11 @@ def tiny_settings(method: str, task: str = TASK, **changes: Any) -> dict[str, An
     restless = {f"method.{key}": value for key, value in RESTLESS.items() if key in known}
     world = resolve_world(task)[0].params_class.__dataclass_fields__
     tiny = {k: v for k, v in TINY.items() if k[:6] != "world." or k[6:] in world}
+    mind = CONTROLLERS[controller_of(conevo.METHODS[method])].settings_class
+    no = {f"controller.{k}" for k in ("n_hidden", "max_hidden")} - {
+        f"controller.{k}" for k in mind.__dataclass_fields__
+    }
+    tiny = {k: v for k, v in tiny.items() if k not in no}
     small = conevo.world(task, **{k[6:]: v for k, v in tiny.items() if k[:6] == "world."})
     tiny["method.genotypes"] = max(tiny["method.genotypes"], small.n_robots)  # HetCNE's minimum
     if "genotypes" not in known:

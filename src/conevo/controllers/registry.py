@@ -76,6 +76,13 @@ CONTROLLERS: dict[str, ControllerEntry] = {
             "Cho et al. 2014, section 2.3",
             "gru:Gru",
         ),
+        ControllerEntry(
+            "graph",
+            "Network of any topology",
+            "nodes with any connections, feed-forward or recurrent, for methods that evolve them",
+            "Stanley and Miikkulainen 2002",
+            "graph:Graph",
+        ),
     )
 }
 

@@ -125,6 +125,16 @@ METHODS: dict[str, MethodEntry] = {
             config_name="CosyneConfig",
             method_name="Cosyne",
         ),
+        MethodEntry(
+            name="neat",
+            title="NEAT",
+            summary="networks that start minimal and grow, in species; clones or whole teams",
+            source="Stanley and Miikkulainen 2002",
+            module="conevo.evolution.methods.neat",
+            config_name="NeatConfig",
+            method_name="Neat",
+            controllers=("graph",),
+        ),
     )
 }
 
