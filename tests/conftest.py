@@ -1,6 +1,7 @@
 """Fixtures that several folders of tests share."""
 
 import os
+import re
 import shutil
 import sys
 import tempfile
@@ -42,14 +43,18 @@ def pytest_unconfigure():
 
 
 def pytest_collection_modifyitems(config, items):
-    """Leave out tests that take minutes, and in parallel those that need their own cores.
+    """Leave out slow tests, those that take minutes, and in parallel those that need their cores.
 
-    Unless ``-m`` selects them by name.
+    Unless ``-m`` names their mark. CI sets ``CONEVO_TEST_SLOW``, so that slow tests run.
     """
-    asked = config.option.markexpr
-    left_out = {"exhaustive"} | ({"timing"} if hasattr(config, "workerinput") else set())
-    left_out = {mark for mark in left_out if mark not in asked}
-    gone = [item for item in items if any(item.get_closest_marker(mark) for mark in left_out)]
+    asked = set(re.findall(r"\w+", config.option.markexpr))
+    never = {"exhaustive"} | ({"timing"} if hasattr(config, "workerinput") else set())
+    gone = []
+    for item in items:
+        marks = {mark.name for mark in item.iter_markers()}
+        is_slow = "slow" in marks and not (marks & asked or os.environ.get("CONEVO_TEST_SLOW"))
+        if is_slow or marks & (never - asked):
+            gone.append(item)
     if gone:
         config.hook.pytest_deselected(items=gone)
         items[:] = [item for item in items if item not in set(gone)]

@@ -90,7 +90,8 @@ def test_every_parameter_of_a_world_is_explained(entry):
 
 
 SLOW = {
-    f"docs/{name}.md": pytest.mark.slow for name in ("quickstart", "python", "replay", "export")
+    f"docs/{name}.md": pytest.mark.slow
+    for name in ("campaigns", "export", "python", "quickstart", "replay", "worlds")
 }
 
 

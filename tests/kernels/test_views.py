@@ -43,6 +43,7 @@ def test_the_smallest_arrays_lie_near_as_many_as_fit(limit, small, other):
     assert near_arrays(SHAPES, limit) == {Small: small, Other: other}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("limit", [600, 24 * 1024])
 def test_near_arrays_compile_for_cuda_and_change_no_result(limit, tmp_path):
     from contracts.test_worlds import assert_same_bits, random_teams

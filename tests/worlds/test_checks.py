@@ -342,6 +342,7 @@ def test_the_line_is_the_one_that_reads_not_the_previous_one(name: str, tmp_path
     assert found == [f"{file}:{at}: {words} an index lies outside its array"]
 
 
+@pytest.mark.slow
 def test_a_check_without_progress_is_ended(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
