@@ -267,7 +267,7 @@ def test_following_the_recipes_adds_worlds_a_method_and_a_controller(tmp_path):
     for folder, words, least in (
         # Eight for each world, but three are for Warp; nine for the method, ten for the controller.
         ("tests/contracts", "light-v1 or spread-v1 or random or complex-5 and linear", 32),
-        ("tests/runs/test_resume.py", "kills and (light and homcne or random and rover)", 2),
+        ("tests/runs/test_resume.py", "kills and (light and homcne or random-search and rover)", 2),
     ):
         output = run("pytest", "-q", "-p", "no:cacheprovider", folder, "-k", words)
         found = re.search(r"(\d+) passed", output)
