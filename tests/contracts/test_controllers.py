@@ -28,6 +28,16 @@ SETTINGS = {
     "gru": ({"n_hidden": 16, "max_hidden": 32, "weight_scale": 1.5},),
     "ctrnn": ({"n_hidden": 16, "max_hidden": 32, "weight_scale": 1.5, "slowest": 1.0},),
     "graph": ({"max_hidden": 0}, {"max_hidden": 31, "weight_scale": 3.0}),
+    "thresholds": ({"stimulus": "input", "theta": 0.3, "xi": 0.125, "phi": 0.01, "steepness": 3},),
+    "rules": (
+        {
+            "conditions": "intervals",
+            "conflict": "priority",
+            "dont_care": 0.3,
+            "n_rules": 3,
+            "max_rules": 40,
+        },
+    ),
 }
 CASES = [
     pytest.param((path, name, settings), id=f"{Path(path).name}-{name}-{k}")

@@ -22,6 +22,7 @@ OTHERS = {
             {"n_hidden": 16, "max_hidden": 32, "weight_scale": 1.5, "bias": True}),
     "ctrnn": ({"n_hidden": 16, "max_hidden": 32, "weight_scale": 1.5, "slowest": 1.0},),
     "gru": ({"n_hidden": 16, "max_hidden": 32, "weight_scale": 1.5},),
+    "thresholds": ({"stimulus": "input", "theta": 0.3, "steepness": 3, "gain": 16.0},),
 }  # fmt: skip
 
 
@@ -42,7 +43,7 @@ def assert_bits(case, folder, ending):
 
 
 def test_the_controllers_of_the_package_are_exported():
-    assert set(CONTROLLERS) >= set(KINDS) == set(OTHERS) == {"srn", "ctrnn", "gru"}
+    assert set(CONTROLLERS) >= set(KINDS) == set(OTHERS) == {"srn", "ctrnn", "gru", "thresholds"}
 
 
 @pytest.mark.parametrize("ending", FORMATS)

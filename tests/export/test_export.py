@@ -171,7 +171,7 @@ def test_a_run_without_a_team_and_a_controller_without_equations(run, say, monke
     said = say("export", str(run.path), "--to", "team.py")
     assert said.err == (
         "conevo: error: controller 'own' cannot be exported: its equations are not in "
-        "conevo/export/networks.py (known: srn, ctrnn, gru)\n"
+        "conevo/export/networks.py (known: srn, ctrnn, gru, thresholds)\n"
     )
     assert said.code == 2
     monkeypatch.undo()

@@ -83,6 +83,20 @@ CONTROLLERS: dict[str, ControllerEntry] = {
             "Stanley and Miikkulainen 2002",
             "graph:Graph",
         ),
+        ControllerEntry(
+            "thresholds",
+            "Response thresholds",
+            "tasks, each with a stimulus and a threshold, of which the strongest response wins",
+            "Bonabeau et al. 1996; Theraulaz et al. 1998; Nitschke 2009, section 2.2.2",
+            "thresholds:ResponseThresholds",
+        ),
+        ControllerEntry(
+            "rules",
+            "Classifier system",
+            "rules with a condition and an action, of which one acts",
+            "Smith 1980; Potter et al. 1995; Nitschke 2009, section 2.2.5",
+            "rules:RuleSet",
+        ),
     )
 }
 

@@ -39,7 +39,7 @@ __all__ = [
 ]
 
 Floats = npt.NDArray[np.float32]
-OPERATORS = {"+": operator.add, "-": operator.sub, "*": operator.mul}
+OPERATORS = {"+": operator.add, "-": operator.sub, "*": operator.mul, "/": operator.truediv}
 
 # The kernels' sigmoid(a) is 1/2 + 1/2 h p(h^2) / q(h^2), with h = a / 2 between -limit and limit.
 sigmoid_limit = float(LIMIT)
@@ -82,7 +82,7 @@ class Arithmetic(Protocol):
         """Return the kernels' sigmoid of every element."""
 
     def each(self, name: str, first: Any, sign: str, second: Any) -> Any:
-        """Return the sum ("+"), difference ("-") or product ("*") of every element."""
+        """Return the sum, difference, product or quotient (``OPERATORS``) of every element."""
 
 
 class NumpyArithmetic:
@@ -124,6 +124,6 @@ class NumpyArithmetic:
         return sigmoid_of(values)
 
     def each(self, name: str, first: Floats, sign: str, second: Floats) -> Floats:
-        """Return the sum, difference or product."""
+        """Return the sum, difference, product or quotient."""
         result: Floats = OPERATORS[sign](first, second)
         return result

@@ -79,7 +79,7 @@ class CLines:
         return self._array(name, values.columns, f"NAME_sigmoid({values.at_u})")
 
     def each(self, name: str, first: CValue, sign: str, second: CValue) -> CValue:
-        """Write the sum, difference or product."""
+        """Write the sum, difference, product or quotient."""
         columns = max(first.columns, second.columns)
         return self._array(name, columns, f"{first.at_u} {sign} {second.at_u}")
 

@@ -3,6 +3,9 @@
 The operations are those of the kernels, in the same order, and so are their results. Weights are
 numbers of their own: genes times ``weight_scale``, zeros in empty slots. Slots after the last
 neuron of a team are left out.
+
+Sets of rules, and thresholds that are learned, have no equations here, since they compare numbers:
+files have arithmetic alone.
 """
 
 from __future__ import annotations
@@ -60,7 +63,7 @@ def network_of(
         n_outputs: O.
 
     Raises:
-        UsageError: a kind of controller without equations here.
+        UsageError: a kind of controller, or a setting, without equations here.
     """
     if controller.name not in KINDS:
         raise UsageError(
@@ -69,7 +72,8 @@ def network_of(
         )
     settings: Any = controller
     filled = np.flatnonzero(active.any(axis=0))
-    used = max(int(filled[-1]) + 1 if filled.size else 1, settings.n_hidden)
+    n_parts = controller.genome(n_inputs, n_outputs).n_parts
+    used = max(int(filled[-1]) + 1 if filled.size else 1, n_parts)
     genes, active = genes[:, :used], active[:, :used]
     scaled = np.where(active[..., None], np.float32(settings.weight_scale) * genes, np.float32(0))
     weights, n_context, equations = KINDS[controller.name](
@@ -172,4 +176,46 @@ def _gru(
     return weights, used, equations
 
 
-KINDS = {"srn": _srn, "ctrnn": _ctrnn, "gru": _gru}
+def _thresholds(
+    settings: Any, scaled: Floats, genes: Floats, filled: Floats, n_inputs: int
+) -> tuple[dict[str, Floats], int, Equations]:
+    """Response thresholds that do not change; there is no context.
+
+    Raises:
+        UsageError: thresholds that are learned.
+    """
+    if settings.is_learning:
+        raise UsageError(
+            f"controller.xi = {settings.xi} and controller.phi = {settings.phi}: thresholds that "
+            f"are learned cannot be exported, only those with xi = phi = 0"
+        )
+    n_factors = settings.steepness - 1
+
+    def equations(ops: Arithmetic, observations: Any, context: Any) -> tuple[Any, Any]:
+        drive = ops.weighted("drive", "w_in", observations, ops.weight("bias"))
+        stimulus = above = ops.sigmoid("stimulus", drive)
+        for k in range(n_factors):
+            above = ops.each(f"power_{k + 2}", above, "*", stimulus)
+        total = ops.each("total", above, "+", ops.weight("theta"))
+        quotient = ops.each("quotient", above, "/", total)
+        response = ops.each("response", quotient, "*", ops.weight("filled"))
+        twice = ops.each("twice", ops.number(2), "*", response)
+        balance = ops.each("balance", twice, "-", ops.number(1))
+        return ops.each("outputs", ops.weight("gain"), "*", balance), context
+
+    w_in, bias, theta = settings.tasks(genes, n_inputs)
+    below = theta
+    for _ in range(n_factors):
+        below = below * theta
+    gain = np.where(filled.any(axis=1, keepdims=True), np.float32(settings.gain), np.float32(0))
+    weights = {
+        "w_in": w_in.transpose(0, 2, 1),
+        "bias": bias,
+        "theta": below,
+        "gain": np.broadcast_to(gain, filled.shape),
+        "filled": filled,
+    }
+    return weights, 0, equations
+
+
+KINDS = {"srn": _srn, "ctrnn": _ctrnn, "gru": _gru, "thresholds": _thresholds}

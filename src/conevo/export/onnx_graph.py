@@ -19,7 +19,7 @@ from conevo.export.team import EvolvedTeam
 __all__ = ["to_onnx"]
 
 OPSET, IR_VERSION = 17, 9
-KINDS_OF_NODES = {"+": "Add", "-": "Sub", "*": "Mul"}
+KINDS_OF_NODES = {"+": "Add", "-": "Sub", "*": "Mul", "/": "Div"}
 
 
 class OnnxNodes:
@@ -135,7 +135,7 @@ class OnnxNodes:
         return total
 
     def each(self, name: str, first: str, sign: str, second: str) -> str:
-        """Add the sum, difference or product."""
+        """Add the sum, difference, product or quotient."""
         known = [self._n_columns[one] for one in (first, second) if one in self._n_columns]
         self._n_columns[name] = known[0]
         return self._add(KINDS_OF_NODES[sign], name, first, second)

@@ -138,7 +138,7 @@ class PythonText:
         return self._line(name, f"sigmoid({values})")
 
     def each(self, name: str, first: str, sign: str, second: str) -> str:
-        """Write the sum, difference or product."""
+        """Write the sum, difference, product or quotient."""
         return self._line(name, f"{first} {sign} {second}")
 
 

@@ -63,7 +63,7 @@ class TorchTensors:
         return 0.5 + 0.5 * ((h * _polynomial(NUMERATOR, q)) / _polynomial(DENOMINATOR, q))
 
     def each(self, name: str, first: Any, sign: str, second: Any) -> Any:
-        """Return the sum, difference or product."""
+        """Return the sum, difference, product or quotient."""
         return OPERATORS[sign](first, second)
 
 
