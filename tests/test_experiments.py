@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import conevo
+from conevo.report.foreign import read_foreign
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.append(str(ROOT / "experiments"))  # scripts import what they share
@@ -16,6 +17,7 @@ CALIBRATION = ROOT / "docs" / "results" / "calibration.md"
 import calibration  # noqa: E402
 import calibration_tables as tables  # noqa: E402
 import pages  # noqa: E402
+import reference_q  # noqa: E402
 from blind import Blind, kind  # noqa: E402
 from incentives import Regime, fitted, incentive, residence, value  # noqa: E402
 
@@ -142,3 +144,82 @@ def test_the_page_s_tables_are_those_of_its_numbers():
     for name, (part, make) in tables.PAGE_PARTS.items():
         rows = pages.read(page.with_name(f"calibration{tables.PARTS[part]}.csv"))
         assert f"<!-- {name} -->\n{make(rows)}<!-- end -->" in text, name
+
+
+# --- robots that learn by Q-learning ------------------------------------------------------------
+
+
+def q_learners(n_actions=2):
+    """Return one robot with one sensor between 0 and 1, of two bins."""
+    return reference_q.Learners(np.zeros(1), np.ones(1), np.zeros((1, n_actions, 3)), 2)
+
+
+def test_a_q_learners_features_are_a_bin_of_each_sensor_and_a_one():
+    seen = np.array([[[0.0]], [[0.49]], [[0.5]], [[1.0]], [[7.0]]])
+    bins = q_learners().features(seen)[:, 0].tolist()
+    assert bins == [[1, 0, 1], [1, 0, 1], [0, 1, 1], [0, 1, 1], [0, 1, 1]]
+
+
+def test_a_step_of_q_learning_by_hand():
+    """Reward 3, and 0.99 x 8 to come: a tenth of the error 10.92 - 4, shared by two features."""
+    robot = q_learners()
+    low, high = (robot.features(np.array([[[x]]])) for x in (0.0, 1.0))
+    robot.values[0, 0], robot.values[0, 1] = [4, 0, 0], [0, 8, 0]
+    robot.learn(low, np.array([[0]]), np.array([[3.0]]), high)
+    assert robot.values[0, 0].tolist() == pytest.approx([4 + 0.346, 0, 0.346])
+    assert robot.values[0, 1].tolist() == [0, 8, 0]  # the other action
+    robot.learn(low, np.array([[1]]), np.array([[3.0]]), None)  # the end: nothing to come
+    assert robot.values[0, 1].tolist() == pytest.approx([0.15, 8, 0.15])
+
+
+def test_teams_side_by_side_teach_the_mean_of_their_errors():
+    robot = q_learners()
+    low = robot.features(np.zeros((4, 1, 1)))
+    robot.learn(low, np.array([[0], [0], [0], [1]]), np.array([[1.0], [2.0], [6.0], [10.0]]), None)
+    assert robot.values[0].tolist() == [[0.15, 0, 0.15], [0.5, 0, 0.5]]
+
+
+def test_values_converge_to_the_rewards_to_come():
+    """Two states: action 1 leads to the other one, and pays 1 where the sensor is low."""
+    robot, rng = q_learners(), np.random.default_rng(1)
+    state = np.zeros(8, int)
+    for _ in range(4000):
+        before = robot.features(state[:, None, None].astype(float))
+        actions = robot.choose(before, 0.5, rng)
+        rewards = ((actions[:, 0] == 1) & (state == 0)).astype(float)[:, None]
+        state = np.where(actions[:, 0] == 1, 1 - state, state)
+        robot.learn(before, actions, rewards, robot.features(state[:, None, None].astype(float)))
+    q = robot.q(robot.features(np.array([[[0.0]], [[1.0]]])))[:, 0]
+    assert q[0, 1] == pytest.approx(1 / (1 - 0.99**2), rel=0.05)  # 1, then one step without
+    assert q.argmax(axis=1).tolist() == [1, 1]
+
+
+@pytest.mark.parametrize("reward", reference_q.REWARDS)
+def test_the_script_of_q_learners_writes_what_a_report_reads(reward, tmp_path):
+    params = {"iterations": 10, "prey": "heuristic"}
+    rows = reference_q.trained("pursuit/team-3", reward, 1, 480, tmp_path, params, n_tests=4)
+    assert [row["policy"] for row in rows] == ["greedy", "epsilon-greedy"]
+    assert all(row["team-steps"] == 480 for row in rows)
+    stem = f"pursuit-team-3-{reward}-s1"
+    assert {one.name for one in tmp_path.iterdir()} == {
+        f"{stem}.{e}" for e in ("json", "toml", "npz")
+    }
+    found = {one.measure: one for one in read_foreign([tmp_path / f"{stem}.json"], "team")}
+    one = found["capture_time"]
+    assert (one.algorithm, one.about["parameters"], one.about["shared"]) == (
+        f"q-{reward}",
+        245,
+        False,
+    )
+    assert [steps for steps, _ in one.runs[0]] == [160, 320, 480]
+    assert "pursuit-team-3" in one.names
+
+
+def test_q_learners_need_named_actions(tmp_path, capsys, monkeypatch):
+    light = f"{ROOT}/examples/light.py:dark-1"
+    monkeypatch.setattr(
+        sys, "argv", ["reference_q.py", "--work", f"{tmp_path}/q", "--tasks", light]
+    )
+    assert reference_q.main() == 2
+    assert "declares no discrete actions" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
