@@ -12,7 +12,8 @@ import scipy.linalg
 
 from conevo.evolution import Layout, Scores, Trials, method
 from conevo.evolution.inheritance import breed_from
-from conevo.evolution.methods.cone_es import FIRST, ConeEsState, _ranks, _signal
+from conevo.evolution.methods.cone_es import FIRST, ConeEsState, _signal
+from conevo.evolution.strategies import centred_ranks
 
 LAYOUT = Layout(n_robots=6, n_hidden=3, max_hidden=4, n_genes=5)
 UPHILL = np.random.default_rng(2).standard_normal((4, 5))  # of a linear fitness, [U, G]
@@ -96,8 +97,8 @@ def test_pairs_are_mirror_images_in_the_scenarios_of_their_round() -> None:
 def test_ranks_of_each_robot_by_hand() -> None:
     fitness = np.array([[3.0, 1.0], [1.0, 2.0], [1.0, np.inf], [np.nan, 4.0], [9.0, 3.0]])
     expected = [[0.25, -0.25], [-0.125, 0.0], [-0.125, -0.5], [-0.5, 0.5], [0.5, 0.25]]
-    assert _ranks(fitness).tolist() == expected
-    assert _ranks(np.full((3, 1), np.nan)).tolist() == [[0.0]] * 3
+    assert centred_ranks(fitness).tolist() == expected
+    assert centred_ranks(np.full((3, 1), np.nan)).tolist() == [[0.0]] * 3
 
 
 def test_teams_are_ranked_in_their_round_alone() -> None:

@@ -40,7 +40,8 @@ from conevo.evolution.protocol import (
     Scores,
     Trials,
 )
-from conevo.parameters import WrongValue, parameters
+from conevo.evolution.strategies import PairsConfig, as_trials, gains, mirrored
+from conevo.parameters import parameters
 from conevo.rng import stream
 
 __all__ = ["ConeEs", "ConeEsConfig", "ConeEsState", "HomEsConfig"]
@@ -51,19 +52,12 @@ TRUST = 0.8  # memory of the deviations' worth to the team
 
 
 @parameters("method")
-class ConeEsConfig:
+class ConeEsConfig(PairsConfig):
     """Parameters of CONE-ES.
 
     Choice: all values come from a few trials in the multi-rover world, not from a search.
     """
 
-    pairs: Annotated[int, Ge(2), Le(1_000_000)] = 50
-    """mirrored pairs of teams in a generation."""
-    rounds: Annotated[int, Ge(1), Le(10_000)] = 5
-    """rounds among which the pairs are divided evenly; each has its own scenarios, and teams are
-    ranked within it."""
-    spread: Annotated[float, Gt(0), Le(1)] = 0.1
-    """standard deviation of a perturbation in gene units."""
     step: Annotated[float, Gt(0), Le(1)] = 0.02
     """root mean square of the mean's step in a generation, in gene units."""
     memory: Annotated[float, Ge(0), Le(0.999)] = 0.8
@@ -81,12 +75,6 @@ class ConeEsConfig:
     """portion of signal, in the robots' strongest common component, above which the share grows."""
     decay: Annotated[float, Ge(0), Le(1)] = 0.1
     """portion of the deviations that is lost in a generation in which they do not pay."""
-
-    def __post_init__(self) -> None:
-        """Refuse a number of rounds that does not divide the pairs evenly."""
-        if self.pairs % self.rounds:
-            problem = f"must divide the {self.pairs} pairs evenly"
-            raise WrongValue("rounds", f"method.rounds = {self.rounds}", problem)
 
 
 @parameters("method")
@@ -227,9 +215,7 @@ class ConeEs:
         shared, own = self._perturbations(state)
         moved = np.broadcast_to(shared[:, None], (len(shared), *state.deviations.shape)).copy()
         moved[self._is_own(state)] += own
-        both = self.config.spread * np.stack([moved, -moved])  # [2, pairs, R, U, G]
-        rounds = both.reshape(2, self.config.rounds, -1, *state.deviations.shape)
-        teams = rounds.swapaxes(0, 1).reshape(-1, *state.deviations.shape)
+        teams = mirrored(self.config.spread * moved, self.config.rounds)
         return self._trials(state, state.mean + state.deviations + teams)
 
     def tell(self, state: ConeEsState, trials: Trials, scores: Scores) -> ConeEsState:
@@ -254,15 +240,15 @@ class ConeEs:
         """Return the state with mean and deviations moved by one step, given credit [N, R]."""
         config, n_robots = self.config, len(state.deviations)
         shared, own = self._perturbations(state)
-        gain = self._gains(credit.mean(axis=1, keepdims=True))[:, 0]
+        gain = gains(credit.mean(axis=1, keepdims=True), config.rounds)[:, 0]
         direction = np.tensordot(gain, shared, axes=1) / config.pairs
         direction = config.memory * state.direction + (1 - config.memory) * direction
         centre = state.mean + config.step * direction / _size(direction, state.active)
         state = replace(state, phase="fittest", direction=direction)
         deviations = state.deviations
         if config.individual and n_robots > 1:
-            gains = self._gains(credit)[self._is_own(state)]
-            found: FloatArray = np.einsum("nr,nrug->rug", gains, own) / config.pairs
+            own_gain = gains(credit, config.rounds)[self._is_own(state)]
+            found: FloatArray = np.einsum("nr,nrug->rug", own_gain, own) / config.pairs
             state = self._remember(state, found - found.mean(axis=0))
             kept, signal = _signal(state, config.individual_memory)
             size = _size(state.directions, np.broadcast_to(state.active, (n_robots, kept.shape[1])))
@@ -347,41 +333,9 @@ class ConeEs:
         n_own = max(int(state.share * per_round + 0.5), int(state.share > 0))
         return np.tile(np.arange(per_round) < n_own, self.config.rounds)
 
-    def _gains(self, fitness: FloatArray) -> FloatArray:
-        """Return the gain of the first of each pair over the second, [pairs, C], in ranks.
-
-        Args:
-            fitness: [2 * pairs, C].
-        """
-        rounds = fitness.reshape(self.config.rounds, -1, fitness.shape[1])
-        ranks = np.stack([_ranks(one) for one in rounds])
-        half = ranks.shape[1] // 2
-        gains: FloatArray = (ranks[:, :half] - ranks[:, half:]).reshape(-1, fitness.shape[1])
-        return gains
-
     def _trials(self, state: ConeEsState, teams: FloatArray) -> Trials:
         """Return teams [N, R, U, G] as trials."""
-        genes = np.clip(teams, -1, 1).astype(np.float32).reshape(-1, teams.shape[-1])
-        rows = np.arange(len(genes), dtype=np.int32).reshape(teams.shape[:3])
-        is_last = state.phase == "fittest"
-        return Trials(
-            generation=state.progress.generation,
-            genes=genes,
-            teams=np.where(state.active, rows, np.int32(-1)),
-            scenarios="fixed" if is_last else "fresh",
-            portrait=is_last,
-            rounds=1 if is_last else self.config.rounds,
-            purpose=state.phase,
-        )
-
-
-def _ranks(fitness: FloatArray) -> FloatArray:
-    """Return the ranks [N, C] of each column, from -1/2 (the least) to 1/2; ties share one."""
-    order = np.where(np.isfinite(fitness), fitness, -np.inf)
-    below = (order[None] < order[:, None]).sum(axis=1)
-    equal = (order[None] == order[:, None]).sum(axis=1)
-    ranks: FloatArray = (below + (equal - 1) / 2) / max(len(order) - 1, 1) - 0.5
-    return ranks
+        return as_trials(state.progress, state.phase, teams, state.active, self.config.rounds)
 
 
 def _size(directions: FloatArray, active: BoolArray) -> float:
