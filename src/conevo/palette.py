@@ -83,6 +83,8 @@ METHODS: dict[str, Look] = {
     "esp": Look(10, "#c3ddf2", "#3f7fb5"),
     "cosyne": Look(11, "#f7d8a8", "#b9822b"),
     "neat": Look(12, "#9838f9", "#7f0cf2"),
+    "openai-es": Look(13, "#b7d7cf", "#2b8f7b"),
+    "cma-es": Look(14, "#e3c9b0", "#a0522d"),
 }
 """The look of every method of the registry."""
 

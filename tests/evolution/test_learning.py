@@ -12,6 +12,9 @@ LAYOUT = Layout(n_robots=3, n_hidden=3, max_hidden=3, n_genes=5)
 CASES = [
     *((name, {"genotypes": 60}, 40) for name in ("homcne", "hetcne")),
     *((name, {"pairs": 50}, 40) for name in ("cone-es", "hom-es")),
+    *(("openai-es", {"pairs": 50, "team": team}, 40) for team in ("clones", "whole", "robots")),
+    *(("cma-es", {"form": form, "team": "clones"}, 40) for form in ("full", "separable")),
+    ("cma-es", {"team": "whole"}, 40),
     *((name, {"team": team}, 60) for name in ("esp", "cosyne") for team in ("clones", "whole")),
     *(
         (name, {"genotypes": 20, "evaluation": evaluation, "rounds": 5}, 40)

@@ -33,7 +33,7 @@ def test_an_entry_builds_its_method(name):
     assert (built.name, built.title) == (entry.name, entry.title)
     assert type(built.config) is entry.config_class
     assert is_dataclass(built.config)
-    size = "pairs" if name in OURS else "genotypes"
+    size = "pairs" if name in (*OURS, "openai-es") else "genotypes"
     assert size in {field.name for field in fields(entry.config_class)}
     with pytest.raises(AttributeError):
         setattr(built.config, size, 3)
@@ -60,6 +60,13 @@ def test_an_entry_builds_its_method(name):
         ("cone-es", {"pairs": 1}, "method.pairs = 1: must be greater than or equal to 2"),
         ("cone-es", {"spread": 0}, "method.spread = 0: must be greater than 0"),
         ("hom-es", {"individual": 0.5}, "method.individual = 0.5: must be less than or equal to 0"),
+        (
+            "openai-es",
+            {"team": "both"},
+            "method.team = 'both': must be 'clones', 'whole' or 'robots'",
+        ),
+        ("openai-es", {"share": 1.1}, "method.share = 1.1: must be less than or equal to 1"),
+        ("cma-es", {"form": "half"}, "method.form = 'half': must be 'full' or 'separable'"),
         (
             "cone-es",
             {"pairs": 52, "rounds": 5},

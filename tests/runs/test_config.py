@@ -17,7 +17,7 @@ from conevo.runs.settings import RunSettings
 from conevo.worlds.registry import WORLDS
 
 TASK = "rover/complex-1"
-OURS = ("cone-es", "hom-es")
+OURS = ("cone-es", "hom-es", "openai-es")
 
 
 @pytest.mark.parametrize("preset", PRESETS)
@@ -74,6 +74,8 @@ def test_thesis_preset_has_the_sizes_of_the_thesis() -> None:
         teams = resolve(task, "homcne", "thesis").method_config.genotypes
         assert {2 * resolve(task, name, "thesis").method_config.pairs for name in OURS} == {teams}
         assert resolve(task, "neat", "thesis").method_config.genotypes == teams
+        cma = resolve(task, "cma-es", "thesis").method_config
+        assert cma.genotypes * cma.rounds == teams
     run = resolve(TASK, "cone", "thesis").run
     assert (run.generations, run.epochs) == (250, 10)
 

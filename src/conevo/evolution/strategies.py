@@ -11,10 +11,10 @@ from typing import Annotated
 import numpy as np
 from annotated_types import Ge, Gt, Le
 
-from conevo.evolution.protocol import BoolArray, FloatArray, Progress, Trials
+from conevo.evolution.protocol import BoolArray, FloatArray, Layout, Progress, Trials
 from conevo.parameters import WrongValue, parameters
 
-__all__ = ["PairsConfig", "as_trials", "centred_ranks", "gains", "mirrored"]
+__all__ = ["PairsConfig", "as_trials", "centred_ranks", "controllers_of", "gains", "mirrored"]
 
 
 @parameters("method")
@@ -98,3 +98,25 @@ def as_trials(
         rounds=1 if is_last else rounds,
         purpose=phase,
     )
+
+
+def controllers_of(
+    layout: Layout, genes: FloatArray, active: BoolArray, *, is_clones: bool
+) -> tuple[FloatArray, BoolArray]:
+    """Return the controllers [P, U, G] of a team and their slots in use [P, U].
+
+    Choice: for clones (P = 1) the mean controller, with the slots that any robot uses, which count
+    as zeros in the others.
+
+    Args:
+        layout: the size of the problem; P = R if robots are not clones.
+        genes: [R', U, G] the team's genes; robot r is its robot r mod R'.
+        active: [R', U] its slots in use.
+        is_clones: whether all robots are to have one controller.
+    """
+    robots = np.arange(layout.n_robots) % len(genes)
+    used: BoolArray = active[robots]
+    team: FloatArray = genes[robots].astype(np.float64) * used[:, :, None]
+    if not is_clones:
+        return team, used
+    return team.mean(axis=0, keepdims=True), np.asarray(used.any(axis=0, keepdims=True))

@@ -135,6 +135,24 @@ METHODS: dict[str, MethodEntry] = {
             method_name="Neat",
             controllers=("graph",),
         ),
+        MethodEntry(
+            name="openai-es",
+            title="OpenAI-ES",
+            summary="an evolution strategy by the gradient of ranks: clones, a whole team, robots",
+            source="Salimans et al. 2017",
+            module="conevo.evolution.methods.openai_es",
+            config_name="OpenAiEsConfig",
+            method_name="OpenAiEs",
+        ),
+        MethodEntry(
+            name="cma-es",
+            title="CMA-ES",
+            summary="an evolution strategy that adapts a covariance matrix: clones or a whole team",
+            source="Hansen 2016; Ros and Hansen 2008",
+            module="conevo.evolution.methods.cma_es",
+            config_name="CmaEsConfig",
+            method_name="CmaEs",
+        ),
     )
 }
 
