@@ -53,7 +53,11 @@ def shown(value: object, most: int = 60) -> str:
 
 def in_a_line(error: BaseException) -> str:
     """Return the name and the words of an error of another program, in one line."""
-    return " ".join(f"{type(error).__name__}: {error}".split())
+    try:
+        words = str(error)
+    except Exception:  # its own __str__ fails
+        words = "(without words)"
+    return " ".join(f"{type(error).__name__}: {words}".split())
 
 
 def unknown_name(kind: str, name: str, allowed: Iterable[str], where: str = "") -> UnknownName:

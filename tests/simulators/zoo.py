@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 import time
 from typing import Any
 
@@ -18,15 +19,25 @@ class raw_env(ParallelEnv):
         noise: where random numbers come from: its "own", also counting "earlier" epochs, the
             "process", or the "clock".
         leaves: iteration in which the first walker leaves, -1 for never.
-        crash: its "exit" or "error" in the second step of an epoch; of "tries" also in those that
-            conevo plays before a run.
+        crash: its "exit", "error" or "sys.exit" in the second step of an epoch; of "tries" also in
+            those that conevo plays before a run.
+        wrong: its mistake in the second step: the guard's observation is "long", or "text", or it
+            has "no observation" or "no reward".
+        agents: their names.
     """
 
     metadata: dict[str, Any] = {"name": "zoo", "is_parallelizable": True}  # noqa: RUF012
 
-    def __init__(self, noise: str = "own", leaves: int = -1, crash: str = "") -> None:
-        self.noise, self.leaves, self.crash = noise, leaves, crash
-        self.possible_agents = ["w_0", "w_1", "guard"]
+    def __init__(
+        self,
+        noise: str = "own",
+        leaves: int = -1,
+        crash: str = "",
+        wrong: str = "",
+        agents: Any = ("w_0", "w_1", "guard"),
+    ) -> None:
+        self.noise, self.leaves, self.crash, self.wrong = noise, leaves, crash, wrong
+        self.possible_agents = list(agents)
         self.used = 0
 
     def observation_space(self, agent: str) -> Any:
@@ -58,6 +69,8 @@ class raw_env(ParallelEnv):
     def step(self, actions: Any) -> Any:
         self.t += 1
         if self.crash and self.t == 2 and (self.seed > 2 or "tries" in self.crash):
+            if "sys" in self.crash:
+                sys.exit("no more")
             if "exit" in self.crash:
                 os._exit(7)
             raise ValueError("no more\nfood")
@@ -71,6 +84,16 @@ class raw_env(ParallelEnv):
         rewards = {name: self.x[name] + self.x["guard"] for name in self.agents}
         ended = {name: name in gone for name in self.agents}
         seen = self.observed()
+        if self.wrong and self.t == 2:
+            match self.wrong:
+                case "long":
+                    seen["guard"] = np.zeros(7, np.float32)
+                case "text":
+                    seen["guard"] = np.array(["near", "far"])
+                case "no observation":
+                    del seen["guard"]
+                case "no reward":
+                    del rewards["guard"]
         self.agents = [name for name in self.agents if name not in gone]
         return seen, rewards, ended, dict.fromkeys(ended, False), {name: {} for name in ended}
 

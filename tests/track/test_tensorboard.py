@@ -5,8 +5,6 @@ from __future__ import annotations
 import struct
 from pathlib import Path
 
-import pytest
-
 from conevo.track.trackers import TRACKERS
 from conevo.track.tracking import Tracking
 from extras import need
@@ -74,7 +72,9 @@ def test_sending_a_run_again_replaces_its_file(tmp_path: Path) -> None:
 def test_tensorboard_shows_no_point_twice_even_with_the_file_of_a_killed_tracker(
     tmp_path: Path,
 ) -> None:
-    accumulator = pytest.importorskip("tensorboard.backend.event_processing.event_accumulator")
+    need("tensorboard")
+    from tensorboard.backend.event_processing import event_accumulator as accumulator
+
     path = write_run(tmp_path / "run", 4)
     send(path, tmp_path)
     (file,) = tmp_path.glob("tensorboard/run-*/events.*")

@@ -51,9 +51,11 @@ class Networks:
     def think(self, inputs: Floats) -> Floats:
         """Return the outputs [B, R, O] of all robots, given their inputs [B, R, S]."""
         rows = inputs.reshape(-1, inputs.shape[2])
-        parts = [
-            block.think(rows[k * BLOCK : (k + 1) * BLOCK]) for k, block in enumerate(self._blocks)
-        ]
+        with np.errstate(invalid="ignore", over="ignore"):  # tasks may observe what is not finite
+            parts = [
+                block.think(rows[k * BLOCK : (k + 1) * BLOCK])
+                for k, block in enumerate(self._blocks)
+            ]
         outputs: Floats = np.concatenate(parts).reshape(*self._shape, self._n_outputs)
         return outputs
 

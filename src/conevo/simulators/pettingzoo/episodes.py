@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from conevo.errors import UsageError, in_a_line, unknown_name
+from conevo.errors import UsageError, in_a_line, shown, unknown_name
 from conevo.reading import parse_toml
 from conevo.simulators.particles import TaskLook
 from conevo.simulators.pettingzoo.things import look_of, places_of
@@ -54,6 +54,7 @@ class Episode:
     def __init__(self, task: Task) -> None:
         from gymnasium.spaces import flatdim
 
+        self._task = f"pettingzoo:{task[0]}"
         self.env = made(*task)
         self.names: list[str] = list(self.env.possible_agents)
         self._spaces = [self.env.action_space(name) for name in self.names]
@@ -61,14 +62,22 @@ class Episode:
         self.sizes = [int(flatdim(space)) for space in self._observed]
 
     def begin(self, seed: int) -> Floats:
-        """Start again, and return what agents observe [agents, S], filled up with 0."""
-        return self._seen(self.env.reset(seed=seed)[0])
+        """Start again, and return what agents observe [agents, S], filled up with 0.
+
+        Raises:
+            UsageError: an agent lacks its observation, or has another than its space has.
+        """
+        return self._seen(self.env.reset(seed=seed)[0], set(self.env.agents))
 
     def step(self, actions: Floats) -> Seen:
         """Execute the actions [agents, A] of the agents that are left.
 
         Returns:
             Observations [agents, S], rewards [agents], and which agents have gone [agents].
+
+        Raises:
+            UsageError: an agent that goes on lacks its observation or its reward, or observes other
+                things than its space has.
         """
         alive = set(self.env.agents)
         given = {
@@ -78,15 +87,27 @@ class Episode:
         }
         observed, rewards, ended, cut, _ = self.env.step(given)
         alive = {name for name in self.env.agents if not (ended.get(name) or cut.get(name))}
+        for name in alive & given.keys() - rewards.keys():
+            raise UsageError(f"{self._task} gives no reward to {name}")
         found = np.array([rewards.get(name, 0.0) for name in self.names], np.float32)
-        return self._seen(observed), found, np.array([name not in alive for name in self.names])
+        gone = np.array([name not in alive for name in self.names])
+        return self._seen(observed, alive), found, gone
 
-    def _seen(self, observed: dict[str, Any]) -> Floats:
+    def _seen(self, observed: dict[str, Any], alive: set[str]) -> Floats:
         whole = np.zeros((len(self.names), max(self.sizes)), np.float32)
-        for row, name, space in zip(whole, self.names, self._observed, strict=True):
+        of_agents = zip(whole, self.names, self._observed, self.sizes, strict=True)
+        for row, name, space, size in of_agents:
             if name in observed:
                 flat = _flat(space, observed[name])
-                row[: len(flat)] = flat
+                if len(flat) != size or flat.dtype.kind not in "biuf":
+                    is_given = f"{len(flat)} values of type {flat.dtype}"
+                    raise UsageError(
+                        f"{self._task} gives {name} an observation of {is_given}, where its "
+                        f"observation_space has {size} numbers"
+                    )
+                row[:size] = flat
+            elif name in alive:
+                raise UsageError(f"{self._task} gives no observation to {name}")
         return whole
 
 
@@ -135,8 +156,14 @@ def made(name: str, options: str) -> Any:
                 "each once in a cycle"
             )
         env = aec_to_parallel(env)
-    if not hasattr(env, "possible_agents"):
-        raise UsageError(f"pettingzoo:{name} cannot be played: it has no possible_agents")
+    agents = list(getattr(env, "possible_agents", ()))
+    if not agents or not all(isinstance(one, str) for one in agents):
+        raise UsageError(
+            f"pettingzoo:{name} cannot be played: possible_agents must be names, "
+            f"not {shown(agents)}"
+        )
+    if len(set(agents)) < len(agents):
+        raise UsageError(f"pettingzoo:{name} cannot be played: two agents have the same name")
     return env
 
 
@@ -156,6 +183,8 @@ def find(name: str, options: str) -> Found:
     turns = [(first, 1), (second, 2), (second, 1), (first, 2)]
     try:
         one, two, one_again, two_again = (_tried(*turn, spaces) for turn in turns)
+    except UsageError:
+        raise
     except Exception as error:
         raise UsageError(refuse + in_a_line(error)) from error
     if (one, two) != (one_again, two_again):
@@ -229,7 +258,8 @@ def _space(agent: str, space: Any) -> Space:
         return int(space.n)
     if isinstance(space, Box) and space.is_bounded():
         low, high = (np.asarray(end, np.float32).ravel() for end in (space.low, space.high))
-        return low, high
+        if low.size:
+            return low, high
     words = " ".join(str(space).split())
     raise UsageError(f"{agent} acts in {words:.80}, not in a Discrete, or a Box with ends")
 

@@ -1,9 +1,9 @@
 """Worker processes, which load and play a task: both ends of the pipe.
 
 A worker reads a function with its arguments, calls it, and writes its result or its error, until
-there is nothing more to read: so it ends with the process that started it. Workers have an
-interpreter of their own, so that a script needs no guard against being run again by them. They are
-started when they are needed, and kept.
+there is nothing more to read. It ends with the process that started it, also in a step of a task
+that never returns. Workers have an interpreter of their own, so that a script needs no guard
+against being run again by them. They are started when they are needed, and kept.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 import warnings
 from collections.abc import Callable, Sequence
 from multiprocessing import Pipe
@@ -43,7 +44,7 @@ class Worker:
         self._pipe, other = Pipe()
         try:
             self._process = subprocess.Popen(
-                [sys.executable, "-P", "-m", __name__, str(other.fileno())],
+                [sys.executable, "-P", "-m", __name__, str(other.fileno()), str(self._owner)],
                 pass_fds=[other.fileno()],
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,  # tasks may print
@@ -136,10 +137,18 @@ def serve(pipe: Connection) -> None:
             answer = function(*arguments)
         except ConevoError as error:
             answer = type(error)(str(error))
-        except Exception as error:
+        except (Exception, SystemExit, KeyboardInterrupt) as error:
             answer = Exception(in_a_line(error))
         pipe.send(answer)
 
 
+def _end_after(owner: int) -> None:
+    """End this process when the one that started it has ended, whatever a task does."""
+    while os.getppid() == owner:
+        time.sleep(0.5)
+    os._exit(1)
+
+
 if __name__ == "__main__":
+    threading.Thread(target=_end_after, args=[int(sys.argv[2])], daemon=True).start()
     serve(Connection(int(sys.argv[1])))
