@@ -271,18 +271,36 @@ def test_ppo_of_stable_baselines_trains_through_supersuit() -> None:
 
 
 @pytest.mark.timing
-@pytest.mark.parametrize(("task", "bar"), [("pursuit/team-3", 40_000), ("rover/complex-5", 20_000)])
-def test_speed_in_team_steps(task: str, bar: int) -> None:
-    """Acceptance A6, on a quiet core: the best of 200 pieces of 20 steps."""
-    env = parallel_env(task)
+@pytest.mark.parametrize("task", ["pursuit/team-3", "rover/complex-5"])
+def test_speed_next_to_a_bare_stepper(task: str) -> None:
+    """Acceptance A6: a step takes at most seven times as long as one of a stepper (4.7 measured).
+
+    The best of 200 pieces of 20 steps of each, in turns: other work on the machine slows both.
+    """
+    env, stepper = parallel_env(task), conevo.Stepper(conevo.world(task), 1, n_threads=1)
     env.reset(seed=0)
-    actions = [random_actions(env) for _ in range(50)]
-    seconds = []
+    stepper.reset()
+    actions = [random_actions(env) for _ in range(20)]
+    outputs = stepper.outputs.numpy()  # a view
+    given = np.random.default_rng(1).normal(size=(20, *outputs.shape)).astype(np.float32)
+
+    def with_names() -> None:
+        for action in actions:
+            env.step(action)
+        if not env.agents or env.teams.stepper.clock.numpy()[0] > 400:
+            env.reset()
+
+    def bare() -> None:
+        for output in given:
+            outputs[:] = output
+            stepper.step()
+        if stepper.clock.numpy()[0] > 400:
+            stepper.reset()
+
+    seconds = dict.fromkeys((with_names, bare), np.inf)
     for _ in range(200):
-        start = perf_counter()
-        for k in range(20):
-            env.step(actions[k % 50])
-            if not env.agents:
-                env.reset()
-        seconds.append(perf_counter() - start)
-    assert 20 / min(seconds) >= bar
+        for play, best in seconds.items():
+            start = perf_counter()
+            play()
+            seconds[play] = min(best, perf_counter() - start)
+    assert seconds[with_names] <= 7 * seconds[bare]

@@ -358,14 +358,21 @@ def test_heuristics_are_nothing_and_random() -> None:
     [
         ("mpe2.simple_tga_v3", "did you mean 'mpe2.simple_tag_v3'?"),
         ("simple_tag_v3", "did you mean 'mpe2.simple_tag_v3'?"),
-        ("json", "unknown task 'json' of PettingZoo"),
+        ("json", "unknown task 'json' of PettingZoo, nor a module on PYTHONPATH"),
+        ("tasks_of_my_own", "unknown task 'tasks_of_my_own' of PettingZoo"),  # a folder
         ("pettingzoo.utils", "has no function parallel_env, nor env"),
         ("pettingzoo.classic.tictactoe_v3", "its agents must act at the same time"),
     ],
 )
 def test_a_task_that_is_not_one_is_refused_in_one_line(
-    task: str, words: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+    task: str,
+    words: str,
+    tmp_path: Path,
+    capfd: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    (tmp_path / "tasks_of_my_own").mkdir()
+    monkeypatch.syspath_prepend(tmp_path)
     check_refused(f"pettingzoo:{task}", words, tmp_path / "run", capfd)
 
 

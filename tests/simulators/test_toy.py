@@ -224,8 +224,9 @@ def test_options_have_one_spelling() -> None:
     made = resolve("toy:line", overrides={"world.options": {"names": ["a", 'b"'], "is": True}})
     assert made.world_params.options == 'is = true, names = ["a", "b\\""]'
     assert made.world_params.keywords == {"names": ["a", 'b"'], "is": True}
-    with pytest.raises(UsageError, match=r"world.options = 'n_agents' .*must be keyword arguments"):
-        resolve("toy:line", overrides={"world.options": "n_agents"})
+    for wrong in ("n_agents", "n_agents = 3}\nother = {"):
+        with pytest.raises(UsageError, match=r"world.options = 'n_agents.*must be keyword argum"):
+            resolve("toy:line", overrides={"world.options": wrong})
 
 
 def test_a_users_function_labels_actions(zones: Path, tmp_path: Path) -> None:

@@ -38,10 +38,13 @@ def _options_text(given: Any) -> Any:
     if isinstance(given, str):
         inside = given.strip().removeprefix("{").removesuffix("}")
         try:
-            given = parse_toml(f"options = {{{inside}}}", "options")["options"]
+            found = parse_toml(f"options = {{{inside}}}", "options")
         except DamagedFile:
+            found = {}
+        if found.keys() != {"options"}:  # "a = 1}\nb = {" is none, either
             example = "'n_agents = 4, share_reward = true'"
-            raise ValueError(f"must be keyword arguments of the task, as in {example}") from None
+            raise ValueError(f"must be keyword arguments of the task, as in {example}")
+        given = found["options"]
     if not isinstance(given, Mapping):
         return given
     return ", ".join(f"{key} = {_toml(given[key])}" for key in sorted(given))

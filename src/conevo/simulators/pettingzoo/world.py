@@ -77,8 +77,9 @@ def entry(task: str) -> TaskEntry:
     if not _is_module(task):
         known = [name for one in EXTRAS for name in _tasks_of(one)]
         lacking = [one for one in EXTRAS if find_spec(one) is None]
-        where = f"(of {', '.join(lacking)}, which is not installed, none is known)"
-        raise unknown_name("task", task, known, where if lacking else "of PettingZoo")
+        missing = f" (of {', '.join(lacking)}, which is not installed, none is known)"
+        where = f"of PettingZoo, nor a module on PYTHONPATH{missing * bool(lacking)}"
+        raise unknown_name("task", task, known, where)
     return TaskEntry(
         name=FAMILY,
         title=f"PettingZoo {task}",
@@ -108,9 +109,10 @@ def versions_of(task: str) -> str:
 
 
 def _is_module(task: str) -> bool:
-    """Return whether a task names a module that can be found, not a whole package of tasks."""
+    """Return whether a task names a module with a file, not a whole package of tasks."""
     is_standard = task.partition(".")[0] in sys.stdlib_module_names
-    return task not in EXTRAS and not is_standard and _spec_of(task) is not None
+    found = None if task in EXTRAS or is_standard else _spec_of(task)
+    return found is not None and found.has_location
 
 
 def _spec_of(module: str) -> ModuleSpec | None:
