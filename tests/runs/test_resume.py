@@ -32,7 +32,7 @@ from runs.tiny import (
 @pytest.mark.parametrize("task", TASKS)
 @pytest.mark.parametrize("method", METHODS)
 def test_resume_after_kills_at_random_moments(method: str, task: str, tmp_path: Path) -> None:
-    whole = evolve_tiny(tmp_path / "whole", method, task, run__generations=60)
+    whole = evolve_tiny(tmp_path / "whole", method, task, run__generations=40)
     path = tmp_path / "killed"
     kills = kill_twice(path, command(path, method, task, run__generations=40))
     conevo.Run(path).resume(threads=2)
