@@ -22,6 +22,7 @@ OUTSIDE = {
     "outside-light": f"{EXAMPLES}/light.py:dark-1",
     "outside-ball": f"{EXAMPLES}/ball.py:far-1",
     "outside-spread": f"{EXAMPLES}/spread.py:open-1",
+    "outside-poles": f"{EXAMPLES}/poles.py:full-2",
 }
 ITERATIONS = 25
 TOPICS = ("sensors", "values", "counts", "order", "reset", "heuristics")
