@@ -39,8 +39,14 @@ SETTINGS = {
         },
     ),
 }
+# Controllers whose functions are compiled for two worlds only in CI, since no world changes them.
+IN_TWO = ("thresholds", "rules")
 CASES = [
-    pytest.param((path, name, settings), id=f"{Path(path).name}-{name}-{k}")
+    pytest.param(
+        (path, name, settings),
+        id=f"{Path(path).name}-{name}-{k}",
+        marks=[pytest.mark.exhaustive] if name in IN_TWO and path in WORLDS[:2] else [],
+    )
     for path in WORLDS
     for name in CONTROLLERS
     for k, settings in enumerate(({}, *SETTINGS.get(name, ())))
