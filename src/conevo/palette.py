@@ -85,6 +85,8 @@ METHODS: dict[str, Look] = {
     "neat": Look(12, "#9838f9", "#7f0cf2"),
     "openai-es": Look(13, "#b7d7cf", "#2b8f7b"),
     "cma-es": Look(14, "#e3c9b0", "#a0522d"),
+    "novelty": Look(15, "#e4ecd0", "#5f7a1e"),
+    "map-elites": Look(16, "#b7cfe8", "#2c5f8a"),
 }
 """The look of every method of the registry."""
 

@@ -337,7 +337,7 @@ def test_every_genotype_is_tried_the_promised_number_of_times(name, config):
             assert len(trials.teams) == ROUNDS * GENOTYPES
             continue
         # Robot r of team n scores n + r / 8: fitness identifies the robot and the team on trial.
-        told = learner.tell(state, trials, Scores(n + r / 8, 0.0 * n))
+        told = learner.tell(state, trials, Scores(n + r / 8, 0.0 * n, np.zeros((*n.shape, 2))))
         if config.get("team") == "whole":  # a genotype is one of each population
             np.testing.assert_array_equal(trials.teams[:, :, 0], own[:, 0].T)
             np.testing.assert_array_equal(told.fitness, [np.arange(GENOTYPES) + 1 / 8] * 3)

@@ -16,6 +16,8 @@ CASES = [
     *(("cma-es", {"form": form, "team": "clones"}, 40) for form in ("full", "separable")),
     ("cma-es", {"team": "whole"}, 40),
     *((name, {"team": team}, 60) for name in ("esp", "cosyne") for team in ("clones", "whole")),
+    ("novelty", {"genotypes": 60, "weight": 0.0, "team": "clones"}, 40),
+    ("map-elites", {"genotypes": 60, "team": "clones"}, 40),
     *(
         (name, {"genotypes": 20, "evaluation": evaluation, "rounds": 5}, 40)
         for name, entry in METHODS.items()
@@ -30,7 +32,7 @@ def test_error_halves(name, config, generations):
     target = np.random.default_rng(0).uniform(-1, 1, (3, 3, 5))
     if name in ("homcne", "hetcne", "hom-es") or config.get("team") == "clones":
         target[:] = target[0]  # clones can only learn one target
-    if "genotypes" in config:
+    if "genotypes" in config and name != "map-elites":
         config = config | {"elite_portion": 0.25}
     learner = method(name, **config)
     state = learner.init(LAYOUT, root=11)
@@ -39,9 +41,10 @@ def test_error_halves(name, config, generations):
         trials = learner.ask(state)
         distance = np.abs(trials.networks() - target).mean(axis=(2, 3))
         before = state.progress.generation
-        # Robots differ in S by more than any threshold: no two are similar.
+        # Robots differ in S and in their actions by more than any threshold: no two are similar.
         specialization = np.broadcast_to([0.0, 0.5, 1.0], distance.shape)
-        state = learner.tell(state, trials, Scores(1 - distance, specialization))
+        shares = np.broadcast_to(np.eye(3), (*distance.shape, 3))
+        state = learner.tell(state, trials, Scores(1 - distance, specialization, shares))
         if state.progress.generation > before:
             error.append((1 - state.progress.fittest_fitness).mean())
     assert np.mean(error[-3:]) < error[0] / 2

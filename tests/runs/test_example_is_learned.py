@@ -11,11 +11,12 @@ from conevo.evolution.methods.registry import METHODS
 
 LIGHT = Path(__file__).parents[2] / "examples" / "light.py"
 ENOUGH = 0.85  # nearness; random teams have about 0.5, one that walks straight there 0.99
+FURTHER = {"novelty": {"method.weight": 0.5}}  # without any fitness it comes there only by chance
 
 
 def learned(method: str, seed: int, folder: Path, **others: object) -> float:
     """Return the nearness of the champion of a run with the preset desk, in 100 fresh scenarios."""
-    settings = {"run.n_tests": 100, **others}
+    settings = {"run.n_tests": 100, **FURTHER.get(method, {}), **others}
     run = conevo.evolve(f"{LIGHT}:dark-1", method, "desk", seed, folder, overrides=settings)
     assert run.test_result is not None
     return float(run.test_result["champion"]["performance"]["nearness"]["mean"])

@@ -153,6 +153,24 @@ METHODS: dict[str, MethodEntry] = {
             config_name="CmaEsConfig",
             method_name="CmaEs",
         ),
+        MethodEntry(
+            name="novelty",
+            title="Novelty search",
+            summary="selects teams that behave as none has before, whatever their fitness",
+            source="Lehman and Stanley 2011",
+            module="conevo.evolution.methods.novelty",
+            config_name="NoveltyConfig",
+            method_name="Novelty",
+        ),
+        MethodEntry(
+            name="map-elites",
+            title="MAP-Elites",
+            summary="keeps the fittest team of each behaviour, and varies these elites",
+            source="Mouret and Clune 2015; Vassiliades and Mouret 2018",
+            module="conevo.evolution.methods.map_elites",
+            config_name="MapElitesConfig",
+            method_name="MapElites",
+        ),
     )
 }
 
