@@ -87,6 +87,7 @@ METHODS: dict[str, Look] = {
     "cma-es": Look(14, "#e3c9b0", "#a0522d"),
     "novelty": Look(15, "#e4ecd0", "#5f7a1e"),
     "map-elites": Look(16, "#b7cfe8", "#2c5f8a"),
+    "hyb-ccea": Look(17, "#f3c9b0", "#a8461c"),
 }
 """The look of every method of the registry."""
 

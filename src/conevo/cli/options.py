@@ -27,7 +27,8 @@ settings_only = all_of(
     click.option(
         "--method", metavar="NAME",
         help="cone (default), mesp, ccga, hetcne, homcne, cone-1..3, cone-es, hom-es, esp, "
-        "cosyne, neat, openai-es, cma-es, novelty, map-elites, or FILE.py:NAME.",
+        "cosyne, neat, openai-es, cma-es, novelty, map-elites, hyb-ccea, or "
+        "FILE.py:NAME.",
     ),
     click.option(
         "--preset", metavar="NAME", help="smoke (seconds), desk (minutes, default), night, thesis."

@@ -35,7 +35,7 @@ from conevo.evolution.variation import VariationConfig
 from conevo.parameters import parameters
 from conevo.rng import stream
 
-__all__ = ["Ccga", "CcgaConfig", "CcgaState"]
+__all__ = ["Ccga", "CcgaConfig", "CcgaState", "type_a"]
 
 
 @parameters("method")
@@ -99,7 +99,8 @@ class Ccga:
         config = self.config
         n_elite = elite_count(config.elite_portion, config.genotypes)
         if state.phase == "genotypes":
-            return grade(state, self._fitness(trials, scores, state), n_elite, phase="fittest")
+            fitness = type_a(config, state, trials, scores)
+            return grade(state, fitness, n_elite, phase="fittest")
         state = crown(state, trials, scores)
         children = breed_networks(state, state.elite, config)
         if not config.has_elite_partners:
@@ -108,11 +109,11 @@ class Ccga:
         partners = state.genes[population, :, state.elite].swapaxes(1, 2)
         return advance(state, children, state.active, partners=partners)
 
-    def _fitness(self, trials: Trials, scores: Scores, state: CcgaState) -> FloatArray:
-        """Return type A fitness [P, M]."""
-        m = self.config.genotypes
-        if self.config.evaluation == "shared":
-            by_row = credit.mean_of_trials(trials.teams, scores.fitness, len(trials.genes))
-            return by_row.reshape(state.genes.shape[:3])[:, 0]
-        robot = np.arange(len(state.active)).repeat(m)
-        return credit.of_robot(scores.fitness, robot).reshape(-1, m)
+
+def type_a(config: CcgaConfig, state: CcgaState, trials: Trials, scores: Scores) -> FloatArray:
+    """Return type A fitness [P, M] of the genotypes on trial in phase "genotypes"."""
+    if config.evaluation == "shared":
+        by_row = credit.mean_of_trials(trials.teams, scores.fitness, len(trials.genes))
+        return by_row.reshape(state.genes.shape[:3])[:, 0]
+    robot = np.arange(len(state.active)).repeat(config.genotypes)
+    return credit.of_robot(scores.fitness, robot).reshape(-1, config.genotypes)

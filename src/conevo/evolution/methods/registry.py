@@ -171,6 +171,15 @@ METHODS: dict[str, MethodEntry] = {
             config_name="MapElitesConfig",
             method_name="MapElites",
         ),
+        MethodEntry(
+            name="hyb-ccea",
+            title="Hyb-CCEA",
+            summary="CCGA whose populations merge if their robots behave alike, and split again",
+            source="Gomes, Mariano and Christensen 2015, 2018; Nitschke 2009, section 7.2",
+            module="conevo.evolution.methods.hyb_ccea",
+            config_name="HybCceaConfig",
+            method_name="HybCcea",
+        ),
     )
 }
 
