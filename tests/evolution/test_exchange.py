@@ -95,6 +95,7 @@ LIVES = [[1, 0], [0, 1], [0.75, 0.25], [0.25, 0.75]]  # 0 and 2 do the first act
         ("switching", [0, 0, 0, 0], [{0, 1}, {0, 1}, {2, 3}, {2, 3}]),  # all alike
         ("shares", [0, 0, 0, 0], [{0, 2}, {1, 3}, {0, 2}, {1, 3}]),  # (0,2) and (1,3) 1/4
         ("shares", [0, 0, 0.5, 0.5], [{0, 2}, {1, 3}, {0, 2}, {1, 3}]),  # S does not matter
+        ("entropy", [0, 1, 0, 1], [{0, 1}, {0, 1}, {2, 3}, {2, 3}]),  # 0 and 1 do one thing each
         ("label", [0, 0, 0.4, 0.4], [{0, 2}, {1, 3}, {0, 2}, {1, 3}]),
         ("label", [0, 0, 0.5, 0.4], [{0}, {1, 3}, {2}, {1, 3}]),  # 2 is not specialized
         ("label", [0, 0.5, 0.5, 0.5], [{0}, {1, 3}, {2}, {1, 3}]),  # neither 1 nor 3 is
@@ -106,9 +107,28 @@ def test_similar_behaviour(sd: str, s: list[float], expected: list[set[int]]) ->
     assert families(state, NAMES) == expected
 
 
-def test_shares_of_actions_must_be_known_if_pairing_depends_on_them() -> None:
-    learner = method("cone", genotypes=4, sd="shares")
-    with pytest.raises(UsageError, match=r"method.sd = 'shares' needs scores.shares"):
+@pytest.mark.parametrize(
+    ("sd", "s", "sst"),
+    [
+        ("entropy", [0.5, 0.4, 0.3, 0.2], 0.47),  # entropy rises three times, whatever S does
+        ("switching", [0.5, 0.4, 0.3, 0.2], 0.53),  # S falls
+    ],
+)
+def test_sst_follows_the_measure_of_specialization(sd: str, s: list[float], sst: float) -> None:
+    """While nothing progresses, a rise from specialists to generalists lowers SST."""
+    learner = method("cone", genotypes=4, sd=sd, stagnation_v=1)
+    state = learner.init(FOUR, root=5)
+    for a, one in zip((0.0, 0.1, 0.2, 0.3), s, strict=True):
+        state = generation(learner, state, s=one, shares=np.tile([1 - a, a], (4, 1)))
+    assert round(state.sst, 6) == sst
+    if sd == "entropy":  # of 0.7 and 0.3
+        assert round(state.progress.numbers["activity_entropy"], 6) == 0.881291
+
+
+@pytest.mark.parametrize("sd", ["shares", "label", "entropy"])
+def test_shares_of_actions_must_be_known_if_pairing_depends_on_them(sd: str) -> None:
+    learner = method("cone", genotypes=4, sd=sd)
+    with pytest.raises(UsageError, match=f"method.sd = {sd!r} needs scores.shares"):
         generation(learner, learner.init(FOUR, root=5))
 
 
@@ -166,7 +186,7 @@ def test_without_a_share_of_the_pairs_nothing_is_exchanged(name: str) -> None:
         ("cone-3", {"thresholds_from": "ancestor"}, "method.thresholds_from = 'ancestor': has no"),
         ("cone", {"type_c": "off", "type_c_rounds": 3}, "method.type_c_rounds = 3: has no effect"),
         ("cone", {"exchange_share": 1.5}, "method.exchange_share = 1.5: must be less than or eq"),
-        ("cone", {"sd": "caste"}, "method.sd = 'caste': must be 'switching', 'shares' or 'label'"),
+        ("cone", {"sd": "caste"}, "method.sd = 'caste': must be 'switching', 'shares', 'label' or"),
     ],
 )
 def test_an_option_without_effect_is_refused(name: str, config: dict[str, Any], words: str) -> None:

@@ -5,6 +5,7 @@ import pytest
 
 from conevo.evolution.selection import (
     elite_distance,
+    entropy_distance,
     label_distance,
     pair_populations,
     pair_similar,
@@ -14,6 +15,7 @@ from conevo.evolution.selection import (
 )
 from conevo.specialization import shares
 from conevo.specialization.diversity import differences
+from conevo.specialization.entropy import activity_entropy
 
 
 def test_specialization_distance_of_the_thesis_controllers():
@@ -63,6 +65,19 @@ def test_distance_of_lives_agrees_with_the_measure_of_a_teams_diversity():
     counts = np.random.default_rng(1).integers(0, 9, (6, 4))
     counts[2] = 0
     np.testing.assert_allclose(shares_distance(shares(counts)), differences(counts), atol=1e-15)
+
+
+def test_distance_by_entropy_compares_degrees_of_specialization_without_labels():
+    # One action each, two alike, one three times as often as the other, nothing.
+    lives = np.array([[1.0, 0.0], [0.0, 1.0], [0.5, 0.5], [0.25, 0.75], [0.0, 0.0]])
+    expected = np.array([0, 0, 1, 2 - 0.75 * np.log2(3), 0])  # bits of two
+    found = entropy_distance(lives)
+    np.testing.assert_allclose(found, np.abs(expected[:, None] - expected))
+    counts = np.random.default_rng(1).integers(0, 9, (6, 4))
+    degrees = [activity_entropy(row[None]) / 2 for row in counts]
+    np.testing.assert_allclose(
+        entropy_distance(shares(counts)), np.abs(np.subtract.outer(degrees, degrees)), atol=1e-12
+    )
 
 
 def test_labels_are_the_action_done_most_and_whether_a_robot_is_specialized():

@@ -23,7 +23,7 @@ from conevo.evolution.protocol import FloatArray, IntArray, Scores
 from conevo.evolution.whole import TeamConfig
 from conevo.parameters import parameters
 
-__all__ = ["MapConfig", "TeamMap", "describe"]
+__all__ = ["MapConfig", "TeamMap", "describe", "evenness"]
 
 
 @parameters("method")
@@ -59,7 +59,7 @@ def describe(scores: Scores, behaviour: str) -> FloatArray:
     mean = scores.shares.mean(axis=1)
     if behaviour == "shares":
         return np.concatenate([mean, difference[:, None]], axis=1)
-    return np.stack([_evenness(mean), difference], axis=1)
+    return np.stack([evenness(mean), difference], axis=1)
 
 
 def _difference(described: FloatArray) -> FloatArray:
@@ -72,8 +72,11 @@ def _difference(described: FloatArray) -> FloatArray:
     return distance
 
 
-def _evenness(shares: FloatArray) -> FloatArray:
-    """Return the entropy [N] of shares [N, A] as a portion of that of equal ones; 0 for A = 1."""
+def evenness(shares: FloatArray) -> FloatArray:
+    """Return the entropy [N] of shares [N, A] as a portion of that of equal ones.
+
+    0 for A = 1, and where nothing was done. Shares are divided by their sum first.
+    """
     total = shares.sum(axis=1, keepdims=True)
     part = np.divide(shares, total, out=np.zeros_like(shares), where=total > 0)
     bits = np.log2(part, out=np.zeros_like(part), where=part > 0)

@@ -15,11 +15,13 @@ from typing import Literal
 
 import numpy as np
 
+from conevo.evolution.behaviour import evenness
 from conevo.evolution.population import genotype_distance
 from conevo.evolution.protocol import BoolArray, FloatArray, IntArray
 
 __all__ = [
     "elite_distance",
+    "entropy_distance",
     "label_distance",
     "pair_populations",
     "pair_similar",
@@ -45,6 +47,19 @@ def shares_distance(shares: FloatArray) -> FloatArray:
     spent = _with_nothing(shares)
     distance: FloatArray = np.abs(spent[:, None] - spent[None]).sum(axis=-1) / 2
     return distance
+
+
+def entropy_distance(shares: FloatArray) -> FloatArray:
+    """Return how much controllers differ in their degree of specialization, [P, P] in [0, 1].
+
+    The degree is the entropy of a robot's shares, as a portion of that of equal ones: 0 for one
+    action only, 1 for all equally often (O'Donnell and Jeanne 1990). It needs neither labels nor a
+    threshold, nor switches between actions (Nitschke 2009, section 7.2).
+
+    Args:
+        shares: [P, A] share of each action.
+    """
+    return specialization_distance(evenness(shares))
 
 
 def label_distance(

@@ -21,12 +21,14 @@ from annotated_types import Ge, Le
 from conevo.errors import UsageError, shown
 from conevo.evolution import credit
 from conevo.evolution.assembly import elite_teams
+from conevo.evolution.behaviour import evenness
 from conevo.evolution.generation import begin, count, note, push, trials
 from conevo.evolution.methods.mesp import Mesp, MespConfig, MespState
 from conevo.evolution.population import ranking
 from conevo.evolution.protocol import BoolArray, FloatArray, IntArray, Layout, Scores, Trials
 from conevo.evolution.regulation import regulate_gst, regulate_sst
 from conevo.evolution.selection import (
+    entropy_distance,
     label_distance,
     pair_populations,
     pair_similar,
@@ -77,10 +79,12 @@ class ConeConfig(MespConfig):
     """which pairs of populations below SST may exchange genes: "nearest" takes the most similar
     first and each population once; "all" takes every pair, and each sub-population once. Choice:
     "nearest"; the printed loop overwrites a population n - 1 times."""
-    sd: Literal["switching", "shares", "label"] = "switching"
+    sd: Literal["switching", "shares", "label", "entropy"] = "switching"
     """difference between the behaviours of two robots: "switching" is that of their S (eq. 3.5);
     "shares" the part of its life that one would have to spend differently to be like the other;
-    "label" 0 if they do the same most and are both specialized (S < 0.5) or both not, else 1."""
+    "label" 0 if they do the same most and are both specialized (S < 0.5) or both not, else 1;
+    "entropy" is that of the entropies of their shares of actions, which then replaces S in the
+    regulation of SST, too (7.2: a metric without labels and thresholds)."""
     exchange_slots: Literal["any", "same"] = "any"
     """whether sub-populations of "any" two slots may recombine, or only of the "same" slot, as the
     genotypes' tags imply. CONE-1 always takes the same. Choice: "any"; section 3.7 tests each pair
@@ -144,7 +148,8 @@ class ConeState(MespState):
     """State of CONE.
 
     Attributes:
-        past_specialization: [H] float64 mean S of the fittest team, like ``past_fitness``.
+        past_specialization: [H] float64 mean S of the fittest team, like ``past_fitness``; with
+            ``sd`` = "entropy" the mean entropy of its robots' actions.
         past_recombinations: [H] float64 recombinations between populations.
         distance: [P, P] float64 SD between the last fittest team's controllers; NaN before the
             first one, and without the SDM.
@@ -227,7 +232,12 @@ class Cone(Mesp[ConeState]):
     def crowned(self, state: ConeState, trials: Trials, scores: Scores) -> ConeState:
         """Return the state with its fittest team and the SD between its controllers recorded."""
         state = super().crowned(state, trials, scores)
-        return replace(state, distance=self.differ(scores)) if self.config.use_sdm else state
+        if not self.config.use_sdm:
+            return state
+        state = replace(state, distance=self.differ(scores))
+        if self.config.sd == "entropy" and scores.shares is not None:
+            state = note(state, activity_entropy=float(evenness(scores.shares[0]).mean()))
+        return state
 
     def differ(self, scores: Scores) -> FloatArray:
         """Return SD [P, P] between the controllers of the first team of some scores.
@@ -242,6 +252,8 @@ class Cone(Mesp[ConeState]):
             raise UsageError(f"method.sd = {sd!r} needs scores.shares, the activity of each robot")
         if sd == "shares":
             return shares_distance(scores.shares[0])
+        if sd == "entropy":
+            return entropy_distance(scores.shares[0])
         return label_distance(specialization, scores.shares[0])
 
     @property
@@ -296,7 +308,9 @@ class Cone(Mesp[ConeState]):
     def remember(self, state: ConeState) -> ConeState:
         """Return the state with the ended generation added to the windows of its thresholds."""
         ended = state.progress
-        specialization = np.mean(ended.fittest_specialization)
+        specialization = ended.numbers.get("activity_entropy")
+        if specialization is None:
+            specialization = float(np.mean(ended.fittest_specialization))
         return replace(
             state,
             past_specialization=push(state.past_specialization, specialization),
