@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 import conevo
+from conevo.evolution import Layout, Scores
 from conevo.report.foreign import read_foreign
+from conevo.runs import checkpoint
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.append(str(ROOT / "experiments"))  # scripts import what they share
@@ -16,6 +18,7 @@ CALIBRATION = ROOT / "docs" / "results" / "calibration.md"
 
 import calibration  # noqa: E402
 import calibration_tables as tables  # noqa: E402
+import draw_team_map  # noqa: E402
 import pages  # noqa: E402
 import reference_q  # noqa: E402
 from blind import Blind, kind  # noqa: E402
@@ -223,3 +226,23 @@ def test_q_learners_need_named_actions(tmp_path, capsys, monkeypatch):
     assert reference_q.main() == 2
     assert "declares no discrete actions" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
+
+
+def test_the_map_of_teams_is_that_of_the_newest_checkpoint(tmp_path):
+    learner = conevo.method("map-elites", genotypes=9, bins=3)
+    state = learner.init(Layout(n_robots=2, n_hidden=2, max_hidden=2, n_genes=3), 1)
+    for name in ("checkpoint-b.npz", "checkpoint-a.npz"):
+        generation = state.progress.generation
+        while state.progress.generation == generation:
+            trials = learner.ask(state)
+            credit = trials.networks()[:, :, 0, 0].astype(float)
+            shares = np.stack([credit > 0, credit < -0.5], axis=2).astype(float)
+            state = learner.tell(state, trials, Scores(credit, 0 * credit, shares))
+        checkpoint.save(tmp_path / name, state, {})
+    found = draw_team_map.newest_map(tmp_path)
+    np.testing.assert_array_equal(found.ravel(), state.map.fitness)
+    assert found.shape == (3, 3)
+    assert 0 < np.isfinite(found).sum() < 9
+    checkpoint.save(tmp_path / "checkpoint-a.npz", state.progress, {})
+    with pytest.raises(ValueError, match="its method has no map of teams"):
+        draw_team_map.newest_map(tmp_path)
