@@ -1,9 +1,11 @@
 """Response thresholds: the papers' steps by hand, on the oracle, which the kernel equals."""
 
+from dataclasses import asdict
+
 import numpy as np
 import pytest
 
-from conevo.controllers.registry import controller
+from conevo.controllers.registry import CONTROLLERS, controller
 from conevo.errors import UsageError
 from conevo.export.networks import network_of
 
@@ -94,3 +96,29 @@ def test_thresholds_that_change_are_not_exported_and_a_threshold_below_all_genes
         network_of(controller("thresholds", xi=0.1), genes, active, 1, 1)
     with pytest.raises(UsageError, match=r"controller.theta = 0\.01: must be 0, or from 1/64 to 1"):
         controller("thresholds", theta=0.01)
+
+
+@pytest.mark.parametrize(
+    ("name", "settings", "remembers"),
+    [
+        ("srn", {}, True),
+        ("srn", {"recurrent": False}, False),
+        ("gru", {}, True),
+        ("thresholds", {}, False),
+        ("thresholds", {"phi": 0.1}, True),
+        ("rules", {}, False),
+    ],
+)
+def test_the_registry_knows_which_robots_remember(name, settings, remembers):
+    """As reports state it: outputs for the same inputs differ, or do not, after other inputs."""
+    mind, rng = controller(name, **settings), np.random.default_rng(2)
+    assert CONTROLLERS[name].remembers(asdict(mind)) == remembers
+    genome = mind.genome(3, 2)
+    genes = rng.uniform(-1, 1, (4, genome.max_parts, genome.n_genes)).astype(np.float32)
+    active = np.ones(genes.shape[:2], bool)
+    memory = np.zeros((*active.shape, mind.n_memory), np.float32)
+    inputs = rng.uniform(-1, 1, (4, 3)).astype(np.float32)
+    first, memory = mind.forward(genes, active, memory, inputs, 2)
+    _, memory = mind.forward(genes, active, memory, -inputs, 2)
+    again, _ = mind.forward(genes, active, memory, inputs, 2)
+    assert (first.tobytes() != again.tobytes()) == remembers

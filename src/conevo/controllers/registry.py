@@ -37,6 +37,8 @@ class ControllerEntry:
         summary: a description in one line.
         source: the publication that describes it.
         target: "module:Class" below this package, loaded when needed.
+        remembers_by: settings of which one must be on (not false, not 0) if a robot is to remember
+            anything; none of them: it never does; None: it always does.
     """
 
     name: str
@@ -44,6 +46,11 @@ class ControllerEntry:
     summary: str
     source: str
     target: str
+    remembers_by: tuple[str, ...] | None = None
+
+    def remembers(self, settings: Mapping[str, Any]) -> bool:
+        """Return whether robots with these settings act on more than their inputs of now."""
+        return self.remembers_by is None or any(settings.get(one) for one in self.remembers_by)
 
     @property
     def settings_class(self) -> type[Any]:
@@ -61,6 +68,7 @@ CONTROLLERS: dict[str, ControllerEntry] = {
             "one hidden layer that sees its own activations of the previous iteration",
             "Elman 1990; Nitschke 2009, sections 3.1, 4.1, 5.2, 6.2.7",
             "srn:Srn",
+            ("recurrent",),
         ),
         ControllerEntry(
             "ctrnn",
@@ -89,6 +97,7 @@ CONTROLLERS: dict[str, ControllerEntry] = {
             "tasks, each with a stimulus and a threshold, of which the strongest response wins",
             "Bonabeau et al. 1996; Theraulaz et al. 1998; Nitschke 2009, section 2.2.2",
             "thresholds:ResponseThresholds",
+            ("xi", "phi"),
         ),
         ControllerEntry(
             "rules",
@@ -96,6 +105,7 @@ CONTROLLERS: dict[str, ControllerEntry] = {
             "rules with a condition and an action, of which one acts",
             "Smith 1980; Potter et al. 1995; Nitschke 2009, section 2.2.5",
             "rules:RuleSet",
+            (),
         ),
     )
 }

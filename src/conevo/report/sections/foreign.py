@@ -15,6 +15,7 @@ from statistics import fmean, stdev
 import numpy as np
 
 from conevo.campaigns.campaign import Campaign
+from conevo.controllers.registry import CONTROLLERS
 from conevo.errors import ConevoError
 from conevo.report.comparison import Cell, Treatment
 from conevo.report.exhibits import Column, Exhibit, Figure, Section, Table, plain, slug
@@ -189,7 +190,10 @@ def _controller(path: Path) -> tuple[str, int | None, bool | None, str]:
         team, machine = run.champion, str(run.provenance["cpu"])
     except (ConevoError, KeyError):  # a damaged run is reported elsewhere
         return NOT_STATED, None, None, NOT_STATED
-    memory = f"context ({about['name']})" if about.get("recurrent", True) else "none"
+    entry = CONTROLLERS.get(about["name"])
+    memory = "none"
+    if entry is None or entry.remembers(about):
+        memory = f"context ({about['name']})"
     if team is None:
         return machine, None, None, memory
     sizes = team.active.sum(axis=1) * team.genes.shape[2]
