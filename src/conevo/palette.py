@@ -88,6 +88,7 @@ METHODS: dict[str, Look] = {
     "novelty": Look(15, "#e4ecd0", "#5f7a1e"),
     "map-elites": Look(16, "#b7cfe8", "#2c5f8a"),
     "hyb-ccea": Look(17, "#f3c9b0", "#a8461c"),
+    "sane": Look(18, "#e8c7cf", "#b04a63"),
 }
 """The look of every method of the registry."""
 

@@ -52,7 +52,7 @@ def variants():
         names = {field.name for field in fields(entry.config_class)}
         small = {"genotypes": GENOTYPES, "elite_portion": 0.5, "pairs": 2 * ROUNDS}
         small |= dict.fromkeys(("stagnation_v", "stagnation_w", "stagnation_y", "stagnation"), 1)
-        small |= {"new_node": 0.5, "new_connection": 0.5}
+        small |= {"new_node": 0.5, "new_connection": 0.5, "blueprints": 20}
         config = {key: value for key, value in small.items() if key in names}
         if "evaluation" not in names:
             config |= {"rounds": ROUNDS} if "rounds" in names else {}
@@ -327,6 +327,9 @@ def test_every_genotype_is_tried_the_promised_number_of_times(name, config):
         trials = learner.ask(state)
         n, r = np.indices(trials.teams.shape[:2])
         if state.phase != "genotypes":
+            continue
+        if "blueprints" in config:  # a neuron is tried as often as blueprints list it
+            assert len(trials.teams) == config["blueprints"]
             continue
         own = np.arange(state.genes[..., 0].size).reshape(state.genes.shape[:3])
         if config.get("evaluation", "shared" if "rounds" in config else "") == "shared":

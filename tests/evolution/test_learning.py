@@ -18,6 +18,7 @@ CASES = [
     *((name, {"team": team}, 60) for name in ("esp", "cosyne") for team in ("clones", "whole")),
     ("novelty", {"genotypes": 60, "weight": 0.0, "team": "clones"}, 40),
     ("map-elites", {"genotypes": 60, "team": "clones"}, 40),
+    *(("sane", {"team": team}, 60) for team in ("clones", "whole")),
     *(
         (name, {"genotypes": 20, "evaluation": evaluation, "rounds": 5}, 40)
         for name, entry in METHODS.items()

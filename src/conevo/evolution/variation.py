@@ -6,9 +6,10 @@ networks. Shapes: S units, M genotypes each, L of them elite, G genes.
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
+import numpy.typing as npt
 from annotated_types import Ge, Gt, Le
 
 from conevo.evolution.population import ranking
@@ -26,6 +27,9 @@ __all__ = [
     "upward",
     "within",
 ]
+
+
+Genotypes = npt.NDArray[Any]  # of genes, or of whole numbers
 
 
 @parameters("method")
@@ -104,7 +108,7 @@ def across(
     return crossover(a, b, generator)
 
 
-def upward(elites: FloatArray, generator: np.random.Generator) -> tuple[FloatArray, FloatArray]:
+def upward(elites: Genotypes, generator: np.random.Generator) -> tuple[Genotypes, Genotypes]:
     """Return both children [S, L, G] of each elite and a random fitter one.
 
     Moriarty and Miikkulainen 1996 (SANE), Gomez and Miikkulainen 1997 (ESP). Choice: the fittest,
@@ -120,7 +124,7 @@ def upward(elites: FloatArray, generator: np.random.Generator) -> tuple[FloatArr
     return crossover(elites, elites[np.arange(n_units)[:, None], mate], generator)
 
 
-def replaced(genes: FloatArray, fitness: FloatArray, children: FloatArray) -> FloatArray:
+def replaced(genes: Genotypes, fitness: FloatArray, children: Genotypes) -> Genotypes:
     """Return units [S, M, G] in which children [S, C, G] have replaced the least fit genotypes.
 
     Args:

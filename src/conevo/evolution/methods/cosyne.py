@@ -37,7 +37,7 @@ from conevo.evolution.generation import (
 )
 from conevo.evolution.population import elite_count, ranking
 from conevo.evolution.protocol import BoolArray, FloatArray, Layout, Scores, Trials
-from conevo.evolution.variation import mutate, replaced, upward
+from conevo.evolution.variation import VariationConfig, mutate, replaced, upward
 from conevo.evolution.whole import TeamConfig, credit_of_team, filled
 from conevo.parameters import parameters
 from conevo.rng import stream
@@ -46,17 +46,15 @@ __all__ = ["Cosyne", "CosyneConfig", "marked", "permuted", "relative"]
 
 
 @parameters("method")
-class CosyneConfig(TeamConfig):
+class CosyneConfig(VariationConfig, TeamConfig):
     """Parameters of CoSyNE."""
 
     genotypes: Annotated[int, Ge(4), Le(1_000_000)] = 40
     """M, networks; each costs one team evaluation in a generation. Choice: 40."""
     elite_portion: Annotated[float, Gt(0), Le(0.5)] = 0.25
     """fraction of the networks that mate. Each has two children."""
-    mutation_probability: Annotated[float, Ge(0), Le(1)] = 0.05
-    """chance of each gene of a child to be mutated."""
-    mutation_scale: Annotated[float, Ge(0), Le(1000)] = 0.1
-    """scale of the Cauchy step in gene units. Choice: 0.1, as for all methods."""
+    n_elitist: Annotated[int, Ge(0), Le(0)] = 0
+    """always 0: the fitter half of the networks survives in any case."""
     permutation: Literal["fitness", "rank", "all"] = "fitness"
     """what the relative fitness q of a network is: its place between the least and the largest
     "fitness" (equation of section 3), its "rank" likewise, which does not depend on the scale of

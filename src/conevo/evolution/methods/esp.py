@@ -52,7 +52,7 @@ from conevo.evolution.protocol import (
     Trials,
 )
 from conevo.evolution.regulation import resized
-from conevo.evolution.variation import mutate, replaced, upward
+from conevo.evolution.variation import VariationConfig, mutate, replaced, upward
 from conevo.evolution.whole import TeamConfig, credit_of_team, filled
 from conevo.parameters import parameters
 from conevo.rng import stream
@@ -63,7 +63,7 @@ BURSTS = 2  # without success, before the size is questioned (Gomez 2003)
 
 
 @parameters("method")
-class EspConfig(TeamConfig):
+class EspConfig(VariationConfig, TeamConfig):
     """Parameters of ESP."""
 
     genotypes: Annotated[int, Ge(2), Le(1_000_000)] = 40
@@ -75,10 +75,8 @@ class EspConfig(TeamConfig):
     elite_portion: Annotated[float, Gt(0), Le(0.5)] = 0.25
     """fraction of a sub-population that mates (Gomez and Miikkulainen 1997: a quarter). Each has
     two children."""
-    mutation_probability: Annotated[float, Ge(0), Le(1)] = 0.05
-    """chance of each gene of a child to be mutated."""
-    mutation_scale: Annotated[float, Ge(0), Le(1000)] = 0.1
-    """scale of the Cauchy step in gene units. Choice: 0.1, as for all methods."""
+    n_elitist: Annotated[int, Ge(0), Le(0)] = 0
+    """always 0: the fitter half of a sub-population survives in any case."""
     stagnation: Annotated[int, Ge(1), Le(100_000)] = 20
     """generations without a better network before a burst, and between bursts. Choice: 20."""
     burst_scale: Annotated[float, Gt(0), Le(1000)] = 0.03

@@ -117,6 +117,15 @@ METHODS: dict[str, MethodEntry] = {
             method_name="Esp",
         ),
         MethodEntry(
+            name="sane",
+            title="SANE",
+            summary="one population of neurons and one of blueprints, which are lists of neurons",
+            source="Moriarty and Miikkulainen 1996, 1997; Nitschke 2009, section 2.3.3",
+            module="conevo.evolution.methods.sane",
+            config_name="SaneConfig",
+            method_name="Sane",
+        ),
+        MethodEntry(
             name="cosyne",
             title="CoSyNE",
             summary="a sub-population per connection weight of one network, permuted by fitness",
