@@ -89,6 +89,7 @@ METHODS: dict[str, Look] = {
     "map-elites": Look(16, "#b7cfe8", "#2c5f8a"),
     "hyb-ccea": Look(17, "#f3c9b0", "#a8461c"),
     "sane": Look(18, "#e8c7cf", "#b04a63"),
+    "hyperneat": Look(19, "#9375ef", "#3a1a97"),
 }
 """The look of every method of the registry."""
 

@@ -19,7 +19,10 @@ from conevo.evolution.methods.registry import name_in, resolve
 from conevo.runs.checkpoint import difference, load_like, refuse_unkept, save
 
 LAYOUT = Layout(n_robots=3, n_hidden=3, max_hidden=5, n_genes=4)
-SIZES = {"graph": {"max_hidden": 2}}  # of controllers that some methods need
+SIZES = {
+    "graph": {"max_hidden": 2},
+    "srn": {"n_hidden": 3, "max_hidden": 4},
+}  # of controllers that some methods need
 GENOTYPES = 6
 ROUNDS = 4
 EXCHANGE = {  # every option of the exchange between populations

@@ -15,9 +15,10 @@ from conevo.evolution.inheritance import breed_from, hand_on
 LAYOUT = Layout(n_robots=2, n_hidden=3, max_hidden=5, n_genes=4)
 CONE = method("cone").config
 TAKEN = {"genes", "active", "progress.n_hidden"}
-AROUND_A_TEAM = [name for name in METHODS if hasattr(method(name), "begin_with")]
+GENERAL = [name for name, entry in METHODS.items() if not entry.controllers]  # for any sizes
+AROUND_A_TEAM = [name for name in GENERAL if hasattr(method(name), "begin_with")]
+with_populations = pytest.mark.parametrize("name", [m for m in GENERAL if m not in AROUND_A_TEAM])
 OF_ONE_TEAM = [name for name in AROUND_A_TEAM if name != "map-elites"]  # it has no centre
-with_populations = pytest.mark.parametrize("name", [m for m in METHODS if m not in AROUND_A_TEAM])
 around_a_team = pytest.mark.parametrize("name", OF_ONE_TEAM)
 
 

@@ -73,7 +73,8 @@ def test_thesis_preset_has_the_sizes_of_the_thesis() -> None:
         task = f"{world}/{WORLDS[world].environments[0]}"
         teams = resolve(task, "homcne", "thesis").method_config.genotypes
         assert {2 * resolve(task, name, "thesis").method_config.pairs for name in OURS} == {teams}
-        assert resolve(task, "neat", "thesis").method_config.genotypes == teams
+        for name in ("neat", "hyperneat"):
+            assert resolve(task, name, "thesis").method_config.genotypes == teams
         cma = resolve(task, "cma-es", "thesis").method_config
         assert cma.genotypes * cma.rounds == teams
     run = resolve(TASK, "cone", "thesis").run

@@ -57,6 +57,8 @@ def genes(path: Path) -> np.ndarray:
     with np.load(path) as archive:
         if "field.genes" in archive:
             return archive["field.genes"]
+        if "field.cppns.graphs.genes" in archive:
+            return archive["field.cppns.graphs.genes"]
         if archive["field.progress.fittest_active"].any():
             return archive["field.progress.fittest_genes"]
         if "field.graphs.genes" in archive:  # clones of the first genotype

@@ -27,7 +27,7 @@ settings_only = all_of(
     click.option(
         "--method", metavar="NAME",
         help="cone (default), mesp, ccga, hetcne, homcne, cone-1..3, cone-es, hom-es, esp, "
-        "sane, cosyne, neat, openai-es, cma-es, novelty, map-elites, hyb-ccea, or "
+        "sane, cosyne, neat, hyperneat, openai-es, cma-es, novelty, map-elites, hyb-ccea, or "
         "FILE.py:NAME.",
     ),
     click.option(

@@ -32,7 +32,8 @@ def hand_on(method: Method, layout: Layout, root: int, state: State) -> State:
     them. Choice: in a team with more robots than before, population p starts as a copy of
     population p mod P; in a smaller team the last populations are dropped. A method with a function
     ``begin_with(layout, root, genes, active)`` has no populations: it starts around the fittest
-    team of the last generation, or from random genotypes if no generation has ended yet.
+    team of the last generation, or from random genotypes if no generation has ended yet. One with
+    a function ``inherit(layout, root, state)``, whose genotypes are not networks, takes them over.
 
     Args:
         method: the method of the new task.
@@ -45,6 +46,9 @@ def hand_on(method: Method, layout: Layout, root: int, state: State) -> State:
             only one of the two, one of the two has no populations, or ``state`` lacks the
             thresholds that the parameters require.
     """
+    if hasattr(method, "inherit"):
+        inherited: State = method.inherit(layout, root, state)
+        return inherited
     if hasattr(method, "begin_with"):
         ended = state.progress
         return _around(method, layout, root, ended.fittest_genes, ended.fittest_active)

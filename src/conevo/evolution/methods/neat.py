@@ -168,6 +168,7 @@ class Neat:
     config: NeatConfig = field(default_factory=NeatConfig)
     name: str = "neat"
     title: str = "NEAT"
+    n_further: int = 0  # genes of a node that only another method reads
 
     def init(self, layout: Layout, root: int) -> NeatState:
         """Return generation 0: networks without hidden nodes, with random weights.
@@ -202,6 +203,24 @@ class Neat:
         self._mutate_weights(graphs, 1, stream(root, "champion"))
         return self._first(layout, root, sizes, graphs, marks)
 
+    def continued(
+        self, layout: Layout, root: int, graphs: Graphs, next_mark: int, next_node: int
+    ) -> NeatState:
+        """Return generation 0 with the genotypes of another run.
+
+        Args:
+            layout: the size of the problem.
+            root: the seed of every random decision.
+            graphs: M genotypes.
+            next_mark: the next historical marking of a connection.
+            next_node: the next historical marking of a node.
+
+        Raises:
+            UsageError: as ``init``.
+        """
+        marks = Innovations(next_mark, next_node)
+        return self._first(layout, root, self.sizes(layout), graphs, marks)
+
     def _first(
         self, layout: Layout, root: int, sizes: Sizes, graphs: Graphs, marks: Innovations
     ) -> NeatState:
@@ -231,7 +250,11 @@ class Neat:
             UsageError: as ``init``.
         """
         sizes = Sizes(
-            self.config.n_networks(layout), layout.n_inputs, layout.n_outputs, layout.max_hidden
+            n_networks=self.config.n_networks(layout),
+            n_inputs=layout.n_inputs,
+            n_outputs=layout.n_outputs,
+            n_slots=layout.max_hidden,
+            n_further=self.n_further,
         )
         if not 1 <= sizes.n_outputs <= sizes.n_slots or sizes.n_genes != layout.n_genes:
             raise UsageError(f"{self.title} needs the layout of controller 'graph', not {layout}")
@@ -241,7 +264,8 @@ class Neat:
         """Return the room of a state's genotypes."""
         _, n_slots, n_genes = state.progress.fittest_genes.shape
         n_networks = state.graphs.nodes.shape[1] // n_slots
-        return Sizes(n_networks, n_genes - n_slots - 2, state.n_outputs, n_slots)
+        n_inputs = n_genes - n_slots - 2 - self.n_further
+        return Sizes(n_networks, n_inputs, state.n_outputs, n_slots, self.n_further)
 
     def ask(self, state: NeatState) -> Trials:
         """Return a team of every genotype, then of the fittest."""

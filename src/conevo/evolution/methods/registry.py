@@ -145,6 +145,16 @@ METHODS: dict[str, MethodEntry] = {
             controllers=("graph",),
         ),
         MethodEntry(
+            name="hyperneat",
+            title="HyperNEAT",
+            summary="NEAT evolves functions of geometry that give the weights of a team's networks",
+            source="Stanley, D'Ambrosio and Gauci 2009; D'Ambrosio and Stanley 2008",
+            module="conevo.evolution.methods.hyperneat",
+            config_name="HyperNeatConfig",
+            method_name="HyperNeat",
+            controllers=("srn",),
+        ),
+        MethodEntry(
             name="openai-es",
             title="OpenAI-ES",
             summary="an evolution strategy by the gradient of ranks: clones, a whole team, robots",
