@@ -57,6 +57,18 @@ def test_hostile_names_stay_text(tab, tmp_path, text):
     assert overflow(tab) <= 0
 
 
+def test_a_long_value_does_not_break_the_name_in_front_of_it(tab, tmp_path):
+    facts = (("run", "jaxmarl-MPE_simple_world_comm_v3-" * 4), ("seed", "1"))
+    open_page(tab, replay_page([replace(made_up(), facts=facts)]), tmp_path / "long.html")
+    lines = """() => {
+        const name = document.createRange();
+        const names = [...document.querySelectorAll("dt")];
+        name.selectNodeContents(names.find((one) => one.textContent === "run"));
+        return name.getClientRects().length;
+    }"""
+    assert tab.evaluate(lines) == 1
+
+
 OPTIONAL = {field.name for field in fields(Playback) if field.default is None}
 LISTS = {field.name for field in fields(Playback) if field.default == ()} | {"facts"}
 
