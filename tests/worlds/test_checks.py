@@ -285,9 +285,13 @@ OUTSIDE = {
 
 @pytest.mark.parametrize("name", OUTSIDE)
 def test_an_index_outside_an_array_is_found_with_its_line(
-    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     change, line = OUTSIDE[name]
+    scratch = tmp_path / "scratch"
+    scratch.mkdir()
+    monkeypatch.setattr("tempfile.tempdir", str(scratch))
+    monkeypatch.setenv("TMPDIR", str(scratch))
     imports = ("from conevo.rng", "from neighbour import NOTHING\nfrom conevo.rng")
     (tmp_path / "neighbour.py").write_text("NOTHING = 0\n")
     file = written(tmp_path / "bad.py", change, imports)
@@ -297,6 +301,7 @@ def test_an_index_outside_an_array_is_found_with_its_line(
     number = 1 + [text.strip() for text in file.read_text().splitlines()].index(line)
     assert f"problem  memory        {file}:{number}: in `{line}` an index lies outside its" in out
     assert out.endswith("1 problem\n")
+    assert [*scratch.iterdir()] == []  # of two children that died
 
 
 CALLED = """

@@ -133,11 +133,15 @@ def _in_child(
     """
     got, put = os.pipe()
     command = [sys.executable, "-m", __name__, path, str(put), given]
-    with open(got) as lines, tempfile.TemporaryFile("w+") as errors:
+    with (
+        open(got) as lines,
+        tempfile.TemporaryFile("w+") as errors,
+        tempfile.TemporaryDirectory() as scratch,  # a child that dies leaves Warp's headers there
+    ):
         child = subprocess.Popen(
             command,
             pass_fds=[put],
-            env=os.environ | variables,
+            env=os.environ | variables | {"TMPDIR": scratch},
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             stderr=errors,
