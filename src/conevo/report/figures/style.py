@@ -29,12 +29,17 @@ if TYPE_CHECKING:
 WIDTH = 7.0  # inches: both columns of a page, or its text width
 COLUMN = 3.4  # one of two columns
 HEIGHT = 9.0  # of a page
-HATCHES = ("", "//", "||", "\\\\", "", "xx", "--", "++", "..", "oo")  # by ``palette.Look.number``
+HATCHES = (  # by ``palette.Look.number``, as the next two
+    "", "//", "||", "\\\\", "", "xx", "--", "++", "..", "oo",
+    "**", "OO", "/o", "\\o", "/.", "\\.", "|.", "-.", "|o", "-o",
+)  # fmt: skip
 DASHES: tuple[Any, ...] = (
     ":", "--", "-.", (0, (5, 1.5, 1, 1.5, 1, 1.5)), "-", (0, (1, 1)), (0, (8, 2)), (0, (3, 3)),
-    (0, (8, 2, 2, 2)), (0, (2, 4)),
+    (0, (8, 2, 2, 2)), (0, (2, 4)), (0, (1, 3)), (0, (5, 1)), (0, (12, 3)), (0, (6, 1, 1, 1)),
+    (0, (3, 1, 1, 1, 1, 1)), (0, (12, 2, 3, 2)), (0, (6, 5)), (0, (3, 1)), (0, (1, 1, 4, 1)),
+    (0, (2, 1, 2, 4)),
 )  # fmt: skip
-MARKERS = "os^DvPX*<p"
+MARKERS: tuple[Any, ...] = (*"os^DvPX*<p>hd8H.", (4, 1, 0), (6, 1, 0), (3, 1, 0), (8, 1, 0))
 EVERYTHING = (-math.inf, math.inf)  # the values of a measure that may have any
 SETTINGS: dict[Any, Any] = {
     "font.family": FONT,
