@@ -57,7 +57,7 @@ class CmaEsConfig(TeamConfig):
     genotypes: Annotated[int, Ge(4), Le(1_000_000)] = 40
     """N, teams tried in a generation; the better half moves the mean. Choice: 40, above the
     tutorial's 4 + 3 ln(n), as fitness is noisy."""
-    rounds: Annotated[int, Ge(1), Le(10_000)] = 5
+    rounds: Annotated[int, Ge(1), Le(10_000)] = 2
     """times that each of them is tried, each time in other scenarios."""
     step_size: Annotated[float, Gt(0), Le(1)] = 0.3
     """standard deviation of a gene at the start, in gene units."""
