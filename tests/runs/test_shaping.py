@@ -55,7 +55,10 @@ def stages_content(path: Path) -> dict[str, Any]:
 def genes(path: Path) -> np.ndarray:
     """Return the genotypes or the fittest team that a checkpoint hands on, or those it received."""
     with np.load(path) as archive:
-        if "field.genes" in archive:
+        has_map = "field.start" in archive  # of MAP-Elites, which starts around a team of clones
+        if has_map and not archive["field.progress.fittest_active"].any():
+            return archive["field.start"][0].swapaxes(0, 1)
+        if "field.genes" in archive and not has_map:
             return archive["field.genes"]
         if "field.cppns.graphs.genes" in archive:
             return archive["field.cppns.graphs.genes"]
