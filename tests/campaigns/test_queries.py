@@ -80,6 +80,22 @@ def test_budgets_join_near_numbers_of_evaluations_and_keep_others_apart(tmp_path
     }
 
 
+def test_epochs_that_end_early_are_no_other_budget(tmp_path) -> None:
+    of = [
+        *cells(["rover/complex-1"], ["homcne"], budget=100),
+        *cells(["rover/complex-1"], ["cone"], budget=102),
+    ]
+    with tables_of(tmp_path, of, seeds=1) as tables:
+        assert len({one.budget for one in tables.values()}) == 1
+    longer = "if(method = 'cone', team_steps * 2, team_steps) AS team_steps"
+    edit(tmp_path, f"SELECT * REPLACE ({longer}) FROM old")
+    with Tables(tmp_path / "campaign" / "tables") as tables:
+        assert len({one.budget for one in tables.values()}) == 2
+    edit(tmp_path, "SELECT * REPLACE ('vmas' AS world) FROM old")
+    with Tables(tmp_path / "campaign" / "tables") as tables:
+        assert {one.budget for one in tables.values()} == {"smoke, about 100 team evaluations"}
+
+
 def test_runs_of_one_planned_budget_are_one_group(tmp_path) -> None:
     one = "rover/complex-1"
     of = [

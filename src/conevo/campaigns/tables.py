@@ -15,6 +15,7 @@ from conevo.errors import UsageError
 from conevo.evolution.methods.registry import remember_title
 from conevo.runs.frames import pandas
 from conevo.typing import Floats, Record
+from conevo.worlds.families import FAMILIES
 from conevo.worlds.measures import Measure
 
 if TYPE_CHECKING:
@@ -251,6 +252,9 @@ def _refusing(what: str = "query", end: str = "LINE 1:") -> Iterator[None]:
 def _budgets(rows: list[tuple[Any, ...]]) -> dict[str, str]:
     """Return the budget of each run in words.
 
+    Choice: the team-steps of an evaluation distinguish budgets in conevo's worlds only. Epochs of
+    another package's task may end early, so that good teams need more or fewer steps than bad ones.
+
     Args:
         rows: run, world, preset, whether a stage of a shaping, stopped_by, planned evaluations,
             evaluations, team_steps.
@@ -262,15 +266,16 @@ def _budgets(rows: list[tuple[Any, ...]]) -> dict[str, str]:
         one = (is_saver, counted, steps / max(evaluations, 1), run)
         scales[world, preset, is_stage].append(one)
     budgets = {}
-    for (_, preset, is_stage), runs in scales.items():
-        for alike in _apart(runs, 2):
+    for (world, preset, is_stage), runs in scales.items():
+        for alike in [runs] if world in FAMILIES else _apart(runs, 2):
             steps = _rounded(min(one[2] for one in alike))
+            of_steps = "" if world in FAMILIES else f" of {steps:,} team-steps"
             groups = _apart([one for one in alike if not one[0]] or alike, 1)
             for one in alike:
                 group = next((g for g in groups if one[1] <= g[-1][1]), groups[-1])
                 budgets[one[3]] = (
                     f"{preset}, about {_rounded(group[0][1]):,} team evaluations"
-                    f"{' a stage' if is_stage else ''} of {steps:,} team-steps"
+                    f"{' a stage' if is_stage else ''}{of_steps}"
                 )
     return budgets
 
