@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import re
+import traceback
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 
@@ -52,12 +53,18 @@ def shown(value: object, most: int = 60) -> str:
 
 
 def in_a_line(error: BaseException) -> str:
-    """Return the name and the words of an error of another program, in one line."""
+    """Return the name and the words of an error of another program, in one line.
+
+    An error without words, as of ``assert n > 1``, has the statement that raised it instead.
+    """
     try:
         words = str(error)
     except Exception:  # its own __str__ fails
         words = "(without words)"
-    return " ".join(f"{type(error).__name__}: {words}".split())
+    if not words.strip() and error.__traceback__ is not None:
+        words = traceback.extract_tb(error.__traceback__)[-1].line or ""
+    name = type(error).__name__
+    return " ".join(f"{name}: {words}".split()) if words.strip() else name
 
 
 def unknown_name(kind: str, name: str, allowed: Iterable[str], where: str = "") -> UnknownName:

@@ -260,6 +260,8 @@ def test_options_are_the_tasks_keywords() -> None:
         world(f"jaxmarl:{SPREAD}", options="num_agent = 4")
     with pytest.raises(UsageError, match="cannot be made with options 'local_ratio = 2'"):
         world(f"jaxmarl:{SPREAD}", options="local_ratio = 2")
+    with pytest.raises(UsageError, match="has no agents with options 'num_agents = 0'"):
+        world(f"jaxmarl:{SPREAD}", options="num_agents = 0")
 
 
 @pytest.mark.parametrize(

@@ -61,11 +61,12 @@ class Tables:
     by name stays in ``runs``.
 
     ``budgets`` (run, budget) shows which runs may be compared: those of one world, one preset, and
-    about equal numbers of team evaluations and of team-steps per evaluation; stages of shapings
-    separately. Choice: "about equal" is within 20 %, as methods do not divide a budget evenly and
-    CONE spends some on type C. A run that ended because the next generation would have exceeded its
-    budget counts with that budget, whatever it spent of it. So does one that ended earlier at its
-    target. Without a budget, the latter counts with those it saved evaluations to.
+    about equal numbers of team evaluations and, in conevo's worlds, of team-steps per evaluation;
+    stages of shapings separately. Choice: "about equal" is within 20 %, as methods do not divide a
+    budget evenly and CONE spends some on type C. A run that ended because the next generation would
+    have exceeded its budget counts with that budget, whatever it spent of it. So does one that
+    ended earlier at its target. Without a budget, the latter counts with those it saved evaluations
+    to.
 
     Use it as a context, or ``close`` it.
     """

@@ -43,6 +43,8 @@ def facts_of(task: str, options: str, prefixes: str) -> JaxMarlFacts:
         UsageError: the task cannot be made with these options, or cannot be played.
     """
     env = made(task, options)
+    if not env.agents:
+        raise UsageError(f"jaxmarl:{task} has no agents with options {options!r}")
     try:
         observed, state = jax.eval_shape(env.reset, np.zeros(2, np.uint32))
         agents = tuple(
