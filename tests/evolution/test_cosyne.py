@@ -5,8 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from conevo.controllers.registry import controller
 from conevo.evolution import Layout, Scores, method
 from conevo.evolution.methods.cosyne import marked, permuted, relative
+from conevo.kernels.outputs import sigmoid_of
 
 LAYOUT = Layout(n_robots=2, n_hidden=3, max_hidden=4, n_genes=5)
 
@@ -69,3 +71,33 @@ def test_a_network_of_the_team_takes_the_place_of_each_robot():
     five = replace(LAYOUT, n_robots=5)
     assert whole.init(five, 5).genes.shape == (5, 4, 8, 5)
     assert clones.init(five, 5).genes.shape == (1, 4, 8, 5)
+
+
+XOR = [((0, 0), 0), ((0, 1), 1), ((1, 0), 1), ((1, 1), 0)]
+
+
+def evaluations_to_xor(seed):
+    """Return the networks that are tried until one computes XOR; its third input is 1."""
+    net = controller("srn", n_hidden=4, max_hidden=4, recurrent=False, bias=True, weight_scale=20.0)
+    genome = net.genome(3, 1)
+    learner = method("cosyne", genotypes=100)
+    state = learner.init(Layout(1, genome.n_parts, genome.max_parts, genome.n_genes), seed)
+    while state.progress.generation < 60:
+        trials = learner.ask(state)
+        networks, used = trials.networks()[:, 0], trials.teams[:, 0] >= 0
+        memory = np.zeros((*used.shape, 1), np.float32)
+        errors = []
+        for case, answer in XOR:
+            inputs = np.tile(np.array([*case, 1], np.float32), (len(networks), 1))
+            sums, _ = net.forward(networks, used, memory, inputs, 1)
+            errors.append(np.abs(sigmoid_of(sums[:, 0]) - answer))
+        if (np.array(errors) < 0.1).all(axis=0).any():
+            return state.progress.team_evaluations + len(networks)
+        fitness = (4 - np.sum(errors, axis=0)) ** 2
+        state = learner.tell(state, trials, Scores(fitness[:, None], np.zeros((len(networks), 1))))
+    pytest.fail("no network computes XOR")
+
+
+def test_networks_without_memory_learn_xor():
+    """A known answer. A random network is right once in 1,800 tries."""
+    assert np.mean([evaluations_to_xor(seed) for seed in range(1, 13)]) < 800
