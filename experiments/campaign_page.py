@@ -146,14 +146,14 @@ def claims_table(tables: Tables) -> str:
 
 
 def made_with(campaign: Campaign) -> str:
-    """Return versions and machine of the runs, and the number that failed."""
-    about = [Run(campaign.paths.run(name)).provenance for name in campaign.planned]
+    """Return versions and machine of the finished runs, and the number of the others."""
+    standings = campaign.standings()
+    done = [name for name, entry in standings.items() if entry.state == "finished"]
+    about = [Run(campaign.paths.run(name)).provenance for name in done]
     keys = ("conevo", "warp", "numpy", "python", "cpu")
     each = {key: sorted({str(one[key]) for one in about}) for key in keys}
-    entries = campaign.standings().values()
-    failed = sum(entry.state != "finished" for entry in entries)
     words = "; ".join(f"{key} {', '.join(values)}" for key, values in each.items())
-    return f"Made with {words}. Runs that did not finish: {failed}.\n"
+    return f"Made with {words}. Runs that did not finish: {len(standings) - len(done)}.\n"
 
 
 def main() -> None:
