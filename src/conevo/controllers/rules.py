@@ -166,7 +166,7 @@ def follow(
     heuristic: wp.array[int],
     q: int,
 ) -> None:
-    """Let one of robot ``q``'s rules act: it gives the outputs, 0 if there is no rule."""
+    """Let one of robot ``q``'s rules act: it gives the outputs, 0 without any rule."""
     if heuristic[q] >= 0:
         return
     acting = int(-1)
