@@ -35,10 +35,14 @@ def test_a_cppn_by_hand():
     points = np.array([[0.5, 0.2], [9, 9], [0.0, 0.2], [9, 9], [0, 0]])
     bells = np.array([1 / (1 + 1.0**2), 1.0])
     wanted = (3 * bells - 1) / (1 + np.abs(3 * bells - 1))
-    np.testing.assert_allclose(respond(cppn, active, points, 1, 4.0), wanted)
-    assert not respond(cppn, active, points, 0, 4.0).any()
-    active[3] = False
-    np.testing.assert_allclose(respond(cppn, active, points, 1, 4.0), [-0.5, -0.5])
+    without = np.array([True, True, True, False])
+    first, second, third = respond(
+        np.stack([cppn, cppn]), np.stack([active, without]), (points[:, :1], points, points), 4.0
+    )
+    np.testing.assert_allclose(second, [wanted, [-0.5, -0.5]])
+    assert first.shape == (2, 1)
+    assert not first.any()
+    assert not third.any()
 
 
 def test_the_substrate_has_rings_of_sensors_and_places_of_robots():
@@ -59,6 +63,7 @@ def test_the_substrate_has_rings_of_sensors_and_places_of_robots():
     np.testing.assert_array_equal(outputs[2, 0, 0], [-1, 0, 1])
     plain = method("hyperneat", genotypes=3).init(layout(recurrent=False), 1)
     assert learner._points(plain)[1].shape == (5, 3, 4, 0)
+    assert learner.ask(plain).networks().shape == (3, 3, 6, 18 + 3)
 
 
 @pytest.mark.parametrize("team", ["clones", "whole"])

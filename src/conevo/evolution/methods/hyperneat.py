@@ -23,7 +23,9 @@ Choice: hidden neurons are those of the start; their number does not change.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, fields, replace
+from itertools import pairwise
 from typing import Annotated, Literal
 
 import numpy as np
@@ -31,12 +33,21 @@ from annotated_types import Ge, Gt, Le, Lt
 
 from conevo.errors import UsageError
 from conevo.evolution.methods.neat import Neat, NeatConfig, NeatState
-from conevo.evolution.protocol import BoolArray, FloatArray, Layout, Progress, Scores, Trials
+from conevo.evolution.protocol import (
+    BoolArray,
+    FloatArray,
+    IntArray,
+    Layout,
+    Progress,
+    Scores,
+    Trials,
+)
 from conevo.parameters import parameters
 
 __all__ = ["HyperNeat", "HyperNeatConfig", "HyperNeatState", "bell", "squash", "wave"]
 
 N_INPUTS, N_OUTPUTS = 5, 3  # of a CPPN: places of two neurons and of the robot; layers
+BLOCK = 2**16  # weights of the CPPNs that are computed together, so that they stay in the cache
 
 
 @parameters("method")
@@ -145,10 +156,7 @@ class HyperNeat:
         active = nodes >= 0
         cppns = np.where(active[..., None], asked.genes[nodes], np.float32(0))
         n_robots, n_slots, n_genes = state.progress.fittest_genes.shape
-        points = self._points(state)
-        genes = np.stack(
-            [self._weights(state, *one, points) for one in zip(cppns, active, strict=True)]
-        )
+        genes = self._weights(cppns, active, self._points(state))
         n, r, n_hidden, _ = genes.shape
         rows = np.full((n, r, n_slots), -1, dtype=np.int32)
         rows[:, :, :n_hidden] = np.arange(n * r * n_hidden).reshape(n, r, n_hidden)
@@ -203,56 +211,78 @@ class HyperNeat:
         return tuple(layers)
 
     def _weights(
-        self,
-        state: HyperNeatState,
-        cppn: FloatArray,
-        active: BoolArray,
-        points: tuple[FloatArray, ...],
+        self, cppns: FloatArray, active: BoolArray, points: tuple[FloatArray, ...]
     ) -> FloatArray:
-        """Return the genes [R, U, G] of the substrates that a CPPN describes.
+        """Return the genes [N, R, U, G] of the substrates that CPPNs describe.
 
         Args:
-            state: with the sizes.
-            cppn: [nodes, genes] of its nodes; 0 where there is no connection.
-            active: [nodes] its slots in use.
+            cppns: [N, nodes, genes] of their nodes; 0 where there is no connection.
+            active: [N, nodes] their slots in use.
             points: of each layer.
         """
+        shapes = [at.shape[1:] for at in points]
+        flat = tuple(at.reshape(N_INPUTS, -1) for at in points)
+        step = max(1, BLOCK // sum(at.shape[1] for at in flat))
+        blocks = [slice(k, k + step) for k in range(0, len(cppns), step)]
+        scale = self.config.cppn_scale
+        found = [respond(cppns[block], active[block], flat, scale) for block in blocks]
         layers = []
-        for layer, at in enumerate(points):
-            output = respond(cppn, active, at, layer, self.config.cppn_scale)
+        for shape, parts in zip(shapes, zip(*found, strict=True), strict=True):
+            output = np.concatenate(parts).reshape(len(cppns), *shape)
             size = (np.abs(output) - self.config.least) / (1 - self.config.least)
             layers.append(np.where(size > 0, np.sign(output) * size, 0.0))
-        genes: FloatArray = np.concatenate(layers, axis=2).astype(np.float32)
+        genes: FloatArray = np.concatenate(layers, axis=3).astype(np.float32)
         return genes
 
 
 def respond(
-    cppn: FloatArray, active: BoolArray, points: FloatArray, output: int, scale: float
-) -> FloatArray:
-    """Return one output of a CPPN at many points, in (-1, 1).
+    cppns: FloatArray, active: BoolArray, layers: tuple[FloatArray, ...], scale: float
+) -> list[FloatArray]:
+    """Return the outputs of CPPNs at the points of each layer, [N, P] in (-1, 1).
+
+    All CPPNs take each step together: the first hidden node of each, then the second.
 
     Args:
-        cppn: [nodes, genes] of its nodes, the outputs first.
-        active: [nodes] whether a slot contains a node.
-        points: [5, ...] its inputs.
-        output: which of its outputs.
+        cppns: [N, nodes, genes] of their nodes, the outputs first.
+        active: [N, nodes] whether a slot contains a node.
+        layers: [5, P] the inputs of each output.
         scale: weight of gene 1.
     """
-    n_inputs = len(points)
-    weights = scale * cppn[:, : n_inputs + 1 + len(cppn)].astype(np.float64)
-    hidden = [k for k in range(N_OUTPUTS, len(cppn)) if active[k]]
-    values: dict[int, FloatArray] = {}
-    for k in [*sorted(hidden, key=lambda k: (cppn[k, -1], k)), output]:
-        total = np.full(points.shape[1:], weights[k, n_inputs])
+    points = np.concatenate(layers, axis=1)
+    n_inputs, first = len(points), len(points) + 1
+    is_hidden = active & (np.arange(active.shape[1]) >= N_OUTPUTS)
+    weights = scale * cppns[:, :, : first + active.shape[1]].astype(np.float64)
+    weights[:, :, first:] *= is_hidden[:, None]
+    order = np.argsort(np.where(is_hidden, cppns[:, :, -1], np.inf), axis=1, kind="stable")
+    kinds = ((cppns[:, :, -2] + 1) / 2 * len(FUNCTIONS)).astype(int)
+    values: list[FloatArray] = []  # of each step, [N, P]
+
+    def total(rows: IntArray, nodes: IntArray | int, at: slice) -> FloatArray:
+        """Return the weighted inputs of one node of each of these CPPNs at some points."""
+        own = weights[rows, nodes]
+        sums = np.repeat(own[:, n_inputs, None], points[0, at].size, axis=1)
         for j in range(n_inputs):
-            if weights[k, j] != 0:
-                total = total + weights[k, j] * points[j]
-        for j, value in values.items():
-            if weights[k, n_inputs + 1 + j] != 0:
-                total = total + weights[k, n_inputs + 1 + j] * value
-        kind = min(int((cppn[k, -2] + 1) / 2 * len(FUNCTIONS)), len(FUNCTIONS) - 1)
-        values[k] = squash(total) if k == output else FUNCTIONS[kind](total)
-    return values[output]
+            some = np.flatnonzero(own[:, j])
+            sums[some] += own[some, j, None] * points[j, at]
+        for step, value in enumerate(values):
+            weight = own[np.arange(len(rows)), first + order[rows, step]]
+            some = np.flatnonzero(weight)
+            sums[some] += weight[some, None] * value[rows[some], at]
+        return sums
+
+    counts = is_hidden.sum(axis=1)
+    for step in range(counts.max(initial=0)):
+        rows = np.flatnonzero(counts > step)
+        sums = total(rows, order[rows, step], slice(None))
+        kind = kinds[rows, order[rows, step]].clip(max=len(FUNCTIONS) - 1)
+        value = np.zeros((len(cppns), points.shape[1]))
+        for k, function in enumerate(FUNCTIONS):
+            value[rows[kind == k]] = function(sums[kind == k])
+        values.append(value)
+    ends = np.cumsum([0, *(layer.shape[1] for layer in layers)])
+    parts = [slice(*pair) for pair in pairwise(ends)]
+    everyone = np.arange(len(cppns))
+    return [squash(total(everyone, k, part)) for k, part in enumerate(parts)]
 
 
 def squash(x: FloatArray) -> FloatArray:
@@ -274,7 +304,7 @@ def wave(x: FloatArray) -> FloatArray:
     return y
 
 
-FUNCTIONS = (squash, bell, wave, np.abs)
+FUNCTIONS: tuple[Callable[[FloatArray], FloatArray], ...] = (squash, bell, wave, np.abs)
 
 
 def _line(n: int) -> FloatArray:
