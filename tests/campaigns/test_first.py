@@ -50,6 +50,8 @@ settings = { "method.genotypes" = 4, "method.mutation_scale" = 0.03 }
 factors = { first = ["none", "homcne"] }
 """
 
+pytest_plugins = ["report.quick_figures"]
+
 
 def plan_of(folder: Path, old: str = "", new: str = "") -> Plan:
     assert old in TEXT
@@ -188,7 +190,9 @@ def test_both_stages_are_one_run_in_the_tables(campaign: Campaign, label: str) -
         assert len(tables.query("SELECT DISTINCT budget FROM budgets")[1]) == 1
 
 
-def test_the_report_compares_it_with_both(campaign: Campaign, tmp_path: Path) -> None:
+def test_the_report_compares_it_with_both(
+    without_ink: None, campaign: Campaign, tmp_path: Path
+) -> None:
     text = write_report(campaign, tmp_path / "report").read_text()
     assert "first=homcne" in text
     assert "a stage" not in text

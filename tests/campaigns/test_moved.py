@@ -23,6 +23,8 @@ from conevo.runs.run import Run
 from conevo.runs.store import Store
 from conevo.worlds.pursuit import prey_sets
 
+pytest_plugins = ["report.quick_figures"]
+
 LIGHT = Path(__file__).parents[2] / "examples" / "light.py"
 SHIPPED = Path(prey_sets.__file__).parent / prey_sets.SHIPPED
 OTHER = "0.9.0 (abc123abc123)"
@@ -57,7 +59,7 @@ def test_a_moved_campaign_continues_without_the_files_of_its_plan(tmp_path: Path
 
 
 def test_tables_and_reports_run_no_world_file(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    without_ink: None, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     made = create(read_plan(light_plan(tmp_path / "plans")).at(seeds=1), tmp_path / "made")
     carried_out(made)

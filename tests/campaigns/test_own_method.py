@@ -18,6 +18,8 @@ from conevo.evolution.methods import registry
 from conevo.runs.run import Run
 from conevo.watch.state import Watched
 
+pytest_plugins = ["report.quick_figures"]
+
 EXAMPLE = Path(__file__).parents[2] / "examples" / "random_search.py"
 WHERE = """
 [[where]]
@@ -52,7 +54,10 @@ def say(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
 
 
 def test_it_is_listed_with_the_others_and_its_file_is_not_run_to_show_it(
-    made: Campaign, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    without_ink: None,
+    made: Campaign,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     text = made.paths.plan.read_text() + made.paths.runs.read_text()
     assert "inputs/mine.py:random-search" in text

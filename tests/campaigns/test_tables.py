@@ -21,6 +21,9 @@ from conevo.runs.run import Run
 from conevo.runs.shrinkage import shrinkage
 from conevo.runs.store import Store
 
+pytest_plugins = ["report.quick_figures"]
+pytestmark = pytest.mark.usefixtures("without_ink")
+
 
 def unread_of(page: Path) -> dict[str, str]:
     """The lines of a report about files that could not be read."""

@@ -3,6 +3,9 @@
 Warp compiles its headers once for each process, which takes three seconds, and its kernels with
 them. The kernels do not depend on who has compiled the headers. Python imports this module when it
 starts, in each process that a test starts: ``tests/conftest.py`` puts the folder on their path.
+
+NumPy's matrices are small here: further threads of OpenBLAS wait for work by spinning, which takes
+as much time again from the other core as the work.
 """
 
 import os
@@ -11,6 +14,7 @@ from contextlib import suppress
 from importlib.machinery import PathFinder
 from pathlib import Path
 
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before NumPy is imported
 COMPILER = "warp._src.build"
 HEADERS = "CONEVO_TEST_HEADERS"  # the folder of the headers that all processes share
 

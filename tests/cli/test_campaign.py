@@ -13,6 +13,8 @@ from conevo.cli.main import main
 from watch.followed import record, tables
 from worlds.test_outside import written
 
+pytest_plugins = ["report.quick_figures"]
+
 
 @pytest.fixture
 def conevo(tmp_path, monkeypatch, capsys):
@@ -28,7 +30,7 @@ def conevo(tmp_path, monkeypatch, capsys):
     return run
 
 
-def test_a_campaign_from_start_to_answers(conevo, tmp_path):
+def test_a_campaign_from_start_to_answers(without_ink, conevo, tmp_path):
     write_plan(tmp_path, 'studies = ["teams"]')
     code, out, _ = conevo("campaign", "start", "tiny.toml", "--executor", "serial", "--seeds", "1")
     assert code == 0

@@ -7,8 +7,10 @@ from pathlib import Path
 from report.benchmarl import write
 from report.finished_runs import cells, write_campaign
 
+pytest_plugins = ["report.quick_figures"]
 
-def test_foreign_results_are_shown_and_their_steps_must_be_named(say) -> None:
+
+def test_foreign_results_are_shown_and_their_steps_must_be_named(without_ink, say) -> None:
     write_campaign(Path("camp"), cells(["pursuit/team-4"], ["homcne"]), 2, 3)
     paths = write(Path("theirs"), {1: [100.0, 200.0], 2: [50.0, 300.0]})
     files = [word for path in paths for word in ("--foreign", str(path))]

@@ -10,6 +10,8 @@ import pytest
 from campaigns.plans import tiny_campaign
 from conevo.campaigns.executors.registry import make_executor
 
+pytest_plugins = ["report.quick_figures"]
+
 MOUNT = "mount --bind {0} {0} && mount -o remount,ro,bind {0} && "
 
 ALL = """
@@ -56,7 +58,7 @@ def content(folder):
 
 @pytest.mark.parametrize("lost", [(), ("tables", "lock", "ledger.sqlite")])
 def test_a_campaign_is_queried_and_reported_where_nothing_can_be_written(
-    say, archive, tmp_path, refusing, lost
+    without_ink, say, archive, tmp_path, refusing, lost
 ):
     for name in lost:
         path = archive / "tiny" / name
@@ -72,7 +74,7 @@ def test_a_campaign_is_queried_and_reported_where_nothing_can_be_written(
     assert content(archive) == before
 
 
-def test_the_same_tables_are_made_elsewhere(say, archive, tmp_path, refusing):
+def test_the_same_tables_are_made_elsewhere(without_ink, say, archive, tmp_path, refusing):
     say("report", "archive/tiny", "--out", "here")
     shutil.rmtree(archive / "tiny" / "tables")
     say("report", "archive/tiny", "--out", "there")

@@ -342,7 +342,8 @@ def test_there_are_never_more_running_threads_than_cores(name, executor_of, camp
 
 
 @every_with_workers
-def test_libraries_in_a_worker_start_no_threads(name, executor_of, campaign):
+def test_libraries_in_a_worker_start_no_threads(name, executor_of, campaign, monkeypatch):
+    monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)  # the tests' own
     made = campaign(ENDLESS)
     (label,) = made.planned
     executor = executor_of(name, 1)

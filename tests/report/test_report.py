@@ -25,6 +25,7 @@ from conevo.report.sections.interventions import interventions
 from conevo.report.sections.scope import scopes
 from report.finished_runs import Cell, cells, mean_of, write_campaign
 
+pytest_plugins = ["report.quick_figures"]
 pytestmark = pytest.mark.filterwarnings("error")
 
 PLACES = ["rover/complex-1", "rover/complex-2", "pursuit/team-4"]
@@ -188,7 +189,7 @@ def test_losses_are_those_of_the_same_run(report, campaign) -> None:
     assert float(hom["percent"]) == pytest.approx(left, rel=1e-9)
 
 
-def test_castes_by_s_are_next_to_favourite_settings(tmp_path) -> None:
+def test_castes_by_s_are_next_to_favourite_settings(without_ink, tmp_path) -> None:
     """Two champions of two robots: one moves and detects in turn, one is of an earlier version."""
     campaign = write_campaign(tmp_path / "c", cells(["rover/complex-1"], ["mesp"]), 3)
     robots = (
@@ -220,7 +221,7 @@ def test_castes_by_s_are_next_to_favourite_settings(tmp_path) -> None:
     assert "cannot see settings" in favourites.note
 
 
-def test_intervals_of_losses_end_where_losses_do(tmp_path) -> None:
+def test_intervals_of_losses_end_where_losses_do(without_ink, tmp_path) -> None:
     with Tables(write_campaign(tmp_path / "c", cells(["rover/complex-1"]), 3) / "tables") as tables:
         tables.query(
             "UPDATE scores SET value = CASE WHEN team = 'whole' THEN 1 WHEN contains(run, '-s1')"
@@ -290,7 +291,7 @@ def test_only_an_unchanged_report_is_replaced(tmp_path) -> None:
     assert sorted(path.name for path in tmp_path.iterdir()) == ["camp", "other", "out", "own"]
 
 
-def test_budgets_are_separate(tmp_path) -> None:
+def test_budgets_are_separate(without_ink, tmp_path) -> None:
     of = [
         *cells(["rover/complex-1"], ["mesp", "cone"], budget=1000),
         *cells(["rover/complex-1"], ["mesp", "cone"], budget=5000),
@@ -396,7 +397,7 @@ def test_diversity_that_pays_is_computed_from_the_runs_of_a_cell(campaign, repor
 
 
 def test_behaviours_of_an_unknown_study_are_shown_by_name(
-    campaign, monkeypatch: pytest.MonkeyPatch
+    without_ink, campaign, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def shown() -> list[str]:
         with Tables(campaign / "tables") as tables:

@@ -1,0 +1,26 @@
+"""Reports without ink: for tests of a report's words, numbers and files.
+
+Drawing takes most of a report's time. Figures are made and laid out in Matplotlib's objects, but
+their files are the same two empty ones. ``test_report.py`` and ``test_figures.py`` draw.
+"""
+
+from __future__ import annotations
+
+from typing import Any, BinaryIO
+
+import pytest
+
+EMPTY = {
+    "svg": b'<svg xmlns="http://www.w3.org/2000/svg" width="504pt" height="216pt"></svg>',
+    "pdf": b"%PDF-1.4\n",
+}
+
+
+@pytest.fixture
+def without_ink(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Save every figure as an empty one."""
+
+    def save(self: object, file: BinaryIO, **options: Any) -> None:
+        file.write(EMPTY[options["format"]])
+
+    monkeypatch.setattr("matplotlib.figure.Figure.savefig", save)
