@@ -50,7 +50,7 @@ def test_a_worlds_own_table_replaces_that_of_any_world(monkeypatch: pytest.Monke
         },
         "pursuit": {"run": {"generations": 5}, "method": {"cone": {"rounds": 6}}},
     }
-    monkeypatch.setattr(tomllib, "loads", lambda _: tables)
+    monkeypatch.setattr("conevo.runs.layers._worlds_of", lambda preset: tables)
     rover, pursuit = (resolve(task, "cone") for task in (TASK, "pursuit/team-3"))
     assert (rover.run.generations, rover.run.epochs) == (3, 4)
     assert (pursuit.run.generations, pursuit.run.epochs) == (5, RunSettings().epochs)

@@ -141,4 +141,5 @@ def content(path: Path) -> dict[str, Any]:
 def arrays(path: Path) -> dict[str, tuple[str, tuple[int, ...], bytes]]:
     """Return the arrays of an npz file as dtype, shape and bytes."""
     with np.load(path) as archive:
-        return {k: (archive[k].dtype.str, archive[k].shape, archive[k].tobytes()) for k in archive}
+        each = {name: archive[name] for name in archive}  # reads it each time
+    return {name: (one.dtype.str, one.shape, one.tobytes()) for name, one in each.items()}

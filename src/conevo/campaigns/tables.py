@@ -99,7 +99,8 @@ class Tables:
         )[1]
         named = sorted(_budgets(rows).items())
         if named:
-            self._connection.executemany("INSERT INTO budgets VALUES (?, ?)", named)
+            both = [list(column) for column in zip(*named, strict=True)]
+            self._connection.execute("INSERT INTO budgets SELECT unnest(?), unnest(?)", both)
         self._connection.execute("SET enable_external_access = false")
         self._connection.execute("SET lock_configuration = true")
 

@@ -75,6 +75,7 @@ def code_digest() -> str:
     return found.hexdigest()
 
 
+@functools.cache
 def version(package: str) -> str:
     """Return the installed version of a package, "source" where it runs without being installed."""
     from importlib import metadata  # takes longer to load than a run takes to be shown

@@ -16,6 +16,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import cache
 from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -135,6 +136,13 @@ def section_of(key: str, parts: Mapping[str, type], place: str) -> str:
     return homes[0]
 
 
+@cache
+def _worlds_of(preset: str) -> dict[str, Any]:
+    """Return the tables of a preset, by world: not to be changed."""
+    source = resources.files(__package__) / "presets" / f"{preset}.toml"
+    return parse_toml(source.read_text(encoding="utf-8"), f"preset {preset!r}")
+
+
 def read_preset(
     preset: str, world: WorldEntry, environment: str, method: MethodEntry, controller: str
 ) -> Layer:
@@ -146,8 +154,7 @@ def read_preset(
     """
     if preset not in PRESETS:
         raise unknown_name("preset", preset, PRESETS)
-    source = resources.files(__package__) / "presets" / f"{preset}.toml"
-    worlds = parse_toml(source.read_text(encoding="utf-8"), f"preset {preset!r}")
+    worlds = _worlds_of(preset)
     generic, own = dict(worlds[ANY]), dict(worlds.get(world.short_name, {}))
     by_method = generic.pop("method") | own.pop("method", {})
     name, family = method.name, method.family

@@ -15,6 +15,7 @@ import re
 import textwrap
 import types
 from dataclasses import dataclass, replace
+from functools import cache
 from importlib import resources
 from typing import (
     TYPE_CHECKING,
@@ -167,7 +168,7 @@ def refuse_other_controller(method: MethodEntry, controller: str, place: str) ->
 def declared(part: type[Any]) -> list[Setting]:
     """Return the settings of a dataclass, in the order of its fields."""
     hints = get_type_hints(part, include_extras=True)
-    texts = _meanings(part)
+    texts = _meanings(part)  # type: ignore[arg-type]  # a class has a hash
     found = []
     for field in dataclasses.fields(part):
         unit, meaning = texts.get(field.name, ("", ""))
@@ -215,6 +216,7 @@ def preset_purpose(preset: str) -> str:
     return re.split(r"[.:](?: |$)", words)[0]
 
 
+@cache
 def _meanings(part: type[Any]) -> dict[str, tuple[str, str]]:
     """Return unit and meaning of every field that has a text below it, also of inherited ones."""
     found: dict[str, tuple[str, str]] = {}

@@ -257,11 +257,11 @@ def write_tables(
             for table, row in _results(run, world, environment, cell, seed, n, noise, studies):
                 rows[table].append(row)
     for name in ("runs", "scores", "champions", "generations", "robots", "behaviours"):
-        text = folder / f"{name}.jsonl"
-        text.write_text("".join(json.dumps(row) + "\n" for row in rows[name]) or "")
+        text = folder / f"{name}.json"
+        text.write_text(json.dumps(rows[name]))
         if rows[name]:
             duckdb.sql(
-                f"COPY (SELECT * FROM read_json('{text}', format='newline_delimited',"
+                f"COPY (SELECT * FROM read_json('{text}', format='array',"
                 f" columns={SCHEMA[name]})) TO '{folder / name}.parquet' (FORMAT parquet)"
             )
         text.unlink()
