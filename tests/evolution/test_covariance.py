@@ -6,7 +6,6 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-import cma
 import numpy as np
 import pytest
 
@@ -67,6 +66,8 @@ def test_it_is_pycma_with_the_same_normal_numbers(function: Function) -> None:
         return drawn[-1]
 
     options = {"verbose": -9, "randn": draw, "seed": 1, "updatecovwait": 0}
+    import cma  # here: each process of the tests would wait for it
+
     es = cma.CMAEvolutionStrategy(np.linspace(-1, 0.5, n), 0.4, options)
     ours, fixed = of_pycma(es)
     for _ in range(50):

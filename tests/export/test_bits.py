@@ -1,4 +1,7 @@
-"""Exported teams give the kernels' outputs bit for bit, in every world and format."""
+"""Exported teams give the kernels' outputs bit for bit, in every world and format.
+
+Whole epochs: ``test_closed_loop.py``.
+"""
 
 import functools
 from pathlib import Path
@@ -72,14 +75,6 @@ def test_other_settings_do_too(name, k, ending, tmp_path):
     assert_bits(epoch(f"{LIGHT}:dark-1", name, SHORT, settings), tmp_path, ending)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(("task", "name"), CASES)
-def test_whole_epochs_are_the_kernels_bit_for_bit(task, name, tmp_path):
-    for ending in FORMATS:
-        if ending != ".pt2":
-            assert_bits(epoch(task, name, 0), tmp_path, ending)
-
-
 def test_one_robot_alone_computes_what_it_computes_in_its_team(tmp_path):
     from dataclasses import replace
 
@@ -95,7 +90,7 @@ def test_one_robot_alone_computes_what_it_computes_in_its_team(tmp_path):
 @pytest.mark.parametrize("ending", [".onnx", ".pt2"])
 def test_fast_arithmetic_agrees_for_one_step_only(ending, tmp_path):
     """It is chaotic: a difference in the last digit grows with the iterations."""
-    team, observations, outputs = epoch("gacc/complex-9", "gru", 0)
+    team, observations, outputs = epoch("gacc/complex-9", "gru", 300)
     step = step_of(team, tmp_path, ending, fast=True)
     first, _ = step(observations[0], team.first_context)
     assert np.abs(first - outputs[0]).max() < 1e-3
