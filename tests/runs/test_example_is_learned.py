@@ -13,6 +13,8 @@ LIGHT = Path(__file__).parents[2] / "examples" / "light.py"
 ENOUGH = 0.85  # nearness; random teams have about 0.5, one that walks straight there 0.99
 LESS = {"hyperneat": 0.65}  # 0.72 (0.77 as clones): these sensors and outputs have no geometry
 FURTHER = {"novelty": {"method.weight": 0.5}}  # without any fitness it comes there only by chance
+BUDGET = 20_000  # of the preset's 50,000 team evaluations
+SLOWER = {"hom-es", "sane"}  # they reach 0.79 and 0.84 with it, so they get all 50,000
 
 
 def learned(method: str, seed: int, folder: Path, **others: object) -> float:
@@ -26,14 +28,16 @@ def learned(method: str, seed: int, folder: Path, **others: object) -> float:
 @pytest.mark.slow
 @pytest.mark.parametrize("method", METHODS)
 def test_every_method_learns_the_example(method: str, tmp_path: Path) -> None:
-    """The whole budget of the preset, 50,000 team evaluations: two seconds a run."""
-    assert learned(method, 1, tmp_path / "run") >= LESS.get(method, ENOUGH)
+    """Two fifths of the budget suffice: most reach 0.89 or more with it, HyperNEAT 0.72."""
+    budget = {} if method in SLOWER else {"run.budget_evaluations": BUDGET}
+    assert learned(method, 1, tmp_path / "run", **budget) >= LESS.get(method, ENOUGH)
 
 
 @pytest.mark.slow
 @pytest.mark.exhaustive
 @pytest.mark.parametrize("method", METHODS)
 def test_every_method_learns_the_example_with_other_seeds_too(method: str, tmp_path: Path) -> None:
+    """The whole budget of the preset."""
     assert min(learned(method, seed, tmp_path / f"{seed}") for seed in range(2, 6)) >= LESS.get(
         method, ENOUGH
     )
