@@ -26,7 +26,7 @@ from conevo.report.claims import verdicts
 from conevo.report.files import write_report
 from conevo.report.foreign import read_foreign
 from conevo.report.statistics import compare, holm
-from conevo.runs.run import Run
+from provenance import versions
 
 
 def by_cell(values: list[RunValue]) -> dict[str, dict[str, list[float]]]:
@@ -145,15 +145,11 @@ def claims_table(tables: Tables) -> str:
     return pages.table(["id", "claim", "effect", "95 % interval", "n", "verdict"], rows)
 
 
-def made_with(campaign: Campaign) -> str:
+def provenance(campaign: Campaign) -> str:
     """Return versions and machine of the finished runs, and the number of the others."""
-    standings = campaign.standings()
-    done = [name for name, entry in standings.items() if entry.state == "finished"]
-    about = [Run(campaign.paths.run(name)).provenance for name in done]
-    keys = ("conevo", "warp", "numpy", "python", "cpu")
-    each = {key: sorted({str(one[key]) for one in about}) for key in keys}
-    words = "; ".join(f"{key} {', '.join(values)}" for key, values in each.items())
-    return f"Made with {words}. Runs that did not finish: {len(standings) - len(done)}.\n"
+    about, planned, each = versions(campaign)
+    words = "; ".join(f"{title} {values}" for title, values in each.items())
+    return f"Made with {words}. Runs that did not finish: {planned - len(about)}.\n"
 
 
 def main() -> None:
@@ -170,7 +166,7 @@ def main() -> None:
     page = folder / "README.md"
     with sealed(campaign) as sources, Tables(sources) as tables:
         write_report(campaign, folder / "report", sources, others)
-        pages.put(made_with(campaign) + "\n" + cost_table(tables), page, "cost")
+        pages.put(provenance(campaign) + "\n" + cost_table(tables), page, "cost")
         pages.put(performance_table(tables), page, "performance")
         pages.put(comparison_table(tables, args.method), page, "comparisons")
         pages.put(caste_table(tables), page, "castes")
