@@ -126,8 +126,8 @@ def saved(figure: Figure) -> Drawing:
 def _fonts_without_layout() -> Iterator[None]:
     """Embed fonts in PDF without the tables that place letters: the file has their places.
 
-    fontTools else reads, cuts and writes these tables for every figure, a quarter of the time of a
-    report. Matplotlib has no setting for it.
+    fontTools else reads, cuts and writes these tables for every figure, a third of the time of
+    saving it. Matplotlib has no setting for it.
     """
     from fontTools.subset import Options
 
