@@ -40,7 +40,7 @@ SETTINGS = {
     ),
 }
 # Controllers whose functions are compiled for two worlds only in CI, since no world changes them.
-IN_TWO = ("thresholds", "rules")
+IN_TWO = ("ctrnn", "gru", "graph", "thresholds", "rules")
 CASES = [
     pytest.param(
         (path, name, settings),

@@ -17,8 +17,8 @@ from conevo.runs.shaping import start_shaping
 from conevo.runs.start import start
 from runs.crashes import Crash, fail_at
 from runs.tiny import (
+    PAIRS,
     TASK,
-    TASKS,
     command,
     content,
     evolve_tiny,
@@ -27,9 +27,6 @@ from runs.tiny import (
     tiny_settings,
     wait_for,
 )
-
-FAMILIES = [method for method in conevo.METHODS if "-" not in method]
-PAIRS = [(method, TASKS[k % len(TASKS)]) for k, method in enumerate(FAMILIES)]
 
 
 @pytest.fixture(scope="module")

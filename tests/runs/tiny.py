@@ -27,6 +27,8 @@ FORKS = multiprocessing.get_context("forkserver")  # loads Warp once for all pro
 FORKS.set_forkserver_preload(["conevo.cli.main", "conevo.runs.start", "conevo.worlds.rollout"])
 TASK = "rover/complex-1"
 TASKS = [f"{entry.short_name}/{entry.environments[-1]}" for entry in conevo.WORLDS.values()]
+PAIRS = [(method, TASKS[k % len(TASKS)]) for k, method in enumerate(conevo.METHODS)]
+"""Each method with one task, each task with several methods."""
 TINY: dict[str, Any] = {
     "run.generations": 5,
     "run.epochs": 2,

@@ -8,8 +8,7 @@ from __future__ import annotations
 import io
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from conevo.report.figures.lettering import (
@@ -116,28 +115,9 @@ def saved(figure: Figure) -> Drawing:
     figure.savefig(svg, format="svg", metadata={"Date": None, "Creator": None})
     figure.set_layout_engine("none")  # it is laid out: the second format need not do it again
     nothing = {"CreationDate": None, "Creator": None, "Producer": None}
-    with _fonts_without_layout():
-        figure.savefig(pdf, format="pdf", metadata=nothing)
+    figure.savefig(pdf, format="pdf", metadata=nothing)
     text = PLACES.sub(lambda found: LONG.sub(_shorter, found[0]), svg.getvalue().decode())
     return Drawing(text.encode(), pdf.getvalue(), float(figure.get_figwidth()) > COLUMN)
-
-
-@contextmanager
-def _fonts_without_layout() -> Iterator[None]:
-    """Embed fonts in PDF without the tables that place letters: the file has their places.
-
-    fontTools else reads, cuts and writes these tables for every figure, a third of the time of
-    saving it. Matplotlib has no setting for it.
-    """
-    from fontTools.subset import Options
-
-    name = "_drop_tables_default"
-    before = getattr(Options, name, [])
-    setattr(Options, name, [*before, "GDEF", "GPOS", "GSUB", "MATH", "kern"])
-    try:
-        yield
-    finally:
-        setattr(Options, name, before)
 
 
 def _shorter(number: re.Match[str]) -> str:
