@@ -175,15 +175,15 @@ def test_torchs_functions_are_its_own_after_an_epoch() -> None:
 
 @pytest.mark.timing
 def test_many_epochs_side_by_side_are_fast() -> None:
-    """Team-steps of balance with networks, one thread, 4096 environments, at least 80,000/s."""
+    """At least 80,000 team-steps in a second of a core: balance, networks, 4096 environments."""
     a_world, made, genes, teams, _ = played("balance", 4096, iterations=25)
     scenarios = a_world.scenarios(keys(1))
     made.evaluate(genes, teams, scenarios)  # makes the environments
     speeds = []
     for _ in range(3):
-        began = time.perf_counter()
+        began = time.process_time()
         steps = made.evaluate(genes, teams, scenarios).steps.sum()
-        speeds.append(steps / (time.perf_counter() - began))
+        speeds.append(steps / (time.process_time() - began))
     assert max(speeds) >= 80_000
 
 
