@@ -8,7 +8,7 @@ import subprocess
 import numpy as np
 
 from conevo.export.files import export
-from conevo.export.networks import network_of
+from conevo.export.networks import KINDS, network_of
 from conevo.export.team import EvolvedTeam
 from conevo.rng import stream
 from conevo.worlds.rollout import Rollout
@@ -17,6 +17,12 @@ from export.needed import compiler, package
 FLAGS = ("-std=c99", "-O3", "-march=native", "-ffp-contract=off", "-shared", "-fPIC")
 STRICT = ("-Wall", "-Wextra", "-Wpedantic", "-Wshadow", "-Wconversion", "-Wdouble-promotion",
           "-Werror")  # fmt: skip
+
+
+def kinds_for(task, k):
+    """Return the kinds of controllers to try in the kth task: all in a world from a file."""
+    first, *others = KINDS
+    return tuple(KINDS) if ".py:" in task else (first, others[k % len(others)])
 
 
 def recorded(world, controller, seed=3):

@@ -13,7 +13,7 @@ import conevo
 from conevo.controllers.registry import CONTROLLERS, controller
 from conevo.export.files import FORMATS
 from conevo.export.networks import KINDS
-from export.replayed import played, recorded, step_of
+from export.replayed import kinds_for, played, recorded, step_of
 
 LIGHT = Path(__file__).resolve().parents[2] / "examples" / "light.py"
 TASKS = [f"{one.short_name}/{one.environments[-1]}" for one in conevo.WORLDS.values()]
@@ -27,13 +27,13 @@ OTHERS = {
     "gru": ({"n_hidden": 16, "max_hidden": 32, "weight_scale": 1.5},),
     "thresholds": ({"stimulus": "input", "theta": 0.3, "steepness": 3, "gain": 16.0},),
 }  # fmt: skip
-# Thresholds are compiled for two tasks only in CI, since no world changes them.
+# In CI: all kinds in the example, elsewhere two of them, since no world changes them.
 CASES = [
     pytest.param(
         task,
         name,
         id=f"{Path(task).name}-{name}",
-        marks=[pytest.mark.exhaustive] if name == "thresholds" and task in TASKS[:-2] else [],
+        marks=[] if name in kinds_for(task, TASKS.index(task)) else [pytest.mark.exhaustive],
     )
     for task in TASKS
     for name in KINDS
