@@ -213,6 +213,7 @@ def test_some_runs_of_a_plan_may_be_shapings(tmp_path):
         ('"run.generations"', '"run.generation"', "run.generation'.*run.generations"),
         ('"method.genotypes" = 6', '"method.genotypes" = -6', "genotypes = -6"),
         ('title = "Tiny"', "title = 3", "campaign.title = 3"),
+        ('title = "Tiny"', r'title = "a\u0007b"', "campaign.title = .*: must be one line"),
         ('title = "Tiny"', 'name = "../x"', "names a folder"),
         ('title = "Tiny"', 'studies = ["team"]', "'team'.*did you mean 'teams'"),
         ('title = "Tiny"', "shape = 1", "campaign.shape"),

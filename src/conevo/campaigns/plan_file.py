@@ -125,7 +125,7 @@ def _parse(tables: Mapping[str, Any], place: str, name: str) -> Plan:
     where = tuple(_where(one, factors, firsts, place) for one in wheres)
     return Plan(
         name=_name(head.get("name", name), place),
-        title=_checked(head.get("title", ""), str, "campaign.title", place),
+        title=_line(head.get("title", ""), "campaign.title", place),
         produces=_texts(head.get("produces", []), "campaign.produces", place),
         seeds=_seeds(head.get("seeds", 20), place),
         preset=preset,
@@ -154,6 +154,13 @@ def _name(value: Any, place: str) -> str:
             f"letters, digits and . _ - only, it names a folder"
         )
     return name
+
+
+def _line(value: Any, key: str, place: str) -> str:
+    text = _checked(value, str, key, place)
+    if not text.isprintable():
+        raise UsageError(f"{key} = {shown(text)} {place}: must be one line of printable characters")
+    return text
 
 
 def _checked(value: Any, kind: type[T], key: str, place: str) -> T:
