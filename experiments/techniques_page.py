@@ -1,26 +1,31 @@
-"""Draw the learning curves of the campaign of all techniques, a row for each task.
+"""Tables and learning curves of the campaign of all techniques, for its page.
 
-    python experiments/techniques_figure.py campaigns/techniques --write docs/results/techniques.png
+    python experiments/techniques_page.py campaigns/techniques --write docs/results/techniques.md
 
-A column holds the methods of one kind in colour, and all others in grey. The means over the seeds
-at 40 numbers of team evaluations go to ``techniques-curves.csv`` next to the picture; ``--again``
-draws from that file.
+The page gets one table with a row for each technique, and one that compares all with HomCNE. The
+picture has a row for each task and a column for each kind of technique, with all others in grey.
+Next to the page are a CSV file of the runs and one of the curves: means over the seeds at 40
+numbers of team evaluations. ``--again`` makes all from these files.
 """
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Sequence
 from pathlib import Path
+from statistics import fmean, stdev
 
+from compare_levels import comparison_table, rows_and_cost
 from conevo.campaigns.tables import Tables
 from conevo.cli.lookup import find_campaign, sealed
+from conevo.errors import ConevoError
 from conevo.evolution.methods.registry import title_of
+from conevo.numbers import plus_minus
 from conevo.palette import several
 from conevo.report.comparison import group_values
 from conevo.report.figures.style import grey, style
 from conevo.report.learning_curves import courses, read_histories
-from pages import Row, read, write
+from page_arguments import PageParser, rows_for
+from pages import Row, put, read, table, write
 
 KINDS = {
     "five of the thesis": ("homcne", "hetcne", "ccga", "mesp", "cone"),
@@ -29,6 +34,8 @@ KINDS = {
     "strategies": ("openai-es", "cma-es", "hom-es", "cone-es"),
     "diversity": ("novelty", "map-elites"),
 }
+CLONES = {"homcne", "sane", "esp", "cosyne", "neat", "openai-es", "cma-es", "hom-es"}
+CLONES |= {"novelty", "map-elites"}  # with the default of method.team, as in the plan
 POINTS = 40
 SIZE = (12.0, 8.0)  # inches
 
@@ -52,6 +59,29 @@ def technique(method: str, variant: str) -> str:
     """Return a method, and the controller if it is not the default one."""
     controller = variant.rpartition("=")[2]
     return method if controller in ("", "srn") else f"{method} {controller}"
+
+
+def overview(rows: Sequence[Row]) -> str:
+    """Return a row for each technique: value and core seconds of a run in each task."""
+    of: dict[str, dict[str, list[Row]]] = {}
+    for row in rows:
+        level = str(row.get("name", "srn"))
+        what = row["method"] if level == "srn" else f"{row['method']} {level}"
+        of.setdefault(what, {}).setdefault(row["task"], []).append(row)
+    tasks = list(dict.fromkeys(row["task"] for row in rows))
+    lines = []
+    for names in KINDS.values():
+        for name in (one for one in names if one in of):
+            line = [title(name), "clones" if name in CLONES else "different"]
+            for task in tasks:
+                runs = of[name].get(task, [])
+                values = [float(run["value"]) for run in runs]
+                sd = stdev(values) if len(values) > 1 else None
+                line += [plus_minus(fmean(values), sd) if values else "-"]
+                line += [f"{fmean(run['core_seconds'] for run in runs):.1f} s" if runs else "-"]
+            lines.append(line)
+    head = ["technique", "robots"]
+    return table([*head, *(part for task in tasks for part in (task, "a run"))], lines)
 
 
 def title(of: str) -> str:
@@ -90,17 +120,25 @@ def draw(rows: Sequence[Row], picture: Path) -> None:
         figure.savefig(picture, dpi=110, metadata={"Software": None})
 
 
-def main() -> None:
-    """Draw the curves."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("campaign", nargs="?")
-    parser.add_argument("--write", type=Path, required=True)
-    parser.add_argument("--again", action="store_true")
-    args = parser.parse_args()
-    numbers = args.write.with_name(f"{args.write.stem}-curves.csv")
-    if not args.again:
-        write(curves_of(args.campaign), numbers)
-    draw(read(numbers), args.write)
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Make the tables and the picture."""
+    parser = PageParser(__doc__)
+    args = parser.parse(arguments)
+    page: Path | None = args.write
+    try:
+        rows = rows_for(args, rows_and_cost)
+        parts = {"overview": overview(rows), "homcne": comparison_table(rows, "method", "homcne")}
+        for name, text in parts.items():
+            print(f"{name}\n\n{text}")
+            if page:
+                put(text, page, name)
+        if page:
+            curves = page.with_name(f"{page.stem}-curves.csv")
+            if not args.again:
+                write(curves_of(args.campaign), curves)
+            draw(read(curves), page.with_suffix(".png"))
+    except (ConevoError, OSError) as error:
+        parser.error(str(error))
 
 
 if __name__ == "__main__":
