@@ -90,7 +90,9 @@ def _refusing(part: type[Any], section: str) -> type[Any]:
             raise wrong_values(error, section)[0] from error
         for key, value in values.items():
             if isinstance(value, float) and not (value == 0 or LEAST <= abs(value) <= MOST):
-                problem = f"must be 0, or between {LEAST:g} and {MOST:g} in size"
+                problem = (
+                    f"must be between {LEAST:g} and {MOST:g} in size (or 0, where it may be 0)"
+                )
                 raise WrongValue(key, f"{section}.{key} = {shown(value)}", problem)
 
     part.__init__ = __init__

@@ -45,6 +45,7 @@ def test_an_extreme_number_is_one_line(words: str, say, tmp_path: Path) -> None:
     [
         ("cone", ("genotypes=1000000",), "method.genotypes = 1,000,000 in"),
         ("cone-es", ("pairs=1000000",), "method.pairs = 1,000,000 ask for most"),
+        ("sane", ("blueprints=1000000", "epochs=10000"), "1,000,000 teams and run.epochs = 10,000"),
         ("homcne", ("genotypes=1000000", "epochs=10000"), "teams and run.epochs = 10,000 ask"),
     ],
 )
@@ -58,6 +59,13 @@ def test_numbers_that_are_too_large_together_are_estimated_before_memory_is_take
     assert "GiB of memory and the machine has" in said.err
     assert words in said.err
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("setting", ["homcne genotypes=22000", "sane blueprints=22000"])
+def test_a_population_of_clones_is_one_team_for_each_genotype(setting: str, say) -> None:
+    method, values = setting.split()
+    words = ("--preset", "smoke", "--dry-run", "--set", f"method.{values}")
+    assert say("run", "rover/complex-1", "--method", method, *words).code == 0
 
 
 PLAN = '[campaign]\nseeds = {seeds}\n[factors]\nworld = ["rover/complex-{n}"]\nmethod = ["cone"]\n'

@@ -351,7 +351,7 @@ class Hermit:
 def test_a_method_without_populations_takes_over_none() -> None:
     hermit, mesp = Hermit(), build("mesp")
     for learner, old, words in (
-        (hermit, mesp.init(LAYOUT, 3), "Hermit has none from which another run could start"),
+        (hermit, mesp.init(LAYOUT, 3), "Hermit has none that consists of controllers"),
         (mesp, hermit.init(LAYOUT, 3), "the method it is from has none"),
     ):
         with pytest.raises(UsageError, match=words) as caught:

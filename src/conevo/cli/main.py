@@ -207,8 +207,8 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
         fail("interrupted", 130)
     except MemoryError:
         fail(
-            "not enough memory: ask for less, as with method.genotypes, method.rounds, run.epochs "
-            "or --scenarios",
+            "not enough memory: ask for less, as with method.genotypes, method.pairs, "
+            "method.rounds, run.epochs or --scenarios",
             3,
         )
     except OSError as error:

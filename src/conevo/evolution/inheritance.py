@@ -56,8 +56,7 @@ def hand_on(method: Method, layout: Layout, root: int, state: State) -> State:
     if not (isinstance(fresh, Populations) and isinstance(state, Populations)):
         who = "the method it is from" if isinstance(fresh, Populations) else method.title
         raise UsageError(
-            f"these populations cannot be handed on: {who} has none from which another run could "
-            f"start (its state is not a {Populations.__module__}.{Populations.__name__})"
+            f"these populations cannot be handed on: {who} has none that consists of controllers"
         )
     old, new = state.genes.shape, fresh.genes.shape
     different = [
@@ -102,9 +101,10 @@ def breed_from(
         return _around(method, layout, root, genes, active)
     fresh = method.init(layout, root)
     if not isinstance(fresh, Populations):
+        inherits = "; it starts from its own runs (--from)" if hasattr(method, "inherit") else ""
         raise UsageError(
-            f"no population can be bred from this team: {method.title} has none from which a run "
-            f"could start (its state is not a {Populations.__module__}.{Populations.__name__})"
+            f"no population can be bred from this team: {method.title} has none that consists of "
+            f"controllers{inherits}"
         )
     fresh = _with_thresholds(fresh, method, None)
     n_populations, n_slots, n_genotypes, n_genes = fresh.genes.shape

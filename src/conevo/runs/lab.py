@@ -148,10 +148,11 @@ def check_memory(config: RunConfig, layout: Layout) -> None:
         EnvironmentFailure: it does; the settings that ask for it are named.
     """
     method, run = config.method_config, config.run
-    robots, genotypes = layout.n_robots, getattr(method, "genotypes", 1)
-    is_shared = getattr(method, "evaluation", "") == "shared"
-    teams = genotypes * (getattr(method, "rounds", 1) if is_shared else robots)
-    name = "genotypes"
+    robots, name = layout.n_robots, "blueprints" if hasattr(method, "blueprints") else "genotypes"
+    genotypes = getattr(method, name, 1)
+    # One after another in the team, or several at once, in teams of each round.
+    is_systematic = getattr(method, "evaluation", "") == "systematic"
+    teams = genotypes * (robots if is_systematic else getattr(method, "rounds", 1))
     if pairs := getattr(method, "pairs", 0):  # of teams, every robot with genes of its own
         name, genotypes, teams = "pairs", pairs, 2 * pairs
     genes = 4 * robots * layout.max_hidden * layout.n_genes * genotypes
