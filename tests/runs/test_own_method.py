@@ -90,8 +90,8 @@ def test_no_run_starts_from_its_populations_but_one_may_start_from_its_champion(
 ) -> None:
     origin = evolved(tmp_path / "origin")
     for method, words in (
-        ("homcne", "the method it is from has none from which another run could start"),
-        (ADDRESS, "Team ES has none from which another run could start"),
+        ("homcne", "the method it is from has none that consists of controllers"),
+        (ADDRESS, "Team ES has none that consists of controllers"),
     ):
         with pytest.raises(UsageError, match=words) as caught:
             evolved(tmp_path / "run", method, origin=origin)
