@@ -23,7 +23,14 @@ from pydantic.dataclasses import dataclass, is_pydantic_dataclass
 
 from conevo.errors import UsageError, shown, unknown_name
 
-__all__ = ["WrongValue", "checked", "parameters", "refuse_unknown", "wrong_values"]
+__all__ = [
+    "WrongValue",
+    "checked",
+    "parameters",
+    "refuse_ineffective",
+    "refuse_unknown",
+    "wrong_values",
+]
 
 Part = TypeVar("Part")
 LEAST, MOST = 1e-18, 1e18  # sizes of numbers whose squares fit into the 32 bits of a kernel
@@ -97,6 +104,21 @@ def _refusing(part: type[Any], section: str) -> type[Any]:
 
     part.__init__ = __init__
     return part
+
+
+def refuse_ineffective(config: Any, *keys: str, unless: str) -> None:
+    """Raise WrongValue for the first of a method's ``keys`` that does not have its default.
+
+    Args:
+        config: the method's parameters.
+        keys: parameters that have no effect here.
+        unless: the condition under which they would have one.
+    """
+    for one in fields(config):
+        value = getattr(config, one.name)
+        if one.name in keys and value != one.default:
+            what = f"method.{one.name} = {shown(value)}"
+            raise WrongValue(one.name, what, f"has no effect without {unless}")
 
 
 def refuse_unknown(

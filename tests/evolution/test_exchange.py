@@ -180,6 +180,21 @@ def test_without_a_share_of_the_pairs_nothing_is_exchanged(name: str) -> None:
         ("cone-2", {"pairing": "all"}, "method.pairing = 'all': has no effect without the spec"),
         ("cone-2", {"sd": "shares"}, "method.sd = 'shares': has no effect without the spec"),
         ("cone", {"use_sdm": False, "sd": "label"}, "method.sd = 'label': has no effect without"),
+        (
+            "hom-es",
+            {"signal": 0.9},
+            "method.signal = 0.9: has no effect without the individual part",
+        ),
+        (
+            "openai-es",
+            {"share": 0.2},
+            "method.share = 0.2: has no effect without method.team = rob",
+        ),
+        (
+            "openai-es",
+            {"optimiser": "momentum", "memory_squares": 0.5},
+            "method.memory_squares = 0.5: has no effect without method.optimiser = adam",
+        ),
         ("cone-3", {"pairing": "all"}, "method.pairing = 'all': has no effect without the spec"),
         ("cone-3", {"exchange_slots": "same"}, "method.exchange_slots = 'same': has no effect wi"),
         ("cone-3", {"exchange_share": 0.5}, "method.exchange_share = 0.5: has no effect without"),

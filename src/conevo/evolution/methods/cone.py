@@ -12,13 +12,13 @@ with several. The most similar sub-populations come first, and each is taken onc
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from typing import Annotated, Literal
 
 import numpy as np
 from annotated_types import Ge, Le
 
-from conevo.errors import UsageError, shown
+from conevo.errors import UsageError
 from conevo.evolution import credit
 from conevo.evolution.assembly import elite_teams
 from conevo.evolution.behaviour import evenness
@@ -36,7 +36,7 @@ from conevo.evolution.selection import (
     shares_distance,
     specialization_distance,
 )
-from conevo.parameters import WrongValue, parameters
+from conevo.parameters import parameters, refuse_ineffective
 from conevo.rng import stream
 
 __all__ = ["Cone", "Cone1Config", "Cone2Config", "Cone3Config", "ConeConfig", "ConeState"]
@@ -100,20 +100,13 @@ class ConeConfig(MespConfig):
         """Refuse parameters that would have no effect."""
         super().__post_init__()
         if not self.use_sdm:
-            self._refuse("pairing", "sd", unless="the specialization difference metric (use_sdm)")
+            metric = "the specialization difference metric (use_sdm)"
+            refuse_ineffective(self, "pairing", "sd", unless=metric)
         if not (self.use_sdm or self.use_gdm):
             keys = ("exchange_slots", "exchange_share", "thresholds_from")
-            self._refuse(*keys, unless="a difference metric (use_sdm, use_gdm)")
+            refuse_ineffective(self, *keys, unless="a difference metric (use_sdm, use_gdm)")
         if self.type_c == "off":
-            self._refuse("type_c_rounds", unless="type C fitness (type_c)")
-
-    def _refuse(self, *keys: str, unless: str) -> None:
-        """Raise WrongValue for the first of some parameters that does not have its default."""
-        for one in fields(self):
-            value = getattr(self, one.name)
-            if one.name in keys and value != one.default:
-                what = f"method.{one.name} = {shown(value)}"
-                raise WrongValue(one.name, what, f"has no effect without {unless}")
+            refuse_ineffective(self, "type_c_rounds", unless="type C fitness (type_c)")
 
     @property
     def n_elite_rounds(self) -> int:

@@ -41,7 +41,7 @@ from conevo.evolution.protocol import (
     Trials,
 )
 from conevo.evolution.strategies import PairsConfig, as_trials, gains, mirrored
-from conevo.parameters import parameters
+from conevo.parameters import parameters, refuse_ineffective
 from conevo.rng import stream
 
 __all__ = ["ConeEs", "ConeEsConfig", "ConeEsState", "HomEsConfig"]
@@ -75,6 +75,15 @@ class ConeEsConfig(PairsConfig):
     """portion of signal, in the robots' strongest common component, above which the share grows."""
     decay: Annotated[float, Ge(0), Le(1)] = 0.1
     """portion of the deviations that is lost in a generation in which they do not pay."""
+
+    def __post_init__(self) -> None:
+        """Refuse parameters of the individual part without it."""
+        super().__post_init__()
+        if not self.individual:
+            keys = ("individual_least", "individual_step", "individual_memory", "signal", "decay")
+            refuse_ineffective(
+                self, *keys, unless="the individual part (cone-es with individual > 0)"
+            )
 
 
 @parameters("method")

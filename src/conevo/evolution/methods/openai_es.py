@@ -52,7 +52,7 @@ from conevo.evolution.strategies import (
     gains,
     mirrored,
 )
-from conevo.parameters import parameters
+from conevo.parameters import parameters, refuse_ineffective
 from conevo.rng import fold, stream
 
 __all__ = ["OpenAiEs", "OpenAiEsConfig", "OpenAiEsState"]
@@ -84,6 +84,14 @@ class OpenAiEsConfig(PairsConfig):
     of generations, not many thousands)."""
     weight_decay: Annotated[float, Ge(0), Le(1)] = 0.005
     """portion of a gene, times ``step``, that is lost in a generation."""
+
+    def __post_init__(self) -> None:
+        """Refuse parameters of another team or optimiser."""
+        super().__post_init__()
+        if self.team != "robots":
+            refuse_ineffective(self, "share", unless="method.team = robots")
+        if self.optimiser != "adam":
+            refuse_ineffective(self, "memory_squares", unless="method.optimiser = adam")
 
 
 @dataclass(frozen=True)
