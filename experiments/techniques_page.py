@@ -47,7 +47,8 @@ def curves_of(name: str) -> list[Row]:
         for group in group_values(tables.values()):
             for cell, course in courses(read_histories(tables, group), "value", POINTS).items():
                 task = f"{group.world}/{cell.environment}"
-                what = technique(cell.treatment.method, cell.treatment.variant)
+                controller = cell.treatment.variant.rpartition("=")[2]
+                what = technique(cell.treatment.method, controller)
                 rows += [
                     {"task": task, "technique": what, "evaluations": float(x), "value": float(y)}
                     for x, y in zip(course.x, course.mean, strict=True)
@@ -55,9 +56,8 @@ def curves_of(name: str) -> list[Row]:
     return rows
 
 
-def technique(method: str, variant: str) -> str:
+def technique(method: str, controller: str) -> str:
     """Return a method, and the controller if it is not the default one."""
-    controller = variant.rpartition("=")[2]
     return method if controller in ("", "srn") else f"{method} {controller}"
 
 
@@ -65,8 +65,7 @@ def overview(rows: Sequence[Row]) -> str:
     """Return a row for each technique: value and core seconds of a run in each task."""
     of: dict[str, dict[str, list[Row]]] = {}
     for row in rows:
-        level = str(row.get("name", "srn"))
-        what = row["method"] if level == "srn" else f"{row['method']} {level}"
+        what = technique(row["method"], row.get("name", ""))
         of.setdefault(what, {}).setdefault(row["task"], []).append(row)
     tasks = list(dict.fromkeys(row["task"] for row in rows))
     lines = []

@@ -62,7 +62,11 @@ def test_numbers_that_are_too_large_together_are_estimated_before_memory_is_take
 
 
 @pytest.mark.parametrize("setting", ["homcne genotypes=22000", "sane blueprints=22000"])
-def test_a_population_of_clones_is_one_team_for_each_genotype(setting: str, say) -> None:
+def test_a_population_of_clones_is_one_team_for_each_genotype(
+    setting: str, say, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    memory = {"SC_PAGE_SIZE": 4096, "SC_PHYS_PAGES": 8 * 2**30 // 4096}  # 8 GiB
+    monkeypatch.setattr("conevo.runs.lab.os.sysconf", memory.__getitem__)
     method, values = setting.split()
     words = ("--preset", "smoke", "--dry-run", "--set", f"method.{values}")
     assert say("run", "rover/complex-1", "--method", method, *words).code == 0

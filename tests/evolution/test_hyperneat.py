@@ -6,6 +6,7 @@ import pytest
 from conevo.controllers.srn import Srn
 from conevo.errors import UsageError
 from conevo.evolution import Layout, Scores, method
+from conevo.evolution.inheritance import breed_from
 from conevo.evolution.methods.hyperneat import N_OUTPUTS, bell, respond, squash, wave
 
 SLOTS = N_OUTPUTS + 1
@@ -99,3 +100,9 @@ def test_genotypes_are_handed_on_to_a_task_of_another_size():
 def test_another_layout_is_refused():
     with pytest.raises(UsageError, match="HyperNEAT needs the layout of controller 'srn'"):
         method("hyperneat").init(Layout(2, 3, 5, 40, 2, 3), 1)
+
+
+def test_a_champion_has_no_cppn_and_the_message_names_the_way_that_works():
+    genes, active = np.zeros((3, 4, 12), np.float32), np.ones((3, 4), bool)
+    with pytest.raises(UsageError, match=r"none that consists of controllers; .* \(--from\)"):
+        breed_from(method("hyperneat", genotypes=10), Layout(3, 4, 4, 12, 3, 5), 1, genes, active)

@@ -148,8 +148,8 @@ def check_memory(config: RunConfig, layout: Layout) -> None:
         EnvironmentFailure: it does; the settings that ask for it are named.
     """
     method, run = config.method_config, config.run
-    robots, name = layout.n_robots, "blueprints" if hasattr(method, "blueprints") else "genotypes"
-    genotypes = getattr(method, name, 1)
+    robots, sizes = layout.n_robots, ("genotypes", "blueprints")
+    genotypes, name = max((getattr(method, size, 0), size) for size in sizes)
     # One after another in the team, or several at once, in teams of each round.
     is_systematic = getattr(method, "evaluation", "") == "systematic"
     teams = genotypes * (robots if is_systematic else getattr(method, "rounds", 1))
