@@ -54,6 +54,17 @@ def outcome(run):
     return rows, run.champion.genes.tobytes(), run.test_result
 
 
+def assert_it_starts_no_usage_reports_and_no_dashboard():
+    """Look at the processes of the Ray that this process has started."""
+    mine = [one for one in Path("/proc").glob("[0-9]*") if parent(one.name) == os.getpid()]
+    texts = {one: (one / "cmdline").read_text() for one in mine}
+    ray = [one for one in mine if "gcs_server" in texts[one] or "dashboard.py" in texts[one]]
+    assert ray
+    for one in ray:
+        assert "RAY_USAGE_STATS_ENABLED=0" in (one / "environ").read_text().split("\0")
+        assert "dashboard.py" not in texts[one] or "--disable-frontend" in texts[one]
+
+
 def end_of(executor):
     """Wait for one ending."""
     return until(lambda: executor.wait(0.1))
@@ -63,6 +74,7 @@ def test_ray_itself_continues_a_run_whose_ray_worker_was_killed(long_run, undist
     campaign, label = long_run
     executor = make_executor("ray", 1)
     try:
+        assert_it_starts_no_usage_reports_and_no_dashboard()
         executor.submit(RunJob(campaign.path, label, 1))
         until(lambda: n_generations(campaign, label) > 2)
         (worker,) = workers(campaign.path)
@@ -157,20 +169,6 @@ def test_a_node_that_does_not_start_in_time_is_one_clear_line(monkeypatch):
     monkeypatch.setattr(ray, "init", init)
     with pytest.raises(EnvironmentFailure, match=r"^Ray at this machine: .* startup\. More\.$"):
         make_executor("ray", 1)
-
-
-def test_ray_starts_no_usage_reports_and_no_dashboard():
-    executor = make_executor("ray", 1)
-    try:
-        mine = [one for one in Path("/proc").glob("[0-9]*") if parent(one.name) == os.getpid()]
-        texts = {one: (one / "cmdline").read_text() for one in mine}
-        ray = [one for one in mine if "gcs_server" in texts[one] or "dashboard.py" in texts[one]]
-        assert ray
-        for one in ray:
-            assert "RAY_USAGE_STATS_ENABLED=0" in (one / "environ").read_text().split("\0")
-            assert "dashboard.py" not in texts[one] or "--disable-frontend" in texts[one]
-    finally:
-        executor.stop()
 
 
 def test_a_missing_ray_is_one_line(tmp_path):

@@ -161,7 +161,7 @@ def assert_finished(campaign, undisturbed):
 
 @every_executor
 def test_every_run_is_carried_out_once(name, executor_of, campaign, undisturbed):
-    made = campaign(QUICK, seeds=3)
+    made = campaign(QUICK, seeds=2)
     endings = []
     standings = made.carry_on(
         executor_of(name, 2), watch=lambda _, one: endings.append(one) if one else None
@@ -190,7 +190,7 @@ def test_a_finished_campaign_is_left_alone(name, executor_of, campaign):
 def test_a_run_that_always_fails_is_listed_with_its_reason_and_stops_no_other(
     name, executor_of, campaign
 ):
-    made = campaign(QUICK, seeds=2, methods=("hetcne", "homcne"))
+    made = campaign(QUICK, methods=("hetcne", "homcne"))
     standings = made.carry_on(executor_of(name, 2))
     for label, planned in made.planned.items():
         failed = planned.method == "hetcne"
