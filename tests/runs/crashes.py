@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import re
+from pathlib import Path
 
 import pytest
 
@@ -13,16 +15,33 @@ class Crash(BaseException):
     """The end of the process at this point."""
 
 
-def fail_at(monkeypatch: pytest.MonkeyPatch, call: int, problem: BaseException) -> list[int]:
-    """Make the ``call``-th fsync of the run's files fail; return the list that counts them."""
-    calls: list[int] = []
+def fail_at(monkeypatch: pytest.MonkeyPatch, call: int, problem: BaseException) -> list[str]:
+    """Make the ``call``-th fsync of the run's files fail; return the list that names them."""
+    calls: list[str] = []
     sync = os.fsync
 
     def fsync(handle: int) -> None:
-        calls.append(handle)
+        calls.append(os.readlink(f"/proc/self/fd/{handle}"))
         if len(calls) - 1 == call:
             raise problem
         sync(handle)
 
     monkeypatch.setattr(durable.os, "fsync", fsync)
     return calls
+
+
+def crashes_and_refusals(calls: list[str]) -> tuple[list[int], list[int]]:
+    """Choose calls of fsync: each kind of write once, in the last and in the first place.
+
+    A file is written, then its directory. A crash after the second leaves the files that a refusal
+    of the next file does, so crashes are at directories and at lines of a log, refusals at files.
+    Generations and stages, and the letters of drafts, make no difference between kinds.
+    """
+    kinds = [re.sub(r"(generation|stage)-\d+|(?<=\.)\w{8}(?=/|$)", r"\1", name) for name in calls]
+    files = [k for k, name in enumerate(calls) if Path(name).suffix]
+    logged = {k for k in files if calls[k].endswith(".jsonl")}
+    named = {k: kinds[k - 1] for k in range(1, len(calls)) if k not in files}
+    named |= {k: kinds[k] for k in logged}
+    last = {kind: k for k, kind in named.items()}
+    first = {kinds[k]: k for k in reversed(files)}
+    return sorted(last.values()), sorted(first.values())

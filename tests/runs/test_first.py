@@ -14,8 +14,8 @@ from conevo.rng import stream
 from conevo.runs.config import RunConfig
 from conevo.runs.first import resolve_stages, take_first, without_method
 from conevo.runs.shaping import Shaping, start_stages
-from runs.test_shaping import genes, killed_at, stages_content
-from runs.tiny import TASK, TINY, evolve_tiny
+from runs.test_shaping import genes, stages_content
+from runs.tiny import TASK, TINY, evolve_tiny, killed_at
 
 OWN_METHOD = Path(__file__).parents[2] / "examples" / "own_method.py"
 SHORT = TINY | {"run.generations": 6, "first": "homcne"}

@@ -15,7 +15,7 @@ from conevo.errors import EnvironmentFailure, UsageError
 from conevo.evolution.methods.registry import METHODS
 from conevo.runs.config import resolve
 from conevo.runs.start import start
-from runs.crashes import Crash, fail_at
+from runs.crashes import Crash, crashes_and_refusals, fail_at
 from runs.tiny import (
     PAIRS,
     TASK,
@@ -46,35 +46,72 @@ def test_resume_after_kills_at_random_moments(method: str, task: str, tmp_path: 
     assert content(path) == content(whole.path), kills
 
 
+FULL = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
 @pytest.mark.parametrize("every", [1, 2])
-@pytest.mark.parametrize("problem", [Crash(), OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))])
+@pytest.mark.parametrize("problem", [Crash(), FULL])
+def test_resume_after_a_failure_at_each_kind_of_write(
+    problem: BaseException, every: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calls, whole = written(tmp_path, monkeypatch, every)
+    crashes, refusals = crashes_and_refusals(calls)
+    assert len(crashes) > len(refusals) >= 12
+    for call in refusals if problem is FULL else crashes:
+        assert_resumes(problem, call, every, whole, tmp_path, monkeypatch)
+
+
+@pytest.mark.exhaustive
+@pytest.mark.parametrize("every", [1, 2])
+@pytest.mark.parametrize("problem", [Crash(), FULL])
 def test_resume_after_a_failure_at_every_write(
     problem: BaseException, every: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    changes = {"run__generations": 3, "run__checkpoint_every": every}
+    calls, whole = written(tmp_path, monkeypatch, every)
+    assert len(calls) >= 30
+    for call in range(len(calls)):
+        assert_resumes(problem, call, every, whole, tmp_path, monkeypatch)
+
+
+def lengths(every: int) -> dict[str, int]:
+    return {"run__generations": 3, "run__checkpoint_every": every}
+
+
+def written(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, every: int
+) -> tuple[list[str], dict[str, object]]:
+    """Return the writes of a whole run and its content."""
     with monkeypatch.context() as patch:
-        calls = fail_at(patch, -1, problem)
-        whole = content(evolve_tiny(tmp_path / "whole", **changes).path)
-    n_writes = len(calls)
-    assert n_writes >= 30
-    for call in range(n_writes):
-        path = tmp_path / "broken"
-        with monkeypatch.context() as patch:
-            fail_at(patch, call, problem)
-            with pytest.raises((Crash, EnvironmentFailure)) as caught:
-                evolve_tiny(path, **changes)
-        if isinstance(caught.value, EnvironmentFailure):
-            assert caught.value.exit_code == 3
-            assert str(path) in str(caught.value)
-            assert "No space left on device" in str(caught.value)
-        if not path.exists():  # interrupted in the first write: nothing is left
-            assert [p.name for p in tmp_path.iterdir()] == ["whole"]
-            continue
-        run = conevo.Run(path)
-        if run.status != "finished":
-            run.resume(threads=1)
-        assert content(path) == whole, call
-        shutil.rmtree(path)
+        calls = fail_at(patch, -1, Crash())
+        return calls, content(evolve_tiny(folder / "whole", **lengths(every)).path)
+
+
+def assert_resumes(
+    problem: BaseException,
+    call: int,
+    every: int,
+    whole: dict[str, object],
+    folder: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Assert that a run of which one write failed, resumed, has the same content."""
+    path = folder / "broken"
+    with monkeypatch.context() as patch:
+        fail_at(patch, call, problem)
+        with pytest.raises((Crash, EnvironmentFailure)) as caught:
+            evolve_tiny(path, **lengths(every))
+    if isinstance(caught.value, EnvironmentFailure):
+        assert caught.value.exit_code == 3
+        assert str(path) in str(caught.value)
+        assert "No space left on device" in str(caught.value)
+    if not path.exists():  # interrupted in the first write: nothing is left
+        assert [p.name for p in folder.iterdir()] == ["whole"]
+        return
+    run = conevo.Run(path)
+    if run.status != "finished":
+        run.resume(threads=1)
+    assert content(path) == whole, call
+    shutil.rmtree(path)
 
 
 def test_interrupt_keeps_the_last_finished_generation(tmp_path: Path) -> None:

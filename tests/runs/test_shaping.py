@@ -7,7 +7,6 @@ import json
 import os
 import re
 import shutil
-import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -22,14 +21,12 @@ from conevo.evolution.methods.registry import METHODS
 from conevo.rng import fold
 from conevo.runs.code import last_code
 from conevo.runs.shaping import Shaping, start_shaping, tasks_up_to
-from conevo.worlds.pursuit import prey_sets
 from conevo.worlds.pursuit.evolved import TASKS as PREY_TASKS
-from runs.crashes import Crash, fail_at
-from runs.tiny import TINY, arrays, content, evolve_tiny, tiny_settings
+from runs.crashes import Crash, crashes_and_refusals, fail_at
+from runs.tiny import TINY, arrays, content, evolve_tiny, killed_at, tiny_settings
 
 TASKS = tasks_up_to("rover/complex-3")
 BRIEF = {"run.generations": 3}
-PREY = {key: value for key, value in TINY.items() if key != "world.n_robots"} | BRIEF
 
 
 def begin(path: Path, method: str = "cone", tasks: list[str] = TASKS, **more: Any) -> Shaping:
@@ -106,10 +103,15 @@ def test_every_stage_starts_from_the_populations_of_the_previous_one(
         assert [record["generation"] for record in run.generations()] == [0, 1, 2]
 
 
-def test_the_same_settings_give_the_same_stages(tmp_path: Path) -> None:
-    one = begin(tmp_path / "one").resume(threads=1)
-    two = begin(tmp_path / "two").resume(threads=2)
-    assert stages_content(one.path) == stages_content(two.path)
+def test_the_same_settings_give_the_same_stages(whole: dict[str, Any], tmp_path: Path) -> None:
+    assert stages_content(begin(tmp_path / "again").resume(threads=2).path) == whole
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    """The content of a shaping that nothing interrupted."""
+    path = tmp_path_factory.mktemp("shapings") / "whole"
+    return stages_content(begin(path).resume(threads=1).path)
 
 
 def test_generations_are_numbered_through_and_name_their_tasks(tmp_path: Path) -> None:
@@ -160,60 +162,63 @@ def test_the_last_team_is_tested_in_the_environment_of_every_stage(tmp_path: Pat
     assert values == outcome.performance["value"][0].tolist()
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("problem", [Crash(), OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))])
+FULL = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+TWO = {"tasks": TASKS[:2], "run.generations": 2}
+
+
+@pytest.mark.parametrize("problem", [Crash(), FULL])
+def test_resume_after_a_failure_at_each_kind_of_write(
+    problem: BaseException, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calls, whole = written(tmp_path, monkeypatch)
+    crashes, refusals = crashes_and_refusals(calls)
+    assert len(crashes) > len(refusals) >= 16
+    for call in refusals if problem is FULL else crashes:
+        assert_resumes(problem, call, whole, tmp_path, monkeypatch)
+
+
+@pytest.mark.exhaustive
+@pytest.mark.parametrize("problem", [Crash(), FULL])
 def test_resume_after_a_failure_at_every_write(
     problem: BaseException, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    two = {"tasks": TASKS[:2], "run.generations": 2}
-    with monkeypatch.context() as patch:
-        calls = fail_at(patch, -1, problem)
-        whole = stages_content(begin(tmp_path / "whole", **two).resume(threads=1).path)
+    calls, whole = written(tmp_path, monkeypatch)
     assert len(calls) >= 50
-    path = tmp_path / "broken"
     for call in range(len(calls)):
-        with monkeypatch.context() as patch:
-            fail_at(patch, call, problem)
-            with pytest.raises((Crash, EnvironmentFailure)) as caught:
-                begin(path, **two).resume(threads=1)
-        if isinstance(caught.value, EnvironmentFailure):
-            assert str(path) in str(caught.value)
-            assert "No space left on device" in str(caught.value)
-        if not path.exists():  # interrupted in the first write: nothing is left
-            assert [p.name for p in tmp_path.iterdir()] == ["whole"]
-            continue
-        shaping = Shaping(path)
-        if shaping.status != "finished":
-            shaping.resume(threads=1)
-        assert stages_content(path) == whole, call
-        shutil.rmtree(path)
+        assert_resumes(problem, call, whole, tmp_path, monkeypatch)
 
 
-KILLED = """
-import os, re, signal, sys
-from conevo.cli.main import main
-pattern, sync = re.compile(sys.argv.pop(1)), os.fsync
-
-def fsync(handle):
-    if pattern.search(os.readlink(f"/proc/self/fd/{handle}")):
-        os.kill(os.getpid(), signal.SIGKILL)
-    sync(handle)
-
-os.fsync = fsync
-main(sys.argv[1:])
-"""
+def written(folder: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[list[str], dict[str, Any]]:
+    """Return the writes of a whole shaping and its content."""
+    with monkeypatch.context() as patch:
+        calls = fail_at(patch, -1, Crash())
+        return calls, stages_content(begin(folder / "whole", **TWO).resume(threads=1).path)
 
 
-def killed_at(pattern: str, *arguments: str) -> None:
-    """Run a command in a process that is killed when it has written a certain file."""
-    done = subprocess.run(
-        [sys.executable, "-c", KILLED, pattern, *arguments, "--threads", "1", "--quiet"],
-        capture_output=True,
-        text=True,
-        env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)},
-        check=False,
-    )
-    assert done.returncode == -signal.SIGKILL, done
+def assert_resumes(
+    problem: BaseException,
+    call: int,
+    whole: dict[str, Any],
+    folder: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Assert that a shaping of which one write failed, resumed, has the same content."""
+    path = folder / "broken"
+    with monkeypatch.context() as patch:
+        fail_at(patch, call, problem)
+        with pytest.raises((Crash, EnvironmentFailure)) as caught:
+            begin(path, **TWO).resume(threads=1)
+    if isinstance(caught.value, EnvironmentFailure):
+        assert str(path) in str(caught.value)
+        assert "No space left on device" in str(caught.value)
+    if not path.exists():  # interrupted in the first write: nothing is left
+        assert [p.name for p in folder.iterdir()] == ["whole"]
+        return
+    shaping = Shaping(path)
+    if shaping.status != "finished":
+        shaping.resume(threads=1)
+    assert stages_content(path) == whole, call
+    shutil.rmtree(path)
 
 
 def command(path: Path, settings: dict[str, Any]) -> list[str]:
@@ -221,8 +226,9 @@ def command(path: Path, settings: dict[str, Any]) -> list[str]:
     return ["--preset", "smoke", "--out", str(path), *sets]
 
 
-@pytest.mark.slow
-def test_kills_between_and_within_the_stages_change_nothing(tmp_path: Path) -> None:
+def test_kills_between_and_within_the_stages_change_nothing(
+    whole: dict[str, Any], tmp_path: Path
+) -> None:
     path, settings = tmp_path / "killed", tiny_settings("cone") | BRIEF
     first = ["run", "rover/complex-3", "--shape", *command(path, settings)]
     killed_at(r"/\.killed\.\w+/killed/shaping\.toml", *first)
@@ -247,8 +253,7 @@ def test_kills_between_and_within_the_stages_change_nothing(tmp_path: Path) -> N
         assert Shaping(path).status == "interrupted"
         assert len(Shaping(path).stages) == begun, pattern
     Shaping(path).resume(threads=2)
-    whole = begin(tmp_path / "whole").resume(threads=1)
-    assert stages_content(path) == stages_content(whole.path)
+    assert stages_content(path) == whole
     assert list(path.glob(".*")) == []
 
 
@@ -275,7 +280,9 @@ def test_kills_during_stages_of_construction_change_nothing(tmp_path: Path) -> N
     ]
 
 
-def test_an_interrupted_stage_can_also_be_finished_by_itself(tmp_path: Path) -> None:
+def test_an_interrupted_stage_can_also_be_finished_by_itself(
+    whole: dict[str, Any], tmp_path: Path
+) -> None:
     shaping = begin(tmp_path / "shaped")
     interrupt(shaping, stage=2)
     run = conevo.Run(shaping.path / "stage-2")
@@ -283,8 +290,7 @@ def test_an_interrupted_stage_can_also_be_finished_by_itself(tmp_path: Path) -> 
     run.resume(threads=1)
     assert shaping.status == "interrupted"
     shaping.resume(threads=1)
-    whole = begin(tmp_path / "whole").resume(threads=1)
-    assert stages_content(shaping.path) == stages_content(whole.path)
+    assert stages_content(shaping.path) == whole
 
 
 def interrupt(shaping: Shaping, stage: int) -> None:
@@ -298,14 +304,15 @@ def interrupt(shaping: Shaping, stage: int) -> None:
         shaping.resume(threads=1, watch=stop)
 
 
-def test_a_stage_without_checkpoints_starts_again_from_its_origin(tmp_path: Path) -> None:
+def test_a_stage_without_checkpoints_starts_again_from_its_origin(
+    whole: dict[str, Any], tmp_path: Path
+) -> None:
     shaping = begin(tmp_path / "shaped")
     interrupt(shaping, stage=2)
     for file in (shaping.path / "stage-2").glob("checkpoint-?.npz"):
         file.unlink()
     shaping.resume(threads=1)
-    whole = begin(tmp_path / "whole").resume(threads=1)
-    assert stages_content(shaping.path) == stages_content(whole.path)
+    assert stages_content(shaping.path) == whole
 
 
 def test_a_lost_or_damaged_origin_is_not_silently_replaced(tmp_path: Path) -> None:
@@ -436,65 +443,3 @@ def test_the_family_of_a_task() -> None:
     for task, words in (("rover/complex-1", "nothing to shape"), ("rover/complex-11", "unknown")):
         with pytest.raises(UsageError, match=words):
             tasks_up_to(task)
-
-
-# --- prey ---------------------------------------------------------------------------------------
-
-
-def shape_prey(path: Path) -> Shaping:
-    shaping = start_shaping(
-        PREY_TASKS, "cone", "smoke", out=path, overrides=PREY, threads=1, command="conevo test"
-    )
-    return shaping.resume(threads=1)
-
-
-def test_the_six_prey_experiments_leave_a_prey_file(tmp_path: Path) -> None:
-    shaping = shape_prey(tmp_path / "prey")
-    assert shaping.product == shaping.path / "prey.npz"
-    found = prey_sets.load(shaping.product)
-    third, sixth = shaping.stages[2].champion, shaping.stages[5].champion
-    assert third is not None
-    assert sixth is not None
-    np.testing.assert_array_equal(found.one, third.genes)
-    np.testing.assert_array_equal(found.one_active, third.active)
-    np.testing.assert_array_equal(found.two, sixth.genes)
-    np.testing.assert_array_equal(found.two_active, sixth.active)
-    assert found.about["command"] == "conevo test"
-    assert (found.about["method"], found.about["preset"], found.about["seed"]) == (
-        "cone", "smoke", 1,
-    )  # fmt: skip
-    assert found.about["run_ids"] == [run.config.run_id for run in shaping.stages]
-    assert found.about["numpy"] == np.__version__
-    again = shape_prey(tmp_path / "again")
-    assert (again.path / "prey.npz").read_bytes() == shaping.product.read_bytes()
-    world = conevo.world("pursuit/team-6", prey=str(shaping.product))
-    assert world.params.prey_digest == prey_sets.load(shaping.product).digest  # type: ignore[attr-defined]
-    with pytest.raises(
-        UsageError, match=r"stage-1: a team of \(2, .* cannot play prey-v2/shaping-1"
-    ):
-        shaping.test(threads=1)
-
-
-def test_a_kill_before_the_prey_file_is_written_changes_nothing(tmp_path: Path) -> None:
-    path = tmp_path / "killed"
-    killed_at(r"stage-6/DONE", "shape-prey", *command(path, PREY))
-    shaping = Shaping(path)
-    assert (shaping.status, shaping.product) == ("interrupted", None)
-    shaping.resume(threads=1)
-    assert shaping.product is not None
-    whole = shape_prey(tmp_path / "whole")
-    one, two = (stages_content(p) for p in (path, whole.path))  # commands differ
-    assert [one.pop("prey")[:2], two.pop("prey")[:2]] == [b"PK", b"PK"]
-    assert one == two
-
-
-@pytest.mark.parametrize(
-    ("setting", "value"), [("bias", True), ("recurrent", True), ("weight_scale", 5.0)]
-)
-def test_prey_that_do_not_fit_a_prey_file_are_refused(
-    setting: str, value: Any, tmp_path: Path
-) -> None:
-    settings = PREY | {f"controller.{setting}": value}
-    with pytest.raises(UsageError, match=f"controller.{setting} = {value}: prey of the pursuit"):
-        start_shaping(PREY_TASKS, "cone", "smoke", out=tmp_path / "prey", overrides=settings)
-    assert not (tmp_path / "prey").exists()

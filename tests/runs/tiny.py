@@ -6,6 +6,7 @@ import json
 import multiprocessing
 import os
 import random
+import re
 import signal
 import subprocess
 import sys
@@ -113,6 +114,27 @@ def kill_twice(path: Path, arguments: list[str]) -> list[int]:
         assert conevo.Run(path).status == "interrupted"
         arguments = ["resume", str(path)]
     return kills
+
+
+def killed_at(pattern: str, *arguments: str) -> None:
+    """Carry out a command in a process that is killed when it has written a certain file."""
+    words = [*arguments, "--threads", "1", "--quiet"]
+    process = FORKS.Process(target=_killed, args=(pattern, words))
+    process.start()
+    process.join()
+    assert process.exitcode == -signal.SIGKILL, process.exitcode
+
+
+def _killed(pattern: str, arguments: list[str]) -> None:
+    sync = os.fsync
+
+    def fsync(handle: int) -> None:
+        if re.search(pattern, os.readlink(f"/proc/self/fd/{handle}")):
+            os.kill(os.getpid(), signal.SIGKILL)
+        sync(handle)
+
+    os.fsync = fsync
+    main(arguments)
 
 
 def is_past(path: Path, process: subprocess.Popen[str] | BaseProcess, generation: int) -> bool:
