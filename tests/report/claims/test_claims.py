@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
+import numpy as np
+import numpy.typing as npt
 import pytest
 
 from conevo.campaigns.tables import Tables
-from conevo.report.claims import CLAIMS, Claim, Verdict, verdicts
+from conevo.report.claims import CLAIMS, Claim, Verdict, outcomes, verdicts
+from conevo.report.statistics import Comparison, compare
 from report.claims.known_truth import METHODS, TRUTHS, Truth, of_robots, write_tables
 
 BY_ID = {claim.id: claim for claim in CLAIMS}
@@ -178,6 +181,22 @@ def judged(folder: Path, claim: Claim) -> Verdict:
     with Tables(folder) as tables:
         (verdict,) = verdicts(tables, [claim])
     return verdict
+
+
+@pytest.fixture(scope="module", autouse=True)
+def compared_once() -> Iterator[None]:
+    """Compare each pair of samples once: most occur in many of these tests."""
+    known: dict[tuple[bytes, bytes], Comparison] = {}
+
+    def once(a: npt.ArrayLike, b: npt.ArrayLike) -> Comparison:
+        key = np.asarray(a, dtype=float).tobytes(), np.asarray(b, dtype=float).tobytes()
+        if key not in known:
+            known[key] = compare(a, b)
+        return known[key]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(outcomes, "compare", once)
+        yield
 
 
 @pytest.fixture(scope="module", params=list(TRUTHS))
