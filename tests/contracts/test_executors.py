@@ -24,13 +24,13 @@ from conevo.campaigns.executors.registry import EXECUTORS, make_executor
 from conevo.campaigns.plan_file import read_plan
 from conevo.runs.directory import read_json
 
-SLOW = {
-    "ray": [
-        pytest.mark.slow,
-        pytest.mark.skipif(not importlib.util.find_spec("ray"), reason="Ray is not installed"),
-    ]
+NEEDS = {
+    "ray": [pytest.mark.skipif(not importlib.util.find_spec("ray"), reason="Ray is not installed")]
 }
-NAMES = [pytest.param(name, marks=SLOW.get(name, [])) for name in EXECUTORS]
+NAMES = [
+    pytest.param(name, marks=[*NEEDS.get(name, []), *[pytest.mark.slow] * (name != "serial")])
+    for name in EXECUTORS
+]
 every_executor = pytest.mark.parametrize("name", NAMES)
 every_with_workers = pytest.mark.parametrize(
     "name", [one for one in NAMES if one.values != ("serial",)]
