@@ -14,6 +14,8 @@ import pytest
 from typing_extensions import TypedDict
 
 from conevo.errors import EnvironmentFailure, UsageError, shown
+from conevo.evolution.methods.outside import load as load_method
+from conevo.outside import files_of
 from conevo.reading import (
     DamagedFile,
     check,
@@ -25,6 +27,8 @@ from conevo.reading import (
     read_text,
     read_toml,
 )
+from conevo.worlds.outside import load as load_world
+from conevo.worlds.pursuit.prey_sets import load as load_prey
 from fuzz.damages import packed_zeros
 
 
@@ -76,6 +80,14 @@ def test_refusals_of_the_system_are_faults_of_the_machine(tmp_path: Path) -> Non
             read_bytes(tmp_path / path)
     with pytest.raises(UsageError, match=r"null (byte|character)"):
         read_bytes(tmp_path / "a\0b")
+
+
+def test_own_files_and_prey_sets_that_the_system_refuses_are_faults_of_the_machine(
+    tmp_path: Path,
+) -> None:
+    for read in (load_world, load_method, load_prey, files_of):
+        with pytest.raises(EnvironmentFailure, match=r"cannot read .*: .*too lo"):
+            read(tmp_path / f"{'a' * 300}.py")
 
 
 def test_a_link_to_a_file_is_followed(tmp_path: Path) -> None:

@@ -23,7 +23,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, Literal, TypeVar, cast
 
-from conevo.errors import EnvironmentFailure, UsageError, unknown_name
+from conevo.errors import UsageError, unknown_name
 from conevo.reading import read_bytes, refuse_wide
 
 __all__ = ["entry_of", "files_of", "is_outside", "line_of", "source_of", "takes"]
@@ -65,7 +65,8 @@ def source_of(path: Path, kind: Sort, digest: str = "") -> Source:
         digest: that the texts must have; any if empty.
 
     Raises:
-        UsageError: a file cannot be read or run, or they have another digest.
+        UsageError: a file is missing, damaged or cannot be run, or they have another digest.
+        EnvironmentFailure: one cannot be read.
     """
     with _loading:  # Python 3.11 parses in one thread at a time: python/cpython issue 106905
         texts = _texts(path, kind)
@@ -102,7 +103,9 @@ def entry_of(
         digest: that the files must have; any if empty.
 
     Raises:
-        UsageError: a file cannot be read or run, has no entry, or they have another digest.
+        UsageError: a file is missing, damaged or cannot be run, has no entry, or they have another
+            digest.
+        EnvironmentFailure: one cannot be read.
     """
     source = source_of(path, kind, digest)
     entry = getattr(source.module, "ENTRY", None)
@@ -125,7 +128,8 @@ def files_of(path: Path) -> list[Path]:
     """Return a file and the files next to it that it imports, without running them.
 
     Raises:
-        UsageError: one cannot be read.
+        UsageError: one is missing or damaged.
+        EnvironmentFailure: one cannot be read.
     """
     return list(_texts(path, "Python"))
 
@@ -157,12 +161,9 @@ def _texts(path: Path, kind: str) -> dict[Path, bytes]:
     rest = [path.resolve()]
     while rest:
         file = rest.pop()
-        try:
-            name = f"the {kind} file {file if texts else path}"
-            texts[file] = read_bytes(file, MOST_BYTES, name)
-            refuse_wide(texts[file], name)
-        except EnvironmentFailure as error:
-            raise UsageError(str(error)) from error
+        name = f"the {kind} file {file if texts else path}"
+        texts[file] = read_bytes(file, MOST_BYTES, name)
+        refuse_wide(texts[file], name)
         near = {file.parent / f"{name}.py" for name in _imported(texts[file])}
         rest += sorted((one for one in near if one.is_file() and one not in texts), reverse=True)
     return texts

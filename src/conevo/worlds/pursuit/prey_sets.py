@@ -98,7 +98,8 @@ def load(path: str | Path | None = None) -> PreySet:
     """Return a prey set, by default the shipped one.
 
     Raises:
-        UsageError: the file cannot be read, or is not a prey set.
+        UsageError: the file is missing, damaged or not a prey set.
+        EnvironmentFailure: it cannot be read.
     """
     arrays = _read(path)
     try:
@@ -122,7 +123,4 @@ def _read(path: str | Path | None) -> dict[str, npt.NDArray[Any]]:
     if path is None:
         with resources.as_file(resources.files(__package__) / SHIPPED) as shipped:
             return read_arrays(shipped)
-    try:
-        return read_arrays(Path(path), MOST_BYTES, "a prey set")
-    except EnvironmentFailure as error:
-        raise UsageError(str(error)) from error
+    return read_arrays(Path(path), MOST_BYTES, "a prey set")
