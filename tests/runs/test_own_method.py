@@ -63,7 +63,7 @@ def test_its_step_size_is_in_the_log_and_its_state_in_the_checkpoint(tmp_path: P
     assert len(set(sizes)) == 6
     assert {record["sst"] for record in run.generations()} == {None}
     shown = generations_table(run.generations()).splitlines()
-    assert re.search(r" recombined  step_size  neurons ", shown[0])
+    assert re.search(r" S  step_size  neurons ", shown[0])  # and none of an exchange
     assert "  0.2  " in shown[1]
     (file,) = run.path.glob("checkpoint-?.npz")
     with np.load(file) as archive:

@@ -16,7 +16,7 @@ from conevo.runs.provenance import declared
 from conevo.runs.records import own_numbers
 from conevo.runs.run import Run
 from conevo.runs.shaping import Shaping
-from conevo.studies.exchange import exchanged, per_generation
+from conevo.studies.exchange import exchanged, has_exchange, per_generation
 from conevo.terms import S_SCALE, counted, quoted
 
 __all__ = [
@@ -31,6 +31,8 @@ __all__ = [
     "state_text",
     "title",
 ]
+
+EXCHANGE = {"sst": "SST", "gst": "GST", "recombinations": "recombined"}
 
 
 def title(outline: Outline) -> str:
@@ -94,11 +96,15 @@ def spaced(records: list[dict[str, Any]], n: int) -> list[dict[str, Any]]:
 
 
 def generations_table(records: list[dict[str, Any]], *lead: str) -> str:
-    """Return generations as a table; ``lead`` are the keys of its first columns."""
+    """Return generations as a table; ``lead`` are the keys of its first columns.
+
+    Only methods with an exchange between populations have columns for it.
+    """
     measures = list(dict.fromkeys(name for one in records for name in one["performance"]))
-    head = [*lead, "generation", *measures, "best fitness", "mean fitness", "S", "SST", "GST"]
-    own = own_numbers(records)  # of the method
-    head += ["recombined", *own, "neurons", "evaluations", "castes of the fittest team"]
+    own = [*(EXCHANGE if has_exchange(records) else ()), *own_numbers(records)]  # of the method
+    head = [*lead, "generation", *measures, "best fitness", "mean fitness", "S"]
+    head += [EXCHANGE.get(name, name) for name in own]
+    head += ["neurons", "evaluations", "castes of the fittest team"]
     rows = [
         [
             *(str(record[name]) for name in (*lead, "generation")),
@@ -106,9 +112,6 @@ def generations_table(records: list[dict[str, Any]], *lead: str) -> str:
             number(record["best_fitness"]),
             number(record["mean_fitness"]),
             number(record["specialization"]),
-            number(record["sst"]),
-            number(record["gst"]),
-            str(record["recombinations"]),
             *(number(record.get(name)) for name in own),
             neurons(record["n_hidden"]),
             number(record["team_evaluations"]),

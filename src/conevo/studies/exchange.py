@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-__all__ = ["FEW_PAIRS", "FEW_SHARE", "exchanged", "is_idle", "per_generation"]
+__all__ = ["FEW_PAIRS", "FEW_SHARE", "exchanged", "has_exchange", "is_idle", "per_generation"]
 
 FEW_PAIRS, FEW_SHARE = 1.0, 0.1
 
@@ -19,11 +19,16 @@ def exchanged(records: Sequence[Mapping[str, Any]]) -> tuple[float | None, float
     Args:
         records: of the generations of a run.
     """
-    if all(record["sst"] is None and record["gst"] is None for record in records):
+    if not has_exchange(records):
         return None, None
     made = sum(record["recombinations"] for record in records)
     possible = sum(sum(record["n_hidden"]) // 2 for record in records)
     return made / len(records), made / possible if possible else 0.0
+
+
+def has_exchange(records: Sequence[Mapping[str, Any]]) -> bool:
+    """Return whether the method of these generations has thresholds for an exchange."""
+    return any(record["sst"] is not None or record["gst"] is not None for record in records)
 
 
 def is_idle(exchanges: float | None, share: float | None) -> bool:
