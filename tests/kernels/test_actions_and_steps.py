@@ -13,6 +13,7 @@ from conevo.kernels.outputs import highest
 from conevo.kernels.steps import is_taken, random_step, steered_step
 
 engine.start()
+wp.set_module_options(engine.options)  # without adjoints, as in the worlds
 
 
 @wp.kernel

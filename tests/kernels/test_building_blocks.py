@@ -19,6 +19,7 @@ from conevo.rng import uniforms
 from oracles import rover_oracle, splitmix
 
 engine.start()
+wp.set_module_options(engine.options)  # without adjoints, as in the worlds
 weights_of, memory_of = view_of(SrnWeights), view_of(SrnMemory)
 
 

@@ -17,6 +17,7 @@ from conevo.kernels.sets import (
 )
 
 engine.start()
+wp.set_module_options(engine.options)  # without adjoints, as in the worlds
 
 
 @wp.kernel

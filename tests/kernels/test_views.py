@@ -1,5 +1,7 @@
 """Which arrays lie in shared memory, and which parts a launch fetches and stores there."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import warp as wp
@@ -7,6 +9,8 @@ import warp as wp
 from conevo.kernels.views import near_arrays
 from conevo.worlds.registry import world
 from conevo.worlds.rollout import Rollout
+
+LIGHT = f"{Path(__file__).resolve().parents[2] / 'examples' / 'light.py'}:dark-1"
 
 
 @wp.struct
@@ -44,17 +48,19 @@ def test_the_smallest_arrays_lie_near_as_many_as_fit(limit, small, other):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("limit", [600, 24 * 1024])
-def test_near_arrays_compile_for_cuda_and_change_no_result(limit, tmp_path):
+@pytest.mark.parametrize(("path", "limit"), [(LIGHT, 600), ("rover/complex-1", 24 * 1024)])
+def test_near_arrays_compile_for_cuda_and_change_no_result(path, limit, tmp_path):
     from contracts.test_worlds import assert_same_bits, random_teams
 
-    task = world("rover/complex-1", n_robots=3, iterations=12)
+    task = world(path, n_robots=3, iterations=12)
     genes, teams = random_teams(task, 2)
     scenarios = task.scenarios([5])
     plain, near = Rollout(task, n_threads=1), Rollout(task, n_threads=1)
     state, memory = near._simulation.state, near._mind.memory
     chosen = near_arrays({state: near._shapes, memory: near._mind_shapes[memory]}, limit)
-    assert sum(map(len, chosen.values())) > 0
+    assert all(chosen.values())
+    n_arrays = len(near._shapes) + len(near._mind_shapes[memory])
+    assert (sum(map(len, chosen.values())) == n_arrays) == (path != LIGHT)  # one lies far there
     kernel = near.cuda_form(64, shared_bytes=limit)
     near._kernel = kernel
     assert_same_bits(*(one.evaluate(genes, teams, scenarios) for one in (plain, near)))
