@@ -201,28 +201,28 @@ PRICES = {"zone_side": 0.1, "object_cost": 0.03, "robot_cost": 0.02, "grip_cost"
           "move_cost": 0.05}  # fmt: skip
 # Environment, minds, robots, iterations, sides of the squares that robots and objects start in.
 CASES = [
-    ("complex-1", "networks", 30, 100, 0.3, 0.3, SMALL | {"grip_distance": 0.05}),
-    ("complex-6", "both", 20, 100, 0.3, 0.3, SMALL | {"wait": 30}),
-    ("complex-4", "both", 30, 100, 0.3, 0.3, SMALL | {"wait": 4}),
-    ("complex-9", "both", 30, 150, 0.3, 0.3, FOUND),
-    ("complex-9", "heuristics", 30, 150, 0.3, 0.3, FOUND | {"wait": 3, "energy": 2.503}),
-    ("complex-5", "heuristics", 30, 150, 0.25, 0.15, FOUND | {"wait": 6, "home_sight": 0.1}),
-    ("complex-8", "heuristics", 40, 120, 0.2, 0.2, SMALL | PRICES | {"wait": 3, "home_sight": 0.2}),
-    ("complex-2", "heuristics", 40, 200, 0.23, 0.23, SMALL | {"wait": 8, "move_range": 0.02}),
-    ("complex-3", "heuristics", 30, 150, 0.2, 0.1, SMALL | {"wait": 8, "grip_distance": 0.05}),
-    ("complex-7", "networks", 30, 120, 0.3, 0.3, SMALL | WIDE | {"grip_distance": 0.04}),
-    ("simple-9", "heuristics", 30, 150, 0.2, 0.2, FOUND | {"wait": 4, "object_accuracy": 0.5}),
-    ("simple-10", "both", 30, 100, 0.99, 0.99, FOUND | WIDE | {"home_range": 0.3}),
-    ("complex-9", "heuristics", 30, 100, 0.9, 0.9, SMALL | WIDE | {"grip_distance": 0.2}),
-    ("complex-4", "heuristics", 30, 150, 0.24, 0.24, SMALL | WIDE | {"home_side": 0.06, "wait": 4,
+    ("complex-1", "networks", 30, 60, 0.3, 0.3, SMALL | {"grip_distance": 0.05}),
+    ("complex-6", "both", 20, 60, 0.3, 0.3, SMALL | {"wait": 30}),
+    ("complex-4", "both", 30, 60, 0.3, 0.3, SMALL | {"wait": 4}),
+    ("complex-9", "both", 30, 90, 0.3, 0.3, FOUND),
+    ("complex-9", "heuristics", 30, 120, 0.3, 0.3, FOUND | {"wait": 3, "energy": 2.503}),
+    ("complex-5", "heuristics", 30, 90, 0.25, 0.15, FOUND | {"wait": 6, "home_sight": 0.1}),
+    ("complex-8", "heuristics", 40, 70, 0.2, 0.2, SMALL | PRICES | {"wait": 3, "home_sight": 0.2}),
+    ("complex-2", "heuristics", 40, 120, 0.23, 0.23, SMALL | {"wait": 8, "move_range": 0.02}),
+    ("complex-3", "heuristics", 30, 90, 0.2, 0.1, SMALL | {"wait": 8, "grip_distance": 0.05}),
+    ("complex-7", "networks", 30, 70, 0.3, 0.3, SMALL | WIDE | {"grip_distance": 0.04}),
+    ("simple-9", "heuristics", 30, 90, 0.2, 0.2, FOUND | {"wait": 4, "object_accuracy": 0.5}),
+    ("simple-10", "both", 30, 60, 0.99, 0.99, FOUND | WIDE | {"home_range": 0.3}),
+    ("complex-9", "heuristics", 30, 60, 0.9, 0.9, SMALL | WIDE | {"grip_distance": 0.2}),
+    ("complex-4", "heuristics", 30, 120, 0.24, 0.24, SMALL | WIDE | {"home_side": 0.06, "wait": 4,
                                                                      "energy": 2.003}),
-    ("complex-6", "networks", 12, 150, 0.2, 0.2, SMALL | {"wait": 2, "separation": 0.01,
+    ("complex-6", "networks", 12, 90, 0.2, 0.2, SMALL | {"wait": 2, "separation": 0.01,
                                                           "min_distance": 0.03}),
-    ("complex-2", "heuristics", 30, 80, 0.99, 0.99, SMALL | WIDE | {"object_accuracy": 0.5}),
+    ("complex-2", "heuristics", 30, 50, 0.99, 0.99, SMALL | WIDE | {"object_accuracy": 0.5}),
     # The world as it is: a large home area, all of it in sight.
-    ("complex-9", "both", 30, 150, 0.9, 0.9, {}),
-    ("complex-4", "networks", 30, 150, 0.99, 0.7, {}),
-    ("simple-7", "heuristics", 30, 150, 0.7, 0.6, {"object_range": 0.1, "object_accuracy": 0.7}),
+    ("complex-9", "both", 30, 90, 0.9, 0.9, {}),
+    ("complex-4", "networks", 30, 90, 0.99, 0.7, {}),
+    ("simple-7", "heuristics", 30, 90, 0.7, 0.6, {"object_range": 0.1, "object_accuracy": 0.7}),
 ]  # fmt: skip
 
 
@@ -280,11 +280,11 @@ def test_the_comparisons_above_are_not_vacuous():
 
 def test_a_whole_epoch_of_the_world_as_it_is():
     """All thirty heuristic robots of every kind with the defaults, from a drawn start."""
-    a_world = world("gacc/complex-9", iterations=600)
+    a_world = world("gacc/complex-9", iterations=300)
     genes, slots = random_team(a_world, 1)
     heuristic = (np.arange(30) % 10).astype(np.int32)
     tally = compare(a_world, genes, slots, a_world.scenarios([3]), heuristic)
-    assert tally.near_ties <= 6
+    assert tally.near_ties <= 3
     assert tally.events["GRIPPED -> CARRIED"] > 10
 
 

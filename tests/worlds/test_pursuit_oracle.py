@@ -9,6 +9,7 @@ rounding; such iterations are counted, and are rare.
 import math
 from copy import copy
 from dataclasses import dataclass, field, replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -397,18 +398,18 @@ def prey(tmp_path_factory):
 # Environment, prey, which robots are heuristic (every n-th, 0 for none), scale of genes,
 # iterations, parameters.
 HUNTS = [
-    ("team-1", "heuristic", 0, 0.1, 120, {"arena_cm": 60.0}),
+    ("team-1", "heuristic", 0, 0.1, 80, {"arena_cm": 60.0}),
     ("team-2", "random", 2, 0.3, 120, {"arena_cm": 60.0, "capture_window": 7}),
-    ("team-3", "shaped", 0, 0.1, 120, {"arena_cm": 60.0}),
-    ("team-3", "file", 1, 0.3, 200, {"arena_cm": 60.0}),
-    ("team-5", "heuristic", 1, 0.3, 150, {}),
-    ("team-5", "random", 3, 1.0, 100, {"max_speed_cm": 2.5, "prey_speed": 0.9}),
-    ("team-6", "file", 0, 0.1, 100, {"arena_cm": 60.0, "sensor_angle_deg": 12.0}),
-    ("team-7", "random", 1, 0.3, 60, {"arena_cm": 1000.0}),
-    ("team-8", "shaped", 2, 0.2, 100, {"sensor_range_cm": 40.0, "n_obstacles": 4}),
-    ("team-9", "heuristic", 3, 0.1, 100, {"arena_cm": 60.0, "sensor_angle_deg": 45.0}),
-    ("team-10", "file", 2, 0.1, 100, {"arena_cm": 60.0, "n_obstacles": 6}),
-    ("team-10", "random", 1, 0.1, 150, {"capture_share": 0.5, "capture_predators": 3}),
+    ("team-3", "shaped", 0, 0.1, 80, {"arena_cm": 60.0}),
+    ("team-3", "file", 1, 0.3, 140, {"arena_cm": 60.0}),
+    ("team-5", "heuristic", 1, 0.3, 100, {}),
+    ("team-5", "random", 3, 1.0, 70, {"max_speed_cm": 2.5, "prey_speed": 0.9}),
+    ("team-6", "file", 0, 0.1, 70, {"arena_cm": 60.0, "sensor_angle_deg": 12.0}),
+    ("team-7", "random", 1, 0.3, 40, {"arena_cm": 1000.0}),
+    ("team-8", "shaped", 2, 0.2, 70, {"sensor_range_cm": 40.0, "n_obstacles": 4}),
+    ("team-9", "heuristic", 3, 0.1, 70, {"arena_cm": 60.0, "sensor_angle_deg": 45.0}),
+    ("team-10", "file", 2, 0.1, 70, {"arena_cm": 60.0, "n_obstacles": 6}),
+    ("team-10", "random", 1, 0.1, 100, {"capture_share": 0.5, "capture_predators": 3}),
 ]  # fmt: skip
 
 
@@ -424,13 +425,18 @@ def hunt(case, prey, seed):
     return a_world, *random_team(a_world, seed, scale), scenarios, heuristic
 
 
-@pytest.mark.parametrize("case", HUNTS, ids=lambda c: f"{c[0]}-{c[1]}-{c[2]}")
-def test_hunts_equal_the_oracle(case, prey):
-    tally = compare(*hunt(case, prey, 1))
+@cache
+def compared(k, prey):
+    return compare(*hunt(HUNTS[k], prey, 1))
+
+
+@pytest.mark.parametrize("k", range(len(HUNTS)))
+def test_hunts_equal_the_oracle(k, prey):
+    tally = compared(k, prey)
     assert tally.near_ties <= 0.03 * tally.steps
 
 
-# Environment, heuristic of each robot (-1 for none), parameters; 150 iterations.
+# Environment, heuristic of each robot (-1 for none), parameters; 90 iterations.
 FLIGHTS = [
     ("shaping-1", [-1], {}),
     ("shaping-2", [-1], {"arena_cm": 60.0}),
@@ -445,7 +451,7 @@ FLIGHTS = [
 
 def flight(case, seed):
     environment, heuristic, params = case
-    a_world = world(f"prey/{environment}", iterations=150, **params)
+    a_world = world(f"prey/{environment}", iterations=90, **params)
     scenarios = a_world.scenarios([fold(seed, environment)])
     genes, slots = random_team(a_world, seed, 0.3 if seed % 2 else 0.1)
     return a_world, genes, slots, scenarios, np.array(heuristic, np.int32)
@@ -468,11 +474,11 @@ def test_held_sensors_equal_the_oracles(prey):
 
 
 def test_the_comparisons_above_are_not_vacuous(prey):
-    tallies = [compare(*hunt(HUNTS[k], prey, 1)) for k in (1, 5, 9, 10, 11)]
-    assert sum(t.captured for t in tallies) > 100
-    assert sum(t.refused for t in tallies) > 1000
-    assert sum(t.lights for t in tallies) > 2000
-    assert sum(t.seen for t in tallies) > 10_000
+    tallies = [compared(k, prey) for k in (1, 5, 9, 10, 11)]
+    assert sum(t.captured for t in tallies) > 50
+    assert sum(t.refused for t in tallies) > 500
+    assert sum(t.lights for t in tallies) > 1000
+    assert sum(t.seen for t in tallies) > 5000
     assert set().union(*(t.actions for t in tallies)) >= {1, 2, 3, 4}
 
 
