@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from textwrap import indent
 
 import pytest
 
@@ -186,16 +187,24 @@ def test_a_mistake_in_a_declaration_is_one_line(name: str, tmp_path: Path) -> No
             conevo.Rollout(conevo.world(f"{file}:dark-1"))
 
 
-def faulty(path: Path, name: str) -> Path:
-    """Write the example with a kernel that has all mistakes and a parameter that selects one."""
-    number = [*PLAYED].index(name) + 1 if name else 0
-    state, given = "    y: wp.array[float]\n", "kernel_params(Params, self.params)"
-    begin = "    team.x[i] = scene.places[2 * i]\n"
-    text = TEXT
+def selecting(number: int, text: str = TEXT) -> str:
+    """Return the example with a parameter ``fault`` of this number, which its kernel can read."""
     for old, new in (
         ("class LightParams:", f"{{}}\n    fault: Annotated[int, Ge(0), Le(99)] = {number}\n"),
         ("    step: float\n", "{}    fault: int\n    zero: float\n"),
-        (given, "kernel_params(Params, self.params, zero=0.0)"),
+        ("kernel_params(Params, self.params)", "kernel_params(Params, self.params, zero=0.0)"),
+    ):
+        assert text.count(old) == 1, old
+        text = text.replace(old, new.replace("{}", old))
+    return text
+
+
+def faulty(path: Path, name: str) -> Path:
+    """Write the example with a kernel that has all mistakes and a parameter that selects one."""
+    state = "    y: wp.array[float]\n"
+    begin = "    team.x[i] = scene.places[2 * i]\n"
+    text = selecting([*PLAYED].index(name) + 1 if name else 0)
+    for old, new in (
         (state, "{}" + "".join(FIELDS)),
         ("@wp.struct\nclass Team:", "@named_arrays\nclass Team:"),
         ("import warp as wp\n", "{}" + IMPORT),
@@ -265,45 +274,6 @@ def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str]:
     return int(caught.value.code or 0), out
 
 
-# The change, and the line in which the mistake is then found.
-OUTSIDE = {
-    "counts": (("i, a, a)", "i, a, a + 1)"),
-               "count_action(team.action, team.switches, team.counts, i, a, a + 1)"),
-    "output": (("heuristic_action(uniform(", "int(team.outputs[i, 4]) + heuristic_action(uniform("),
-               "team.chosen[i] = int(team.outputs[i, 4]) + heuristic_action(uniform("
-               "scene.seed[0], t, 0, i), 0, 1, 2)"),
-    "dy": (("team.outputs[i, 3], p.step", "team.outputs[i, 4], p.step"),
-           "step = steered_step(team.outputs[i, 2], team.outputs[i, 4], p.step)"),
-    "highest": (("highest(team.outputs, i, 2)", "highest(team.outputs, i, 5)"),
-                "team.chosen[i] = highest(team.outputs, i, 5)"),
-    "input": (("team.inputs[i, 1] = way[1]", "team.inputs[i, 2] = way[1]"),
-              "team.inputs[i, 2] = way[1]"),
-    "robot": (("team.inputs[i, 1] = way[1]", "team.inputs[i + 1, 1] = way[1]"),
-              "team.inputs[i + 1, 1] = way[1]"),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("name", OUTSIDE)
-def test_an_index_outside_an_array_is_found_with_its_line(
-    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    change, line = OUTSIDE[name]
-    scratch = tmp_path / "scratch"
-    scratch.mkdir()
-    monkeypatch.setattr("tempfile.tempdir", str(scratch))
-    monkeypatch.setenv("TMPDIR", str(scratch))
-    imports = ("from conevo.rng", "from neighbour import NOTHING\nfrom conevo.rng")
-    (tmp_path / "neighbour.py").write_text("NOTHING = 0\n")
-    file = written(tmp_path / "bad.py", change, imports)
-    code, out = run(capsys, str(file))
-    assert code == 2
-    assert "ok       file          bad.py, which imports neighbour.py" in out
-    number = 1 + [text.strip() for text in file.read_text().splitlines()].index(line)
-    assert f"problem  memory        {file}:{number}: in `{line}` an index lies outside its" in out
-    assert out.endswith("1 problem\n")
-    assert [*scratch.iterdir()] == []  # of two children that died
-
-
 CALLED = """
 @wp.func
 def beyond(team: Team, i: int) -> int:
@@ -319,39 +289,73 @@ def both(team: Team, i: int):
 
 @wp.func
 def reset("""
-MISPLACED = {
-    "after a call": (
-        "team.x[i] = team.y[\n        beyond(team, i)\n    ]",
-        "in `team.x[i] = team.y[ beyond(team, i) ]`",
-    ),
-    "after two": ("u, v = both(team, i)\n    team.x[v] = team.y[u]", "in `team.x[v] = team.y[u]`"),
-    "loop": (
-        "k = int(0)\n    while team.x[k] < 7.0:\n        k += 1\n        if k < 2:\n"
-        "            continue",
-        "in `while team.x[k] < 7.0:`",
-    ),
-}
+ACT, COMMIT, SENSE = (
+    "    a = team.chosen[i]\n",
+    "    count_action(",
+    "    team.inputs[i, 1] = way[1]\n",
+)
+CHOOSE = "    if team.heuristic[i] == 0:\n"
+# The line of the example before which the mistake is made, the mistake, and the number of the line
+# in it, and the statement, that are found. All are in one kernel, and a parameter selects one.
+OUTSIDE: dict[str, tuple[str, str, int, str]] = {
+    name: (before, line, 0, line)
+    for name, before, line in (
+        ("counts", COMMIT, "count_action(team.action, team.switches, team.counts, i, a, a + 1)"),
+        ("output", CHOOSE, "team.chosen[i] = int(team.outputs[i, 4]) + heuristic_action(uniform("
+                           "scene.seed[0], t, 0, i), 0, 1, 2)"),
+        ("dy", ACT, "step = steered_step(team.outputs[i, 2], team.outputs[i, 4], p.step)"),
+        ("highest", CHOOSE, "team.chosen[i] = highest(team.outputs, i, 5)"),
+        ("input", SENSE, "team.inputs[i, 2] = way[1]"),
+        ("robot", SENSE, "team.inputs[i + 1, 1] = way[1]"),
+    )
+} | {
+    "after a call": (ACT, "team.x[i] = team.y[\n    beyond(team, i)\n]", 0,
+                     "team.x[i] = team.y[ beyond(team, i) ]"),
+    "after two": (ACT, "u, v = both(team, i)\nteam.x[v] = team.y[u]", 1, "team.x[v] = team.y[u]"),
+    "loop": (ACT, "k = int(0)\nwhile team.x[k] < 7.0:\n    k += 1\n    if k < 2:\n"
+                  "        continue", 1, "while team.x[k] < 7.0:"),
+}  # fmt: skip
 
 
-@pytest.mark.parametrize("name", MISPLACED)
-def test_the_line_is_the_one_that_reads_not_the_previous_one(name: str, tmp_path: Path) -> None:
-    lines, words = MISPLACED[name]
-    a = "    a = team.chosen[i]\n"
-    file = written(
-        tmp_path / "bad.py", ("\n@wp.func\ndef reset(", CALLED), (a, f"{a}    {lines}\n")
-    )
-    at = 1 + file.read_text().splitlines().index(
-        f"    {lines}".splitlines()[name != "after a call"]
-    )
-    found = [one.text for one in checking.check(str(file)) if one.status == "problem"]
-    assert found == [f"{file}:{at}: {words} an index lies outside its array"]
+def wild(folder: Path, name: str) -> tuple[Path, int]:
+    """Write the example with all these mistakes, of which one is made; return its line, too."""
+    text = selecting([*OUTSIDE].index(name) + 1).replace("\n@wp.func\ndef reset(", CALLED)
+    text = text.replace("from conevo.rng", "from neighbour import NOTHING\nfrom conevo.rng")
+    for k, (before, lines, *_) in enumerate(OUTSIDE.values(), 1):
+        assert text.count(before) == 1, before
+        made = indent(f"if p.fault == {k}:\n{indent(lines, '    ')}\n", "    ")
+        text = text.replace(before, made + before)
+    (folder / "neighbour.py").write_text("NOTHING = 0\n")
+    file = folder / "bad.py"
+    file.write_text(text)
+    selected = f"    if p.fault == {[*OUTSIDE].index(name) + 1}:"
+    return file, text.splitlines().index(selected) + 2 + OUTSIDE[name][2]
+
+
+@pytest.mark.parametrize("name", OUTSIDE)
+def test_an_index_outside_an_array_is_found_with_its_line(
+    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It is the line that reads, not the previous one."""
+    scratch = tmp_path / "scratch"
+    scratch.mkdir()
+    monkeypatch.setattr("tempfile.tempdir", str(scratch))
+    monkeypatch.setenv("TMPDIR", str(scratch))
+    file, at = wild(tmp_path, name)
+    code, out = run(capsys, str(file))
+    assert code == 2
+    assert "ok       file          bad.py, which imports neighbour.py" in out
+    place = f"problem  memory        {file}:{at}: in `{OUTSIDE[name][3]}` an index lies outside its"
+    assert place in out
+    assert out.endswith("1 problem\n")
+    assert [*scratch.iterdir()] == []  # of two children that died
 
 
 @pytest.mark.slow
 def test_a_check_without_progress_is_ended(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(checking, "STEP_SECONDS", 2)
+    monkeypatch.setattr(checking, "STEP_SECONDS", 0.3)
     monkeypatch.setattr(checking, "AGAIN_SECONDS", 2)
     endless = "k = int(0)\n    while True:\n        k = 1 - k\n    a = team.chosen[i]"
     file = written(tmp_path / "light.py", ("a = team.chosen[i]", endless))
@@ -427,8 +431,8 @@ def test_no_run_and_no_campaign_starts_with_an_index_outside_its_array(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    (old, new), words = OUTSIDE["counts"]
-    file = written(tmp_path / "bad.py", (old, new))
+    words = OUTSIDE["counts"][1]
+    file = written(tmp_path / "bad.py", ("i, a, a)", "i, a, a + 1)"))
     (tmp_path / "plan.toml").write_text(
         '[campaign]\nname = "bad"\npreset = "smoke"\nseeds = 1\n\n'
         '[factors]\nworld = ["bad.py:dark-1"]\nmethod = ["homcne"]\n'
