@@ -1,6 +1,7 @@
 """A device must agree with the CPU bit for bit before it is used; here a device is simulated."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from conevo.worlds.registry import world
 from conevo.worlds.rollout import Rollout
 from conevo.worlds.simulators import simulator
 
+LIGHT = f"{Path(__file__).resolve().parents[2] / 'examples' / 'light.py'}:dark-1"
 TASK = world("rover/complex-1", n_robots=4, iterations=50)
 
 
@@ -32,15 +34,16 @@ def asked(monkeypatch):
 
 
 def test_blocks_of_lanes_agree_with_the_cpu_and_are_compared_once(cpu_blocks, asked):
+    task = world(LIGHT, iterations=50)
     with cpu_blocks():
-        block = Rollout(TASK, n_threads=1, lanes=32)
+        block = Rollout(task, n_threads=1, lanes=32)
         refuse_other_bits(block, "cuda:0")
         assert asked == [20, 20]
-        other = world("rover/complex-3", n_robots=3)
+        other = world(LIGHT, n_robots=4)
         refuse_other_bits(Rollout(other, n_threads=1, lanes=32), "cuda:0")
         assert asked == [20, 20]
         refuse_other_bits(block, "cuda:1")
-        refuse_other_bits(Rollout(TASK, controller("gru", world=TASK), 1), "cuda:1")
+        refuse_other_bits(Rollout(task, controller("gru", world=task), 1), "cuda:1")
     assert asked == [20] * 6
 
 

@@ -6,9 +6,9 @@ import pytest
 from conevo.rng import fold
 from conevo.worlds.registry import world
 from conevo.worlds.rollout import Rollout
+from worlds.lanes import lanes_in
 from worlds.situations import NAN, random_team
 
-LANES = [32, 64, 96, 128, 256]
 FULL = {"iterations": 25, "arena_cm": 60.0}  # so that all bodies meet others
 
 
@@ -23,7 +23,7 @@ def recorded(a_world, lanes, heuristic):
     return rollout.record(genes, slots, scenarios, np.array(heuristic, np.int32))
 
 
-@pytest.mark.parametrize("lanes", LANES)
+@pytest.mark.parametrize("lanes", lanes_in(32, 128))
 def test_lanes_share_predators(lanes, cpu_blocks):
     a_world = world("pursuit/team-10", n_obstacles=6, capture_window=3, **FULL)
     heuristic = [-1, -1, 0, -1, -1, -1]

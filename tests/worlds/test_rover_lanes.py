@@ -7,6 +7,7 @@ from conevo.rng import fold
 from conevo.worlds.registry import world
 from conevo.worlds.rollout import Rollout
 from conevo.worlds.walk import Walk
+from worlds.lanes import lanes_in
 from worlds.test_rover import crowd, random_team
 
 ONE_ROCK = {"rocks_per_activation": 1, "fitness": "activation"}
@@ -33,7 +34,7 @@ def serial(epoch):
     return Rollout(a_world, n_threads=1).record(*played)
 
 
-@pytest.mark.parametrize("lanes", [32, 64, 96, 128, 256])
+@pytest.mark.parametrize("lanes", lanes_in(96, 256))
 def test_any_number_of_lanes_agrees_bit_for_bit(epoch, serial, cpu_blocks, lanes):
     a_world, played = epoch
     with cpu_blocks():

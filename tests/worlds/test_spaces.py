@@ -28,6 +28,7 @@ from conevo.worlds.stepper import Stepper
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 LIGHT = f"{EXAMPLES}/light.py:dark-1"
 WORLDS = ("rover/complex-5", "pursuit/team-3", "prey/shaping-6", "gacc/complex-9")
+PREY = WORLDS[2:3]  # a kernel with noise that no other test needs
 
 
 def begun(world: Any, n: int = 1) -> Stepper:
@@ -36,8 +37,14 @@ def begun(world: Any, n: int = 1) -> Stepper:
     return stepper
 
 
-@pytest.mark.parametrize("path", WORLDS)
-@pytest.mark.parametrize("noise", [0.0, 0.5])
+@pytest.mark.parametrize(
+    ("path", "noise"),
+    [
+        *((path, 0.0) for path in WORLDS),
+        *((path, 0.5) for path in WORLDS if path not in PREY),
+        *(pytest.param(path, 0.5, marks=pytest.mark.exhaustive) for path in PREY),
+    ],
+)
 def test_inputs_lie_within_their_bounds_and_reach_far(path: str, noise: float) -> None:
     others = {"action_noise": 1e-12, "failure": 1e-12} if noise else {}  # kernels of other tests
     world = conevo.world(path, iterations=120, sensor_noise=noise, **others)
