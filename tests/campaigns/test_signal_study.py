@@ -18,6 +18,8 @@ from conevo.report.files import sections_of
 from conevo.runs.run import Run
 from conevo.studies.signal import measure_signal
 
+pytest_plugins = ["report.quick_figures"]
+
 OWN = Path(__file__).resolve().parents[2] / "examples" / "own_method.py"
 
 
@@ -32,7 +34,7 @@ def campaign(tmp_path_factory: pytest.TempPathFactory) -> Campaign:
     return create(read_plan(plan), made.path)
 
 
-def test_only_a_study_added_to_a_plan_later_is_missing(campaign) -> None:
+def test_only_a_study_added_to_a_plan_later_is_missing(without_ink, campaign) -> None:
     before = {name: campaign.paths.run(name) / "DONE" for name in campaign.planned}
     sealed = {name: path.stat().st_mtime_ns for name, path in before.items()}
     assert not any(campaign.is_finished(label) for label in campaign.planned)

@@ -6,6 +6,7 @@ their files are the same two empty ones. ``test_report.py`` and ``test_figures.p
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any, BinaryIO
 
 import pytest
@@ -17,10 +18,21 @@ EMPTY = {
 
 
 @pytest.fixture
-def without_ink(monkeypatch: pytest.MonkeyPatch) -> None:
+def without_ink() -> Iterator[None]:
     """Save every figure as an empty one."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("matplotlib.figure.Figure.savefig", save_empty)
+        yield
 
-    def save(self: object, file: BinaryIO, **options: Any) -> None:
-        file.write(EMPTY[options["format"]])
 
-    monkeypatch.setattr("matplotlib.figure.Figure.savefig", save)
+@pytest.fixture(scope="module")
+def module_without_ink() -> Iterator[None]:
+    """Save every figure of a module's tests as an empty one."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("matplotlib.figure.Figure.savefig", save_empty)
+        yield
+
+
+def save_empty(self: object, file: BinaryIO, **options: Any) -> None:
+    """Write the file of an empty figure, in place of ``Figure.savefig``."""
+    file.write(EMPTY[options["format"]])

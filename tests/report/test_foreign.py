@@ -20,6 +20,7 @@ from conevo.report.sections.scope import scopes
 from report.benchmarl import FRAMES, describe, write
 from report.finished_runs import cells, write_campaign
 
+pytest_plugins = ["report.quick_figures"]
 pytestmark = pytest.mark.filterwarnings("error")
 MEANS = {1: [100.0, 500.0, 300.0], 2: [80.0, 200.0, 400.0]}
 
@@ -32,13 +33,13 @@ def campaign(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def own(campaign: Path) -> Path:
+def own(module_without_ink: None, campaign: Path) -> Path:
     """The report without results of others."""
     return write_report(Campaign(campaign), campaign.parent / "own").parent
 
 
 @pytest.fixture(scope="module")
-def with_mappo(campaign: Path) -> Path:
+def with_mappo(module_without_ink: None, campaign: Path) -> Path:
     """The report with described results of MAPPO in the same task."""
     paths = write(campaign.parent / "theirs", MEANS)
     describe(paths)

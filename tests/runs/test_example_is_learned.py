@@ -15,6 +15,7 @@ LESS = {"hyperneat": 0.65}  # 0.72 (0.77 as clones): these sensors and outputs h
 FURTHER = {"novelty": {"method.weight": 0.5}}  # without any fitness it comes there only by chance
 BUDGET = 20_000  # of the preset's 50,000 team evaluations
 SLOWER = {"hom-es", "sane"}  # they reach 0.79 and 0.84 with it, so they get all 50,000
+FASTER = {"homcne", "cosyne", "neat", "openai-es", "cma-es"}  # half suffices with seeds 1 to 5
 
 
 def learned(method: str, seed: int, folder: Path, **others: object) -> float:
@@ -29,7 +30,8 @@ def learned(method: str, seed: int, folder: Path, **others: object) -> float:
 @pytest.mark.parametrize("method", METHODS)
 def test_every_method_learns_the_example(method: str, tmp_path: Path) -> None:
     """Two fifths of the budget suffice: most reach 0.89 or more with it, HyperNEAT 0.72."""
-    budget = {} if method in SLOWER else {"run.budget_evaluations": BUDGET}
+    evaluations = BUDGET // 2 if method in FASTER else BUDGET
+    budget = {} if method in SLOWER else {"run.budget_evaluations": evaluations}
     assert learned(method, 1, tmp_path / "run", **budget) >= LESS.get(method, ENOUGH)
 
 

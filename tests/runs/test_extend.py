@@ -51,9 +51,9 @@ def run(short: Path, tmp_path: Path) -> conevo.Run:
 def test_a_continued_run_equals_one_planned_with_that_length(
     method: str, task: str, tmp_path: Path
 ) -> None:
-    planned = evolve_tiny(tmp_path / "planned", method, task, run__generations=18)
-    run = evolve_tiny(tmp_path / "run", method, task, run__generations=15)
-    run = conevo.Run(run.path).resume(generations=18, threads=2)
+    planned = evolve_tiny(tmp_path / "planned", method, task, run__generations=8)
+    run = evolve_tiny(tmp_path / "run", method, task, run__generations=6)
+    run = conevo.Run(run.path).resume(generations=8, threads=2)
     assert run.status == "finished"
     assert not run.changed_files
     assert content(run.path) == content(planned.path)

@@ -39,9 +39,9 @@ ALL_PAIRS = [
 
 @pytest.mark.parametrize(("method", "task"), ALL_PAIRS)
 def test_resume_after_kills_at_random_moments(method: str, task: str, tmp_path: Path) -> None:
-    whole = evolve_tiny(tmp_path / "whole", method, task, run__generations=40)
+    whole = evolve_tiny(tmp_path / "whole", method, task, run__generations=25)
     path = tmp_path / "killed"
-    kills = kill_twice(path, command(path, method, task, run__generations=40))
+    kills = kill_twice(path, command(path, method, task, run__generations=25))
     conevo.Run(path).resume(threads=2)
     assert content(path) == content(whole.path), kills
 

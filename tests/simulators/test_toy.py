@@ -127,7 +127,7 @@ def test_the_budget_is_in_team_evaluations_and_early_ends_save_none(tmp_path: Pa
     """A team that has reached the middle costs fewer team-steps, but as many evaluations."""
     small, large = (
         evolved(tmp_path / str(n), 50, **{"run.budget_evaluations": 400, "world.iterations": n})
-        for n in (30, 300)
+        for n in (15, 150)
     )
     for run in (small, large):
         assert run.provenance["stopped_by"] == "budget"
