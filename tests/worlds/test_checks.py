@@ -223,7 +223,10 @@ def faulty(path: Path, name: str) -> Path:
 
 
 @pytest.mark.parametrize("name", ["", *PLAYED])
-def test_a_mistake_in_a_phase_is_one_line(name: str, tmp_path: Path) -> None:
+def test_a_mistake_in_a_phase_is_one_line(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("conevo.worlds.checks.ITERATIONS", 15)  # of an epoch step by step
     found = problems(faulty(tmp_path / "bad.py", name))
     if not name:
         assert found == []
@@ -356,7 +359,7 @@ def test_a_check_without_progress_is_ended(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(checking, "STEP_SECONDS", 0.3)
-    monkeypatch.setattr(checking, "AGAIN_SECONDS", 2)
+    monkeypatch.setattr(checking, "AGAIN_SECONDS", 1)
     endless = "k = int(0)\n    while True:\n        k = 1 - k\n    a = team.chosen[i]"
     file = written(tmp_path / "light.py", ("a = team.chosen[i]", endless))
     code, out = run(capsys, str(file), "--json")
@@ -431,8 +434,7 @@ def test_no_run_and_no_campaign_starts_with_an_index_outside_its_array(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    words = OUTSIDE["counts"][1]
-    file = written(tmp_path / "bad.py", ("i, a, a)", "i, a, a + 1)"))
+    file, at = wild(tmp_path, "counts")
     (tmp_path / "plan.toml").write_text(
         '[campaign]\nname = "bad"\npreset = "smoke"\nseeds = 1\n\n'
         '[factors]\nworld = ["bad.py:dark-1"]\nmethod = ["homcne"]\n'
@@ -445,10 +447,11 @@ def test_no_run_and_no_campaign_starts_with_an_index_outside_its_array(
         out, err = capsys.readouterr()
         assert (caught.value.code, out) == (2, "")
         assert err == (
-            f"conevo: error: {file}:{line_with('count_action(team')}: in `{words}` an index lies "
-            f"outside its array; see also: conevo check {file}:dark-1\n"
+            f"conevo: error: {file}:{at}: in `{OUTSIDE['counts'][3]}` an index lies outside its "
+            f"array; see also: conevo check {file}:dark-1\n"
         )
-        assert sorted(one.name for one in tmp_path.iterdir()) == ["bad.py", "plan.toml"]
+        files = {one.name for one in tmp_path.iterdir()} - {"__pycache__"}
+        assert files == {"bad.py", "neighbour.py", "plan.toml"}
 
 
 def test_a_sound_world_is_checked_once_for_its_text_and_parameters(

@@ -113,7 +113,11 @@ def test_kernel_equals_the_oracle(environment, seed):
     ("environment", "options"),
     [
         ("complex-5", {"rocks_per_activation": 1}),
-        ("simple-3", {"rocks_per_activation": 1, "fitness": "value"}),
+        pytest.param(  # a kernel that no other test needs
+            *("simple-3", {"rocks_per_activation": 1, "fitness": "value"}),
+            marks=pytest.mark.exhaustive,
+        ),
+        ("simple-3", {"fitness": "value"}),
         ("complex-5", {"fitness": "activation"}),
         ("complex-5", {"range_is": "area", "fitness": "value"}),
         ("complex-5", {"sensor_noise": 0.2, "action_noise": 0.1, "failure": 0.005}),
