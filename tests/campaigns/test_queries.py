@@ -18,6 +18,13 @@ def tables_of(folder: Path, of: list[Cell], **further: object) -> Tables:
     return Tables(write_campaign(folder / "campaign", of, **further) / "tables")  # type: ignore[arg-type]
 
 
+@pytest.fixture(scope="module")
+def of_one_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the folder of the tables of one run."""
+    folder = tmp_path_factory.mktemp("one-run") / "campaign"
+    return write_campaign(folder, cells(["rover/complex-1"], ["cone"]), seeds=1) / "tables"
+
+
 def edit(folder: Path, sql: str, table: str = "runs") -> None:
     """Replace a table by the result of a query over it (as ``old``)."""
     file = folder / "campaign" / "tables" / f"{table}.parquet"
@@ -181,10 +188,12 @@ def test_a_folder_without_runs_and_a_foreign_file_are_refused(tmp_path) -> None:
         ("FROM runs; DESCRIBE runs; SHOW TABLES", "3 SQL statements, must be one"),
     ],
 )
-def test_anything_but_a_query_is_refused_in_one_line(tmp_path, monkeypatch, sql, message) -> None:
+def test_anything_but_a_query_is_refused_in_one_line(
+    of_one_run, tmp_path, monkeypatch, sql, message
+) -> None:
     monkeypatch.chdir(tmp_path)
     with (
-        tables_of(tmp_path, cells(["rover/complex-1"], ["cone"]), seeds=1) as tables,
+        Tables(of_one_run) as tables,
         pytest.raises(UsageError, match=message) as refused,
     ):
         tables.ask(sql)
@@ -206,8 +215,8 @@ def test_anything_but_a_query_is_refused_in_one_line(tmp_path, monkeypatch, sql,
         "SELECT 1;  -- and a comment",
     ],
 )
-def test_all_read_only_statements_are_queries(tmp_path, sql) -> None:
-    with tables_of(tmp_path, cells(["rover/complex-1"], ["cone"]), seeds=1) as tables:
+def test_all_read_only_statements_are_queries(of_one_run, sql) -> None:
+    with Tables(of_one_run) as tables:
         columns, rows = tables.ask(sql)
     assert {len(row) for row in rows} == {len(columns)}
 
@@ -219,10 +228,12 @@ def test_all_read_only_statements_are_queries(tmp_path, sql) -> None:
         ("SET enable_external_access = true", "locked"),
     ],
 )
-def test_a_refused_statement_reaches_no_file(tmp_path, monkeypatch, sql, message) -> None:
+def test_a_refused_statement_reaches_no_file(
+    of_one_run, tmp_path, monkeypatch, sql, message
+) -> None:
     monkeypatch.chdir(tmp_path)
     with (
-        tables_of(tmp_path, cells(["rover/complex-1"], ["cone"]), seeds=1) as tables,
+        Tables(of_one_run) as tables,
         pytest.raises(UsageError, match=message) as refused,
     ):
         tables.query(sql)

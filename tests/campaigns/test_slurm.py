@@ -48,7 +48,7 @@ def test_the_tasks_carry_out_all_runs_and_the_campaign_finds_them(tmp_path, task
     before = {path: path.stat().st_mtime_ns for path in campaign.path.glob("ended/*")}
     assert task(script, 0).wait(60) == 0  # as after a requeue: finished runs are left alone
     assert {path: path.stat().st_mtime_ns for path in before} == before
-    standings = campaign.carry_on(make_executor("processes", 1))
+    standings = campaign.carry_on(make_executor("serial", 1))
     assert {one.state for one in standings.values()} == {"finished"}
     assert [len(conevo.Run(campaign.paths.run(n)).provenance["sessions"]) for n in standings] == [
         1, 1, 1, 1,

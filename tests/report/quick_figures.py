@@ -1,7 +1,8 @@
 """Reports without ink: for tests of a report's words, numbers and files.
 
-Drawing takes most of a report's time. Figures are made and laid out in Matplotlib's objects, but
-their files are the same two empty ones. ``test_report.py`` and ``test_figures.py`` draw.
+Drawing takes most of a report's time. Figures are made in Matplotlib's objects, but their files
+are the same two empty ones. ``test_report.py`` and ``test_figures.py`` draw: each kind of figure in
+both formats, the others as SVG.
 """
 
 from __future__ import annotations
@@ -30,6 +31,21 @@ def module_without_ink() -> Iterator[None]:
     """Save every figure of a module's tests as an empty one."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("matplotlib.figure.Figure.savefig", save_empty)
+        yield
+
+
+@pytest.fixture(scope="module")
+def as_svg_only() -> Iterator[None]:
+    """Save every figure of a module's tests as an SVG and an empty PDF."""
+    from matplotlib.figure import Figure
+
+    real = Figure.savefig
+
+    def save(self: Figure, file: BinaryIO, **options: Any) -> None:
+        (save_empty if options["format"] == "pdf" else real)(self, file, **options)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Figure, "savefig", save)
         yield
 
 

@@ -23,6 +23,7 @@ from conevo.report.figures.style import DASHES, HATCHES, MARKERS, Drawing, hatch
 from conevo.report.learning_curves import Course
 from conevo.worlds.registry import colours_of
 
+pytest_plugins = ["report.quick_figures"]
 pytestmark = pytest.mark.filterwarnings("error")
 
 X = np.array([10.0, 20.0, 30.0])
@@ -177,7 +178,7 @@ ONE, TEN = ["dark-1"], [f"complex-{k}" for k in range(1, 11)]
         pytest.param(OWN, 8, ONE, id="eight panels"),
     ],
 )
-def test_any_number_of_methods_and_panels_fits(methods, panels, places, drawn) -> None:
+def test_any_number_of_methods_and_panels_fits(methods, panels, places, drawn, as_svg_only) -> None:
     titles = [f"gst = {k}, {LONG}" if panels > 1 else "" for k in range(panels)]
     names = {m: method_title(m) for m in methods}
     bar = figures.Bar(0.3, 0.1)
@@ -207,7 +208,7 @@ def test_any_number_of_methods_and_panels_fits(methods, panels, places, drawn) -
         pytest.param(OWN, 13, id="long names"),
     ],
 )
-def test_any_number_of_curves_fits(methods, panels) -> None:
+def test_any_number_of_curves_fits(methods, panels, as_svg_only) -> None:
     names = {Line(method): method_title(method) for method in methods}
     course = {line: band(1 + k / 9) for k, line in enumerate(names)}
     titles = [f"complex-{k}, {LONG}" for k in range(panels)]
@@ -224,7 +225,7 @@ def test_any_number_of_curves_fits(methods, panels) -> None:
     )
 
 
-def test_long_names_of_pairs_and_bars_fit() -> None:
+def test_long_names_of_pairs_and_bars_fit(as_svg_only) -> None:
     pairs = [f"CONE, {LONG} {k} − Multi-Agent ESP, {LONG}" for k in range(10)]
     cells = {(pair, place): tiles.Shade(0.5, "+ 1.000") for pair in pairs for place in "123"}
     legend = [(0.0, "neither test below 0.05"), (0.5, "Mann-Whitney only (Holm)")]
@@ -241,7 +242,7 @@ def method_title(name: str) -> str:
     return f"{name} (n = 3 to 20)"
 
 
-def test_bars_go_down_for_negative_means(drawn) -> None:
+def test_bars_go_down_for_negative_means(drawn, as_svg_only) -> None:
     cells = {"cone": [figures.Bar(-0.5, 0.1)], "homcne": [figures.Bar(-0.2, 0.1)]}
     figures.bars({"": cells}, ["dark-1"], NAMES, x_label="x", y_label="y")
     (axes,) = drawn[0].axes
@@ -251,7 +252,7 @@ def test_bars_go_down_for_negative_means(drawn) -> None:
     assert sorted(bar.get_height() for bar in axes.patches) == [-0.5, -0.2]
 
 
-def test_nothing_is_drawn_beyond_the_range_of_a_measure(drawn) -> None:
+def test_nothing_is_drawn_beyond_the_range_of_a_measure(drawn, as_svg_only) -> None:
     cells = {"cone": [figures.Bar(0.9, 0.5)]}
     within = (0.0, 1.0)
     figures.bars({"": cells}, ["1"], {"cone": "CONE"}, x_label="x", y_label="y", within=within)
@@ -271,7 +272,7 @@ def test_nothing_is_drawn_beyond_the_range_of_a_measure(drawn) -> None:
     assert heights.max() <= 1 / 1.04 + 1e-9
 
 
-def test_a_method_looks_the_same_next_to_any_others(drawn) -> None:
+def test_a_method_looks_the_same_next_to_any_others(drawn, as_svg_only) -> None:
     panel = {"cone": [figures.Bar(1.0, None)]}
     figures.bars({"": panel}, ["1"], {"cone": "CONE"}, x_label="x", y_label="y")
     bars()

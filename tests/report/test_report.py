@@ -40,7 +40,7 @@ def campaign(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def report(campaign: Path) -> Path:
+def report(as_svg_only: None, campaign: Path) -> Path:
     return write_report(Campaign(campaign), campaign / "report").parent
 
 
@@ -332,7 +332,7 @@ def test_budgets_are_separate(without_ink, tmp_path) -> None:
     ],
     ids=["one run", "variants", "cells missing, a method of one's own"],
 )
-def test_odd_campaigns_have_a_report_too(of, tmp_path) -> None:
+def test_odd_campaigns_have_a_report_too(of, as_svg_only, tmp_path) -> None:
     root = write_campaign(tmp_path / "c", of, 1, 2, without=["behaviours", "robots", "castes"])
     text = write_report(Campaign(root), tmp_path / "out").read_text()
     assert text.count("One run per cell: no deviation, no interval, and nothing") == 1
