@@ -17,6 +17,9 @@ from conevo.report.sections.performance import performance
 from conevo.report.sections.scope import scopes
 from report.claims.known_truth import Cell, write_tables
 
+pytest_plugins = ["report.quick_figures"]
+pytestmark = pytest.mark.usefixtures("without_ink")
+
 TRUTH = {("complex-1", "mesp"): Cell(100.0), ("complex-1", "cone"): Cell(200.0)}
 
 

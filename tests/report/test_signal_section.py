@@ -16,6 +16,7 @@ from conevo.report.sections.signal import blind_cells, signal
 from report.finished_runs import Cell, write_campaign
 
 pytest_plugins = ["report.quick_figures"]
+pytestmark = pytest.mark.usefixtures("without_ink")
 
 OF = [
     Cell("rover", "complex-1", "homcne", reliability=0.6),
@@ -91,7 +92,7 @@ def test_the_section_is_absent_without_a_study(tmp_path) -> None:
         assert blind_cells(scope) == set()
 
 
-def test_a_report_has_the_table_in_all_its_forms(without_ink, folder, tmp_path) -> None:
+def test_a_report_has_the_table_in_all_its_forms(folder, tmp_path) -> None:
     report = write_report(Campaign(folder), tmp_path / "report").parent
     assert "not tested: no signal" in (report / "index.html").read_text()
     assert (report / "tables" / "rover-complex-signal.tex").is_file()

@@ -15,7 +15,7 @@ from conevo.errors import UsageError
 from conevo.runs.config import resolve
 from conevo.runs.shaping import start_shaping
 from conevo.runs.start import start
-from runs.crashes import Crash, fail_at
+from runs.crashes import Crash, crashes_and_refusals, fail_at
 from runs.tiny import (
     PAIRS,
     TASK,
@@ -140,31 +140,32 @@ def test_a_changed_run_is_refused_before_it_is_unsealed(run: conevo.Run) -> None
     assert not (run.path / "extension.json").exists()
 
 
+@pytest.mark.parametrize("at_each", [False, pytest.param(True, marks=pytest.mark.exhaustive)])
 @pytest.mark.parametrize("is_finished", [True, False])
-def test_a_crash_at_every_write_of_an_extension_leaves_the_old_run_or_the_new_one(
-    is_finished: bool, run: conevo.Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_a_crash_in_an_extension_leaves_the_old_run_or_the_new_one(
+    is_finished: bool,
+    at_each: bool,
+    run: conevo.Run,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    """At each kind of write, or at each write."""
     if not is_finished:
         (run.path / "DONE").unlink()
     old = content(run.path)
-    new = content(
-        conevo.Run(shutil.copytree(run.path, tmp_path / "new"))
-        .resume(generations=6, threads=1)
-        .path
-    )
-    calls, call = 1, 0
+    path = shutil.copytree(run.path, tmp_path / "new")
+    with monkeypatch.context() as patch:
+        calls = fail_at(patch, -1, Crash())
+        new = content(conevo.Run(path).resume(generations=6, threads=1).path)
+    crashes = range(len(calls)) if at_each else [0, *crashes_and_refusals(calls)[0]]
+    assert len(crashes) > 10
     endings = set()
-    while call < calls:
-        path = tmp_path / "broken"
-        shutil.copytree(run.path, path)
+    for call in crashes:
+        path = shutil.copytree(run.path, tmp_path / "broken")
         with monkeypatch.context() as patch:
-            made = fail_at(patch, call, Crash())
-            try:
+            fail_at(patch, call, Crash())
+            with pytest.raises(Crash):
                 conevo.Run(path).resume(generations=6, threads=1)
-            except Crash:
-                calls = call + 2
-            else:
-                assert len(made) == call
         broken = conevo.Run(path)
         if broken.status != "finished":
             broken.resume(threads=1)
@@ -176,9 +177,7 @@ def test_a_crash_at_every_write_of_an_extension_leaves_the_old_run_or_the_new_on
         assert not conevo.Run(path).changed_files
         assert not (path / "extension.json").exists()
         shutil.rmtree(path)
-        call += 1
     assert endings == {True, False}
-    assert call > 15
 
 
 def test_kill_9_during_an_extension(run: conevo.Run, tmp_path: Path) -> None:
