@@ -40,27 +40,41 @@ SETTINGS = {
     ),
 }
 # Controllers whose functions are compiled for two worlds only in CI, since no world changes them:
-# the example, and the one for which the tests of exported files compile most of them, too.
+# the example, and the one for which the tests of exported files compile most of them, too. In the
+# form with lanes they are compiled for the example only.
 IN_TWO = ("ctrnn", "gru", "graph", "thresholds", "rules")
-TWO = ("pursuit/team-3", f"{LIGHT}:dark-1")
-CASES = [
-    pytest.param(
-        (path, name, settings),
-        id=f"{Path(path).name}-{name}-{k}",
-        marks=[pytest.mark.exhaustive] if name in IN_TWO and path not in TWO else [],
-    )
-    for path in WORLDS
-    for name in CONTROLLERS
-    for k, settings in enumerate(({}, *SETTINGS.get(name, ())))
-]
+TWO = (f"{LIGHT}:dark-1", "pursuit/team-3")
 
 
-@pytest.fixture(params=CASES, scope="module")
-def case(request):
+def cases(worlds):
+    """Return all pairs of a world and a controller; in CI those of ``IN_TWO`` in these worlds."""
+    return [
+        pytest.param(
+            (path, name, settings),
+            id=f"{Path(path).name}-{name}-{k}",
+            marks=[pytest.mark.exhaustive] if name in IN_TWO and path not in worlds else [],
+        )
+        for path in WORLDS
+        for name in CONTROLLERS
+        for k, settings in enumerate(({}, *SETTINGS.get(name, ())))
+    ]
+
+
+def made(request):
     """Return a world and a controller of its robots."""
     path, name, settings = request.param
     a_world = world(path, iterations=ITERATIONS)
     return a_world, controller(name, world=a_world, **settings)
+
+
+@pytest.fixture(params=cases(TWO), scope="module")
+def case(request):
+    return made(request)
+
+
+@pytest.fixture(params=cases(TWO[:1]))
+def case_in_lanes(request):
+    return made(request)
 
 
 @pytest.fixture
@@ -150,11 +164,16 @@ def test_scenarios_share_a_teams_weights_but_not_memory(case, rollout):
         assert both.counts[:, j].tobytes() == one.counts[:, 0].tobytes()
 
 
-def test_batches_threads_and_lanes_do_not_change_a_bit(case, rollout, cpu_blocks):
+def batch_of(rollout):
+    """Return a pool, teams, one of them with heuristic robots, and scenarios."""
     pool, teams = teams_of(rollout, 7)
     heuristic = np.full(teams.shape[:2], -1, np.int32)
     heuristic[2, ::2] = 0
-    scenarios = rollout.world.scenarios(keys(2))
+    return pool, teams, heuristic, rollout.world.scenarios(keys(2))
+
+
+def test_batches_and_threads_do_not_change_a_bit(case, rollout):
+    pool, teams, heuristic, scenarios = batch_of(rollout)
     whole = rollout.evaluate(pool, teams, scenarios, heuristic)
     assert n_different(whole) > 4
     for other in (
@@ -163,10 +182,16 @@ def test_batches_threads_and_lanes_do_not_change_a_bit(case, rollout, cpu_blocks
         batched(Rollout(*case, n_threads=2), 1),
     ):
         assert_same_bits(whole, other.evaluate(pool, teams, scenarios, heuristic))
+
+
+def test_lanes_do_not_change_a_bit(case_in_lanes, cpu_blocks):
+    one = Rollout(*case_in_lanes, n_threads=1)
+    pool, teams, heuristic, scenarios = batch_of(one)
+    whole = one.evaluate(pool, teams, scenarios, heuristic)
     with cpu_blocks():
-        block = Rollout(*case, n_threads=1, lanes=8)
+        block = Rollout(*case_in_lanes, n_threads=1, lanes=8)
         assert_same_bits(whole, block.evaluate(pool, teams, scenarios, heuristic))
-        assert_same_records(*(x.record(pool, teams[0], scenarios_of(x)) for x in (rollout, block)))
+        assert_same_records(*(x.record(pool, teams[0], scenarios_of(x)) for x in (one, block)))
 
 
 def n_different(outcome):
