@@ -160,21 +160,32 @@ def assert_finished(campaign, undisturbed):
 
 
 @every_executor
-def test_every_run_is_carried_out_once(name, executor_of, campaign, undisturbed):
-    made = campaign(QUICK, seeds=2)
-    endings = []
-    standings = made.carry_on(
-        executor_of(name, 2), watch=lambda _, one: endings.append(one) if one else None
-    )
+def test_every_run_is_carried_out_once_and_never_more_threads_run_than_there_are_cores(
+    name, executor_of, campaign, undisturbed
+):
+    made = campaign(LONG | {"run.generations": 4}, seeds=3)
+    endings, seen = [], []
+
+    def watch(campaign, ending):
+        endings.extend([ending] if ending else [])
+        seen.append(sum(int(words[-1]) for words in workers(campaign.path).values()))
+
+    executor = executor_of(name, 2)
+    assert executor.cores == 2
+    standings = made.carry_on(executor, threads=2 if name == "serial" else 1, watch=watch)
     assert sorted(one.label for one in endings) == sorted(made.planned)
     assert {(one.state, one.attempts) for one in standings.values()} == {("finished", 1)}
     assert_finished(made, undisturbed)
+    assert workers(made.path) == {}
+    assert max(seen) == (0 if name == "serial" else 2)
+    sessions = [run_of(made, label).provenance["sessions"] for label in made.planned]
+    used = [session["threads"] for (session,) in sessions]
+    assert used == ([2, 2, 2] if name == "serial" else [1, 1, used[2]])
+    assert used[2] in (1, 2)  # the last one has both cores if both are free by then
     for label in made.planned:
-        assert len(run_of(made, label).provenance["sessions"]) == 1
         ended = read_json(made.paths.ended(label))
         assert ended["status"] == "finished"
         assert 0 < ended["core_seconds"] < 60
-    assert workers(made.path) == {}
 
 
 @every_executor
@@ -321,24 +332,6 @@ def test_after_ctrl_c_all_write_their_checkpoints_and_end(name, campaign):
     until(lambda: n_generations(made, label) > done)
     executor.stop()
     assert run.provenance["sessions"][1]["from_generation"] in (done - 1, done)  # records go first
-
-
-@every_executor
-def test_there_are_never_more_running_threads_than_cores(name, executor_of, campaign):
-    made = campaign(LONG | {"run.generations": 4}, seeds=3)
-    seen = []
-
-    def count(campaign, _):
-        threads = [int(words[-1]) for words in workers(campaign.path).values()]
-        seen.append(sum(threads))
-
-    executor = executor_of(name, 2)
-    assert executor.cores == 2
-    made.carry_on(executor, threads=2 if name == "serial" else 1, watch=count)
-    assert max(seen) == (0 if name == "serial" else 2)
-    used = [run_of(made, label).provenance["sessions"][0]["threads"] for label in made.planned]
-    assert used == ([2, 2, 2] if name == "serial" else [1, 1, used[2]])
-    assert used[2] in (1, 2)  # the last one has both cores if both are free by then
 
 
 @every_with_workers
