@@ -83,14 +83,18 @@ def cpu_blocks():
     Only tests do so. Their kernels are not optimised, which compiles in a third of the time.
     """
     import warp as wp
+    from warp._src.context import user_modules
 
     @contextmanager
     def switched_on():
         before = wp.config.enable_cpu_blocks, wp.config.optimization_level
+        known = {name for name, module in user_modules.items() if module.hashers}
         wp.config.enable_cpu_blocks, wp.config.optimization_level = True, 0
         try:
             yield
         finally:
             wp.config.enable_cpu_blocks, wp.config.optimization_level = before
+            for name in user_modules.keys() - known:  # else later tests get these options, too
+                user_modules[name].mark_modified()
 
     return switched_on

@@ -96,6 +96,7 @@ MISTAKES = {
 }  # fmt: skip
 
 
+@pytest.mark.filterwarnings("ignore:invalid value:RuntimeWarning")  # of the mistake itself
 @pytest.mark.parametrize("name", MISTAKES)
 def test_each_mistake_is_found(name: str, tmp_path: Path) -> None:
     old, new, words = MISTAKES[name]
