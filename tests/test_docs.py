@@ -269,7 +269,7 @@ def test_following_the_recipes_adds_worlds_a_method_and_a_controller(tmp_path):
         ("tests/contracts", "light-v1 or spread-v1 or random or complex-5 and linear", 32),
         ("tests/runs/test_resume.py", "kills and (light and homcne or random-search and rover)", 2),
     ):
-        marks = ("-m", "exhaustive or not exhaustive")  # CI kills each method in one task only
+        marks = ("-m", "exhaustive or slow or not slow")  # CI kills each method in one task only
         output = run("pytest", "-q", "-p", "no:cacheprovider", folder, "-k", words, *marks)
         found = re.search(r"(\d+) passed", output)
         assert found, output

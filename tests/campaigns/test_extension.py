@@ -124,6 +124,7 @@ def test_a_new_plan_is_written_whole_or_not_at_all(
     assert call >= 6
 
 
+@pytest.mark.slow
 def test_a_worker_that_is_killed_while_it_extends_a_run_continues(
     campaign: Campaign, whole: Campaign, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -180,6 +180,7 @@ def test_a_crash_in_an_extension_leaves_the_old_run_or_the_new_one(
     assert endings == {True, False}
 
 
+@pytest.mark.slow
 def test_kill_9_during_an_extension(run: conevo.Run, tmp_path: Path) -> None:
     planned = evolve_tiny(tmp_path / "planned", run__generations=60)
     process = spawn("resume", str(run.path), "--generations", "60", "--quiet")

@@ -137,6 +137,7 @@ def test_a_method_that_cannot_start_from_a_team_may_come_first_only(tmp_path: Pa
         resolve_stages([TASK], name, "smoke", 1, SHORT, TINY)
 
 
+@pytest.mark.slow
 def test_kills_between_and_within_the_stages_change_nothing(tmp_path: Path) -> None:
     path = tmp_path / "killed"
     settings = {k: v for k, v in SHORT.items() if k not in ("first", "method.genotypes")}

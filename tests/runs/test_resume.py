@@ -37,6 +37,7 @@ ALL_PAIRS = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("method", "task"), ALL_PAIRS)
 def test_resume_after_kills_at_random_moments(method: str, task: str, tmp_path: Path) -> None:
     whole = evolve_tiny(tmp_path / "whole", method, task, run__generations=25)

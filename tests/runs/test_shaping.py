@@ -226,6 +226,7 @@ def command(path: Path, settings: dict[str, Any]) -> list[str]:
     return ["--preset", "smoke", "--out", str(path), *sets]
 
 
+@pytest.mark.slow
 def test_kills_between_and_within_the_stages_change_nothing(
     whole: dict[str, Any], tmp_path: Path
 ) -> None:
@@ -257,6 +258,7 @@ def test_kills_between_and_within_the_stages_change_nothing(
     assert list(path.glob(".*")) == []
 
 
+@pytest.mark.slow
 def test_kills_during_stages_of_construction_change_nothing(tmp_path: Path) -> None:
     """The environments differ in objects, obstacles and complex objects, not in teams."""
     tasks, path = tasks_up_to("gacc/complex-4"), tmp_path / "killed"

@@ -105,6 +105,7 @@ def test_its_kernels_are_also_identified_by_their_text(tmp_path: Path) -> None:
     assert hashes[0] == hashes[2] != hashes[1]
 
 
+@pytest.mark.slow
 def test_a_world_outside_evolves_and_resumes_after_kills_bit_for_bit(
     light: Path, tmp_path: Path
 ) -> None:
