@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from conevo.cli.main import cli, main
 from conevo.errors import in_a_line
 
 
@@ -13,3 +14,19 @@ def test_an_error_without_words_has_the_statement_that_raised_it() -> None:
     assert in_a_line(raised.value) == "ZeroDivisionError: raise ZeroDivisionError"
     assert in_a_line(ZeroDivisionError()) == "ZeroDivisionError"
     assert in_a_line(ZeroDivisionError("two\nlines")) == "ZeroDivisionError: two lines"
+
+
+def test_an_error_raised_while_an_interrupt_is_handled_is_the_interrupt(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def invoke(_: object) -> None:
+        try:
+            raise KeyboardInterrupt
+        finally:
+            raise ValueError("cannot close")
+
+    monkeypatch.setattr(cli, "invoke", invoke)
+    with pytest.raises(SystemExit) as ended:
+        main(["list", "worlds"])
+    assert ended.value.code == 130
+    assert capsys.readouterr().err == "conevo: error: interrupted\n"

@@ -19,6 +19,7 @@ from conevo.outside import files_of
 from conevo.reading import (
     DamagedFile,
     check,
+    packed,
     read_arrays,
     read_bytes,
     read_json,
@@ -357,3 +358,24 @@ def test_long_dotted_keys_are_refused_before_they_take_memory(tmp_path: Path) ->
             read_toml(path)
     path.write_text(f'a.b.c = 1\nlong = "{"word" * 200_000}"\npath = "{"a/b.c/" * 1000}"\n')
     assert read_toml(path)["a"] == {"b": {"c": 1}}
+
+
+@pytest.mark.parametrize("is_compressed", [False, True])
+def test_an_interrupt_while_arrays_are_packed_stays_one(
+    is_compressed: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Closing an archive while a member is being written is an error of zipfile."""
+
+    def interrupted(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("numpy.lib.format.write_array", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        packed("{}", {"one": np.zeros(3)}, is_compressed=is_compressed)
+
+
+def test_packed_arrays_are_read_again(tmp_path: Path) -> None:
+    (tmp_path / "one.npz").write_bytes(packed("text", {"one": np.arange(3.0)}))
+    found = read_arrays(tmp_path / "one.npz")
+    assert found["about"].tobytes() == b"text"
+    assert found["one"].tolist() == [0, 1, 2]

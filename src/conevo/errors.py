@@ -14,6 +14,7 @@ __all__ = [
     "UnknownName",
     "UsageError",
     "in_a_line",
+    "is_interrupt",
     "placed",
     "shown",
     "unknown_name",
@@ -41,6 +42,15 @@ class EnvironmentFailure(ConevoError):
     """The environment failed: disk full, no permission, no such device (exit code 3)."""
 
     exit_code = 3
+
+
+def is_interrupt(error: BaseException) -> bool:
+    """Return whether an error was raised while Ctrl-C was handled, as some libraries do."""
+    while error.__context__ is not None:
+        error = error.__context__
+        if isinstance(error, KeyboardInterrupt):
+            return True
+    return False
 
 
 def shown(value: object, most: int = 60) -> str:

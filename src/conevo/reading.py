@@ -21,7 +21,7 @@ import re
 import stat
 import tomllib
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import is_dataclass
 from functools import cache
@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 __all__ = [
     "DamagedFile",
     "check",
+    "packed",
     "parse_json",
     "parse_toml",
     "read_arrays",
@@ -433,6 +434,30 @@ def read_arrays(
     except Exception as error:  # a damaged file may make its readers raise anything
         reason = _one_line(error) or type(error).__name__
         raise DamagedFile(f"{path} is damaged or not {kind} ({reason})") from error
+
+
+def packed(about: str, arrays: Mapping[str, Any], *, is_compressed: bool = False) -> bytes:
+    """Return the content of an npz file; equal arguments give equal bytes.
+
+    Ctrl-C stays Ctrl-C: an archive that it leaves half-written raises an error of its own.
+
+    Args:
+        about: a text, kept as the array "about" of bytes.
+        arrays: the other arrays.
+        is_compressed: whether they are compressed.
+    """
+    import numpy as np
+
+    buffer = io.BytesIO()
+    first = np.frombuffer(about.encode(), dtype=np.uint8)
+    pack = np.savez_compressed if is_compressed else np.savez
+    try:
+        pack(buffer, allow_pickle=False, about=first, **arrays)
+    except ValueError as error:
+        if isinstance(error.__context__, KeyboardInterrupt):
+            raise error.__context__ from None
+        raise
+    return buffer.getvalue()
 
 
 def _refuse_members(members: list[zipfile.ZipInfo], limit: int) -> None:

@@ -19,7 +19,7 @@ from typing import Any, NoReturn
 
 import click
 
-from conevo.errors import ConevoError, UsageError, unknown_name
+from conevo.errors import ConevoError, UsageError, is_interrupt, unknown_name
 
 __all__ = ["cli", "main"]
 
@@ -222,6 +222,8 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
             fail(f"standard output: {error.strerror}", 3)
         fail(f"{error.filename}: {error.strerror}" if error.filename else str(error), 3)
     except (Exception, SystemExit) as error:
+        if is_interrupt(error):
+            fail("interrupted", 130)
         outside = sys.modules.get("conevo.outside")
         line = outside.line_of(error) if outside else ""
         if not line:

@@ -26,7 +26,6 @@ the world's own        every array of its ``Simulation.recorded`` [T, ...] and `
 
 from __future__ import annotations
 
-import io
 import json
 import math
 from collections.abc import Mapping
@@ -39,7 +38,7 @@ import numpy as np
 from conevo.errors import UsageError
 from conevo.playback.about import About
 from conevo.playback.quantized import Channel
-from conevo.reading import check, parse_json, read_arrays
+from conevo.reading import check, packed, parse_json, read_arrays
 from conevo.runs.durable import write_new
 from conevo.terms import NON_SPECIALIZED
 
@@ -73,10 +72,7 @@ class Trajectory:
         about = json.dumps(self.about | {"channels": kept}, allow_nan=False)
         # Time runs fastest: values of neighbouring iterations are similar and compress better.
         arrays = {name: np.asarray(c.codes, order="F") for name, c in self.channels.items()}
-        text = np.frombuffer(about.encode(), dtype=np.uint8)
-        buffer = io.BytesIO()
-        np.savez_compressed(buffer, allow_pickle=False, about=text, **arrays)
-        return buffer.getvalue()
+        return packed(about, arrays, is_compressed=True)
 
     def frame(self, *arrays: str) -> DataFrame:
         """Return a row per iteration and robot as a pandas DataFrame; see ``replay.frame``.

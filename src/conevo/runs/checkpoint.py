@@ -11,14 +11,13 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
-import io
 import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, TypeVar, get_type_hints
 
 from conevo.errors import UsageError, shown
-from conevo.reading import DamagedFile, check, read_arrays
+from conevo.reading import DamagedFile, check, packed, read_arrays
 from conevo.runs.durable import replace_file
 
 __all__ = [
@@ -60,10 +59,8 @@ def save(path: Path, record: Any, identity: Mapping[str, str]) -> None:
     rest = {name: value for name, value in leaves.items() if name not in arrays}
     about = {"format": FORMAT, "identity": dict(identity), "fields": rest}
     about["digest"] = _digest(about, arrays)
-    buffer = io.BytesIO()
-    text = np.frombuffer(json.dumps(about).encode(), dtype=np.uint8)
-    np.savez(buffer, allow_pickle=False, about=text, **{f"field.{k}": v for k, v in arrays.items()})
-    replace_file(path, buffer.getvalue())
+    fields = {f"field.{name}": value for name, value in arrays.items()}
+    replace_file(path, packed(json.dumps(about), fields))
 
 
 def refuse_unkept(record: Any, owner: str) -> None:

@@ -7,7 +7,6 @@ prey) are the opponents of the pursuit-evasion experiments. A prey set is one np
 from __future__ import annotations
 
 import hashlib
-import io
 import json
 from dataclasses import dataclass, field
 from importlib import resources
@@ -18,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from conevo.errors import EnvironmentFailure, UsageError
-from conevo.reading import parse_json, read_arrays
+from conevo.reading import packed, parse_json, read_arrays
 
 __all__ = ["PreySet", "load", "save"]
 
@@ -77,19 +76,11 @@ def save(path: Path, prey: PreySet) -> None:
     Raises:
         EnvironmentFailure: the file cannot be written.
     """
-    about = json.dumps({"format": FORMAT} | prey.about, sort_keys=True).encode()
-    buffer = io.BytesIO()
-    np.savez(
-        buffer,
-        allow_pickle=False,
-        about=np.frombuffer(about, dtype=np.uint8),
-        one=prey.one,
-        one_active=prey.one_active,
-        two=prey.two,
-        two_active=prey.two_active,
-    )
+    about = json.dumps({"format": FORMAT} | prey.about, sort_keys=True)
+    names = ("one", "one_active", "two", "two_active")
+    content = packed(about, {name: getattr(prey, name) for name in names})
     try:
-        path.write_bytes(buffer.getvalue())
+        path.write_bytes(content)
     except OSError as error:
         raise EnvironmentFailure(f"cannot write {path}: {error.strerror}") from error
 
