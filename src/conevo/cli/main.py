@@ -222,7 +222,7 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
             fail(f"standard output: {error.strerror}", 3)
         fail(f"{error.filename}: {error.strerror}" if error.filename else str(error), 3)
     except (Exception, SystemExit) as error:
-        if is_interrupt(error):
+        if isinstance(error, Exception) and is_interrupt(error):  # no exit after its message
             fail("interrupted", 130)
         outside = sys.modules.get("conevo.outside")
         line = outside.line_of(error) if outside else ""
