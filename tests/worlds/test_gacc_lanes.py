@@ -9,6 +9,7 @@ from conevo.worlds.rollout import Rollout
 from worlds.gathering import SMALL, crowded, random_team
 from worlds.lanes import lanes_in
 
+pytestmark = pytest.mark.slow  # the contract of worlds has one number of lanes for each
 PARAMS = SMALL | {"wait": 4, "energy": 1.503, "robot_range": 0.1}
 
 

@@ -9,6 +9,7 @@ from conevo.worlds.rollout import Rollout
 from worlds.lanes import lanes_in
 from worlds.situations import NAN, random_team
 
+pytestmark = pytest.mark.slow  # the contract of worlds has one number of lanes for each
 FULL = {"iterations": 25, "arena_cm": 60.0}  # so that all bodies meet others
 
 

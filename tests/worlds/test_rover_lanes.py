@@ -10,6 +10,7 @@ from conevo.worlds.walk import Walk
 from worlds.lanes import lanes_in
 from worlds.test_rover import crowd, random_team
 
+pytestmark = pytest.mark.slow  # the contract of worlds has one number of lanes for each
 ONE_ROCK = {"rocks_per_activation": 1, "fitness": "activation"}
 
 
