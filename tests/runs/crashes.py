@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import os
 import re
+import shutil
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from conevo.errors import EnvironmentFailure
 from conevo.runs import durable
 
 
@@ -45,3 +49,33 @@ def crashes_and_refusals(calls: list[str]) -> tuple[list[int], list[int]]:
     last = {kind: k for k, kind in named.items()}
     first = {kinds[k]: k for k in reversed(files)}
     return sorted(last.values()), sorted(first.values())
+
+
+def assert_resumes(
+    problem: BaseException,
+    call: int,
+    begin: Callable[[Path], object],
+    opened: Callable[[Path], Any],
+    content: Callable[[Path], dict[str, Any]],
+    whole: dict[str, Any],
+    folder: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Assert that a run or shaping of which one write failed, resumed, has the same content."""
+    path = folder / "broken"
+    with monkeypatch.context() as patch:
+        fail_at(patch, call, problem)
+        with pytest.raises((Crash, EnvironmentFailure)) as caught:
+            begin(path)
+    if isinstance(caught.value, EnvironmentFailure):
+        assert caught.value.exit_code == 3
+        assert str(path) in str(caught.value)
+        assert "No space left on device" in str(caught.value)
+    if not path.exists():  # interrupted in the first write: nothing is left
+        assert [p.name for p in folder.iterdir()] == ["whole"]
+        return
+    left = opened(path)
+    if left.status != "finished":
+        left.resume(threads=1)
+    assert content(path) == whole, call
+    shutil.rmtree(path)

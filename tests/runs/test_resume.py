@@ -6,16 +6,17 @@ import errno
 import os
 import shutil
 import signal
+from functools import partial
 from pathlib import Path
 
 import pytest
 
 import conevo
-from conevo.errors import EnvironmentFailure, UsageError
+from conevo.errors import UsageError
 from conevo.evolution.methods.registry import METHODS
 from conevo.runs.config import resolve
 from conevo.runs.start import start
-from runs.crashes import Crash, crashes_and_refusals, fail_at
+from runs.crashes import Crash, assert_resumes, crashes_and_refusals, fail_at
 from runs.tiny import (
     PAIRS,
     TASK,
@@ -59,7 +60,10 @@ def test_resume_after_a_failure_at_each_kind_of_write(
     crashes, refusals = crashes_and_refusals(calls)
     assert len(crashes) > len(refusals) >= 12
     for call in refusals if problem is FULL else crashes:
-        assert_resumes(problem, call, every, whole, tmp_path, monkeypatch)
+        assert_resumes(
+            problem, call, partial(evolve_tiny, **lengths(every)), conevo.Run, content, whole,
+            tmp_path, monkeypatch,
+        )  # fmt: skip
 
 
 @pytest.mark.exhaustive
@@ -71,7 +75,10 @@ def test_resume_after_a_failure_at_every_write(
     calls, whole = written(tmp_path, monkeypatch, every)
     assert len(calls) >= 30
     for call in range(len(calls)):
-        assert_resumes(problem, call, every, whole, tmp_path, monkeypatch)
+        assert_resumes(
+            problem, call, partial(evolve_tiny, **lengths(every)), conevo.Run, content, whole,
+            tmp_path, monkeypatch,
+        )  # fmt: skip
 
 
 def lengths(every: int) -> dict[str, int]:
@@ -85,34 +92,6 @@ def written(
     with monkeypatch.context() as patch:
         calls = fail_at(patch, -1, Crash())
         return calls, content(evolve_tiny(folder / "whole", **lengths(every)).path)
-
-
-def assert_resumes(
-    problem: BaseException,
-    call: int,
-    every: int,
-    whole: dict[str, object],
-    folder: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """Assert that a run of which one write failed, resumed, has the same content."""
-    path = folder / "broken"
-    with monkeypatch.context() as patch:
-        fail_at(patch, call, problem)
-        with pytest.raises((Crash, EnvironmentFailure)) as caught:
-            evolve_tiny(path, **lengths(every))
-    if isinstance(caught.value, EnvironmentFailure):
-        assert caught.value.exit_code == 3
-        assert str(path) in str(caught.value)
-        assert "No space left on device" in str(caught.value)
-    if not path.exists():  # interrupted in the first write: nothing is left
-        assert [p.name for p in folder.iterdir()] == ["whole"]
-        return
-    run = conevo.Run(path)
-    if run.status != "finished":
-        run.resume(threads=1)
-    assert content(path) == whole, call
-    shutil.rmtree(path)
 
 
 def test_interrupt_keeps_the_last_finished_generation(tmp_path: Path) -> None:

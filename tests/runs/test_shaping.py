@@ -6,7 +6,6 @@ import errno
 import json
 import os
 import re
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -22,7 +21,7 @@ from conevo.rng import fold
 from conevo.runs.code import last_code
 from conevo.runs.shaping import Shaping, start_shaping, tasks_up_to
 from conevo.worlds.pursuit.evolved import TASKS as PREY_TASKS
-from runs.crashes import Crash, crashes_and_refusals, fail_at
+from runs.crashes import Crash, assert_resumes, crashes_and_refusals, fail_at
 from runs.tiny import TINY, arrays, content, evolve_tiny, killed_at, tiny_settings
 
 TASKS = tasks_up_to("rover/complex-3")
@@ -174,7 +173,9 @@ def test_resume_after_a_failure_at_each_kind_of_write(
     crashes, refusals = crashes_and_refusals(calls)
     assert len(crashes) > len(refusals) >= 16
     for call in refusals if problem is FULL else crashes:
-        assert_resumes(problem, call, whole, tmp_path, monkeypatch)
+        assert_resumes(
+            problem, call, carried_out, Shaping, stages_content, whole, tmp_path, monkeypatch
+        )
 
 
 @pytest.mark.exhaustive
@@ -185,40 +186,20 @@ def test_resume_after_a_failure_at_every_write(
     calls, whole = written(tmp_path, monkeypatch)
     assert len(calls) >= 50
     for call in range(len(calls)):
-        assert_resumes(problem, call, whole, tmp_path, monkeypatch)
+        assert_resumes(
+            problem, call, carried_out, Shaping, stages_content, whole, tmp_path, monkeypatch
+        )
 
 
 def written(folder: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[list[str], dict[str, Any]]:
     """Return the writes of a whole shaping and its content."""
     with monkeypatch.context() as patch:
         calls = fail_at(patch, -1, Crash())
-        return calls, stages_content(begin(folder / "whole", **TWO).resume(threads=1).path)
+        return calls, stages_content(carried_out(folder / "whole").path)
 
 
-def assert_resumes(
-    problem: BaseException,
-    call: int,
-    whole: dict[str, Any],
-    folder: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """Assert that a shaping of which one write failed, resumed, has the same content."""
-    path = folder / "broken"
-    with monkeypatch.context() as patch:
-        fail_at(patch, call, problem)
-        with pytest.raises((Crash, EnvironmentFailure)) as caught:
-            begin(path, **TWO).resume(threads=1)
-    if isinstance(caught.value, EnvironmentFailure):
-        assert str(path) in str(caught.value)
-        assert "No space left on device" in str(caught.value)
-    if not path.exists():  # interrupted in the first write: nothing is left
-        assert [p.name for p in folder.iterdir()] == ["whole"]
-        return
-    shaping = Shaping(path)
-    if shaping.status != "finished":
-        shaping.resume(threads=1)
-    assert stages_content(path) == whole, call
-    shutil.rmtree(path)
+def carried_out(path: Path) -> Shaping:
+    return begin(path, **TWO).resume(threads=1)
 
 
 def command(path: Path, settings: dict[str, Any]) -> list[str]:
